@@ -1,0 +1,50 @@
+//! Counter-based random numbers: a path's numbers depend on its key and on the dimension only, never on the order
+//! in which packets are processed.
+
+use croupier_simd::{F32x8, U32x8};
+
+/// Eight 64-bit keys, one per path vertex or sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Key8 {
+    /// Low words.
+    pub lo: U32x8,
+    /// High words.
+    pub hi: U32x8,
+}
+
+/// Four random words per lane: `pcg4d` of Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 9(3) 2020.
+#[inline(always)]
+fn pcg4d(v: [U32x8; 4]) -> [U32x8; 4] {
+    let [mut x, mut y, mut z, mut w] = v.map(|a| a * U32x8::splat(1_664_525) + U32x8::splat(1_013_904_223));
+    x = x + y * w;
+    y = y + z * x;
+    z = z + x * y;
+    w = w + y * z;
+    [x, y, z, w] = [x, y, z, w].map(|a| a ^ (a >> 16));
+    x = x + y * w;
+    y = y + z * x;
+    z = z + x * y;
+    w = w + y * z;
+    [x, y, z, w]
+}
+
+impl Key8 {
+    /// Four independent words of dimension block `dimension`.
+    #[inline(always)]
+    pub fn words(self, dimension: u32) -> [U32x8; 4] {
+        pcg4d([self.lo, self.hi, U32x8::splat(dimension), U32x8::splat(0x9e37_79b9)])
+    }
+
+    /// Four independent numbers in [0, 1 - 2^-24] of dimension block `dimension`.
+    #[inline(always)]
+    pub fn uniforms(self, dimension: u32) -> [F32x8; 4] {
+        self.words(dimension).map(U32x8::to_unit)
+    }
+
+    /// The key of child number `n` (a sample of a vertex, the next vertex of a sample).
+    #[inline(always)]
+    pub fn child(self, n: U32x8) -> Self {
+        let [lo, hi, ..] = pcg4d([self.lo, self.hi, n, U32x8::splat(0x85eb_ca6b)]);
+        Self { lo, hi }
+    }
+}

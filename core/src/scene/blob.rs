@@ -1,0 +1,364 @@
+//! The layout of a scene blob, version 1. Little-endian, position-independent, every record Pod.
+//!
+//! A blob is a [`Header`], a table of [`Section`]s, then the sections, each at an offset that is a multiple of
+//! [`ALIGN`]. Indices are `u32`; [`NONE`] is absence. Bytes become a [`super::Scene`] through
+//! [`super::Scene::from_bytes`] only.
+
+use bytemuck::{Pod, Zeroable};
+
+/// First bytes of every blob.
+pub const MAGIC: [u8; 8] = *b"CROUPIER";
+/// Version of this layout.
+pub const VERSION: u32 = 1;
+/// Sections start at multiples of this many bytes; a blob aligned to it traverses fastest (4 is enough).
+pub const ALIGN: usize = 64;
+/// "No such index".
+pub const NONE: u32 = u32::MAX;
+/// Set in a child reference that is a leaf: bits 0..27 index [`Leaf`]s, bits 27..31 count its triangles (1..=8).
+pub const LEAF_BIT: u32 = 1 << 31;
+/// Bits of a child reference that index.
+pub const CHILD_INDEX: u32 = (1 << 27) - 1;
+/// Deepest tree that validates: with 7 pushed siblings per level a traversal stack of 256 never overflows.
+pub const MAX_TREE_DEPTH: u32 = 34;
+
+macro_rules! kinds {
+    ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $v:ident = $n:expr, $text:literal;)* }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u32)]
+        pub enum $name { $($(#[$vdoc])* $v = $n),* }
+        impl $name {
+            /// Every kind, in the order of its numbers.
+            pub const ALL: &'static [Self] = &[$(Self::$v),*];
+
+            /// From the number in the blob.
+            pub const fn from_u32(x: u32) -> Option<Self> {
+                match x { $($n => Some(Self::$v),)* _ => None }
+            }
+
+            /// The name in scene files.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$v => $text),* }
+            }
+        }
+    };
+}
+
+kinds! {
+    /// What a section holds.
+    SectionKind {
+        /// [`SceneInfo`], exactly one.
+        Info = 0, "info";
+        /// [`Node`]s; the root is node 0. Empty for an empty scene.
+        Nodes = 1, "nodes";
+        /// [`Leaf`]s.
+        Leaves = 2, "leaves";
+        /// [`Triangle`]s.
+        Triangles = 3, "triangles";
+        /// [`Vertex`]es.
+        Vertices = 4, "vertices";
+        /// [`Material`]s.
+        Materials = 5, "materials";
+        /// [`Texture`]s.
+        Textures = 6, "textures";
+        /// `u32` texels: bytes r, g, b, unused; sRGB-encoded.
+        Texels = 7, "texels";
+        /// `f32` tables that materials refer to.
+        Tables = 8, "tables";
+        /// [`Light`]s.
+        Lights = 9, "lights";
+        /// [`Alias`] table over the lights, as many entries as lights.
+        LightAlias = 10, "light alias table";
+        /// [`Environment`], none or one.
+        Environment = 11, "environment";
+        /// `[f32; 3]` radiance texels of the environment map, row 0 first.
+        EnvTexels = 12, "environment texels";
+        /// [`Alias`] tables of the environment map: one over the cell rows, then one per row over its cells.
+        EnvAlias = 13, "environment alias tables";
+        /// [`Camera`], exactly one.
+        Cameras = 14, "camera";
+        /// Bytes: material names, each ended by a newline, in material order.
+        Names = 15, "names";
+    }
+}
+
+kinds! {
+    /// Scattering models.
+    MaterialKind {
+        /// Lambertian.
+        Diffuse = 0, "diffuse";
+        /// Perfect mirror without Fresnel.
+        Mirror = 1, "mirror";
+        /// Smooth conductor.
+        Conductor = 2, "conductor";
+        /// GGX conductor.
+        RoughConductor = 3, "roughconductor";
+        /// Smooth dielectric.
+        Dielectric = 4, "dielectric";
+        /// GGX dielectric.
+        RoughDielectric = 5, "roughdielectric";
+        /// Thin dielectric sheet.
+        ThinDielectric = 6, "thindielectric";
+        /// Smooth coat over a diffuse base.
+        Plastic = 7, "plastic";
+        /// GGX coat over a diffuse base.
+        RoughPlastic = 8, "roughplastic";
+        /// Index-matched boundary.
+        Null = 9, "null";
+    }
+}
+
+kinds! {
+    /// Light kinds.
+    LightKind {
+        /// An emitting triangle (its front side).
+        Area = 0, "area";
+        /// The environment, map or constant.
+        Environment = 1, "environment";
+        /// Isotropic point.
+        Point = 2, "point";
+        /// Parallel light.
+        Directional = 3, "directional";
+    }
+}
+
+kinds! {
+    /// Environment kinds.
+    EnvironmentKind {
+        /// The same radiance from everywhere.
+        Constant = 0, "constant";
+        /// Lat-long map.
+        Map = 1, "envmap";
+    }
+}
+
+/// Start of a blob.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Header {
+    /// [`MAGIC`].
+    pub magic: [u8; 8],
+    /// [`VERSION`].
+    pub version: u32,
+    /// Number of [`Section`]s that follow.
+    pub sections: u32,
+    /// Bytes in all.
+    pub length: u64,
+    /// [`content_hash`] of everything after the header; identifies the scene.
+    pub hash: u64,
+    /// Zero.
+    pub reserved: [u32; 8],
+}
+
+/// One entry of the section table.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Section {
+    /// [`SectionKind`].
+    pub kind: u32,
+    /// Bytes per record.
+    pub stride: u32,
+    /// Bytes from the start of the blob, a multiple of [`ALIGN`].
+    pub offset: u64,
+    /// Number of records.
+    pub count: u64,
+}
+
+/// Facts about the whole scene.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct SceneInfo {
+    /// Smallest coordinates of the triangles, world space.
+    pub bounds_min: [f32; 3],
+    /// Largest coordinates.
+    pub bounds_max: [f32; 3],
+    /// Path segments from the camera (FORMAT.md, `max_depth`); a default for the settings.
+    pub max_depth: u32,
+    /// Degenerate triangles that baking dropped.
+    pub dropped_triangles: u32,
+}
+
+/// Eight child boxes and references. Unused slots hold an empty box (+inf, -inf) and [`NONE`].
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Node {
+    /// Rows: min x, min y, min z, max x, max y, max z of the eight children.
+    pub bounds: [[f32; 8]; 6],
+    /// Child references: a node index, or [`LEAF_BIT`] | count << 27 | leaf index, or [`NONE`].
+    pub child: [u32; 8],
+    /// Zero.
+    pub reserved: [u32; 8],
+}
+
+/// Up to eight triangles; unused slots hold zeros and [`NONE`].
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Leaf {
+    /// Rows: ax, ay, az, bx, by, bz, cx, cy, cz.
+    pub p: [[f32; 8]; 9],
+    /// Triangle indices.
+    pub triangle: [u32; 8],
+}
+
+/// One triangle for shading.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Triangle {
+    /// Vertex indices; counter-clockwise seen from the front.
+    pub vertex: [u32; 3],
+    /// Material index.
+    pub material: u32,
+    /// Light index if it emits, else [`NONE`].
+    pub light: u32,
+    /// [`TRIANGLE_SMOOTH`].
+    pub flags: u32,
+}
+
+/// Interpolate the vertex normals; else the geometric normal shades.
+pub const TRIANGLE_SMOOTH: u32 = 1;
+
+/// One vertex, world space.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Vertex {
+    /// Position.
+    pub p: [f32; 3],
+    /// Unit normal; used where the triangle is smooth.
+    pub n: [f32; 3],
+    /// Texture coordinates, v upwards.
+    pub uv: [f32; 2],
+}
+
+/// One material; fields a kind does not use are 0. See `bsdf/` for each model's parameters.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Material {
+    /// [`MaterialKind`].
+    pub kind: u32,
+    /// [`MATERIAL_TWO_SIDED`].
+    pub flags: u32,
+    /// Texture index that replaces `reflectance`, or [`NONE`].
+    pub texture: u32,
+    /// First entry of this material's table in the tables section, or [`NONE`].
+    pub table: u32,
+    /// Linear Rec. 709; diffuse albedo or scale of the specular reflection.
+    pub reflectance: [f32; 3],
+    /// GGX width.
+    pub alpha: f32,
+    /// Conductors: real refractive index per channel. Dielectrics and plastics: `eta[0]` = int_ior / ext_ior.
+    pub eta: [f32; 3],
+    /// Plastics: reflectance of the interface from inside for diffuse light (`Fdr`, or `R` of the rough plastic).
+    pub fdr: f32,
+    /// Conductors: extinction per channel.
+    pub k: [f32; 3],
+    /// Zero.
+    pub reserved: f32,
+    /// Radiance emitted from the front side by triangles with a light index.
+    pub emission: [f32; 3],
+    /// Zero.
+    pub reserved2: f32,
+}
+
+/// Both sides behave like the front.
+pub const MATERIAL_TWO_SIDED: u32 = 1;
+
+/// One texture: `width * height` texels from `first` in the texels section; row 0 is the top (v = 1).
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Texture {
+    /// First texel.
+    pub first: u32,
+    /// Columns, >= 1.
+    pub width: u32,
+    /// Rows, >= 1.
+    pub height: u32,
+    /// Zero.
+    pub reserved: u32,
+}
+
+/// One light.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Light {
+    /// [`LightKind`].
+    pub kind: u32,
+    /// Area: the triangle.
+    pub triangle: u32,
+    /// Probability that the alias table picks it, exactly the table's integer width / 2^32.
+    pub probability: f32,
+    /// Area: the triangle's area.
+    pub area: f32,
+    /// Point: position. Directional: unit direction towards the light.
+    pub vector: [f32; 3],
+    /// Area: radiance. Point: intensity. Directional: irradiance on a facing surface.
+    pub emission: [f32; 3],
+    /// Zero.
+    pub reserved: [u32; 2],
+}
+
+/// Entry of an alias table over n items (Vose 1991) with integer thresholds: a 32-bit number r picks slot
+/// `i = (r * n) >> 32` and keeps it if the low word `(r * n) as u32 < threshold`, else takes `alias`. A threshold of
+/// `u32::MAX` means "always keep" and has `alias == i`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Alias {
+    /// Keep slot i below this.
+    pub threshold: u32,
+    /// The other item.
+    pub alias: u32,
+    /// Probability of item i over all slots.
+    pub probability: f32,
+}
+
+/// The environment.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Environment {
+    /// [`EnvironmentKind`].
+    pub kind: u32,
+    /// Its light index.
+    pub light: u32,
+    /// Map: columns, >= 1.
+    pub width: u32,
+    /// Map: rows, >= 2.
+    pub height: u32,
+    /// Map: rows of the rotation world -> map space.
+    pub to_local: [[f32; 3]; 3],
+    /// Constant: radiance. Map: scale.
+    pub radiance: [f32; 3],
+}
+
+/// Pinhole or thin-lens camera. A pixel sample at (x, y) in [0, width) x [0, height), y down, looks along
+/// `forward + right * ((2 x / width) - 1) + down * ((2 y / height) - 1)`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Camera {
+    /// World position.
+    pub origin: [f32; 3],
+    /// Unit viewing axis.
+    pub forward: [f32; 3],
+    /// From the image centre to its right edge, at distance 1.
+    pub right: [f32; 3],
+    /// From the image centre to its lower edge, at distance 1.
+    pub down: [f32; 3],
+    /// Lens radius; 0 is a pinhole.
+    pub lens_radius: f32,
+    /// Distance of the plane in focus along the axis.
+    pub focus_distance: f32,
+    /// Default image size in pixels.
+    pub size: [u32; 2],
+}
+
+/// Identifies content: 64-bit FNV-1a over the bytes taken as little-endian 64-bit words, the tail padded with zeros,
+/// each step followed by a rotation.
+pub fn content_hash(bytes: &[u8]) -> u64 {
+    let mut h: u64 = 0xcbf2_9ce4_8422_2325;
+    for c in bytes.chunks(8) {
+        let mut w = [0u8; 8];
+        for (d, s) in w.iter_mut().zip(c) {
+            *d = *s;
+        }
+        h = (h ^ u64::from_le_bytes(w)).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29);
+    }
+    h
+}

@@ -1,0 +1,1 @@
+//! Bilinear texture look-up.

@@ -1,0 +1,1 @@
+//! Files, trees and threads around the croupier core.

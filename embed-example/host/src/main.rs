@@ -1,0 +1,3 @@
+//! The program `croupier`.
+
+fn main() {}

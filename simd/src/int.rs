@@ -1,0 +1,126 @@
+//! Eight integers: wrapping arithmetic, logical shifts.
+
+use crate::{F32x8, Mask8};
+use bytemuck::{Pod, Zeroable};
+use core::ops::{Add, BitAnd, BitOr, BitXor, Mul, Not, Shl, Shr, Sub};
+use wide::{i32x8, u32x8};
+
+/// Eight `u32` lanes; arithmetic wraps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(transparent)]
+pub struct U32x8(pub(crate) u32x8);
+
+/// Eight `i32` lanes; arithmetic wraps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(transparent)]
+pub struct I32x8(pub(crate) i32x8);
+
+macro_rules! common {
+    ($t:ident, $w:ident, $s:ty) => {
+        impl $t {
+            /// All lanes equal to `x`.
+            #[inline(always)]
+            pub const fn splat(x: $s) -> Self {
+                Self($w::splat(x))
+            }
+
+            /// Lane `i` = `a[i]`.
+            #[inline(always)]
+            pub const fn new(a: [$s; 8]) -> Self {
+                Self($w::new(a))
+            }
+
+            /// Lane `i` = `f(i)`.
+            #[inline(always)]
+            pub fn from_fn(f: impl FnMut(usize) -> $s) -> Self {
+                Self::new(core::array::from_fn(f))
+            }
+
+            /// The lanes as an array.
+            #[inline(always)]
+            pub const fn to_array(self) -> [$s; 8] {
+                self.0.to_array()
+            }
+
+            /// Lane `i & 7`.
+            #[inline(always)]
+            pub fn lane(self, i: usize) -> $s {
+                self.to_array()[i & 7]
+            }
+
+            /// `self == o`.
+            #[inline(always)]
+            pub fn eq(self, o: Self) -> Mask8 {
+                Mask8(bytemuck::cast(self.0.simd_eq(o.0)))
+            }
+
+            /// `self < o`.
+            #[inline(always)]
+            pub fn lt(self, o: Self) -> Mask8 {
+                Mask8(bytemuck::cast(self.0.simd_lt(o.0)))
+            }
+
+            /// `a` where `mask`, else `b`.
+            #[inline(always)]
+            pub fn select(mask: Mask8, a: Self, b: Self) -> Self {
+                bytemuck::cast(mask.select(bytemuck::cast(a), bytemuck::cast(b)))
+            }
+        }
+        common!(@op $t, Add add +, Sub sub -, Mul mul *, BitAnd bitand &, BitOr bitor |, BitXor bitxor ^);
+        impl Not for $t {
+            type Output = Self;
+            #[inline(always)]
+            fn not(self) -> Self {
+                Self(!self.0)
+            }
+        }
+        impl Shl<u32> for $t {
+            type Output = Self;
+            #[inline(always)]
+            fn shl(self, n: u32) -> Self {
+                Self(self.0 << n)
+            }
+        }
+        impl Shr<u32> for $t {
+            type Output = Self;
+            #[inline(always)]
+            fn shr(self, n: u32) -> Self {
+                Self(self.0 >> n)
+            }
+        }
+    };
+    (@op $t:ident, $($tr:ident $f:ident $op:tt),*) => {$(
+        impl $tr for $t {
+            type Output = Self;
+            #[inline(always)]
+            fn $f(self, o: Self) -> Self {
+                Self(self.0 $op o.0)
+            }
+        }
+    )*};
+}
+common!(U32x8, u32x8, u32);
+common!(I32x8, i32x8, i32);
+
+impl U32x8 {
+    /// A float on the grid of 2^-24 in [0, 1 - 2^-24], from the upper 24 bits (NUMERICS SMP-1).
+    #[inline(always)]
+    pub fn to_unit(self) -> F32x8 {
+        let i: I32x8 = bytemuck::cast(self >> 8);
+        i.to_f32() * (1.0 / 16_777_216.0)
+    }
+}
+
+impl I32x8 {
+    /// Nearest float.
+    #[inline(always)]
+    pub fn to_f32(self) -> F32x8 {
+        F32x8(self.0.round_float())
+    }
+
+    /// The same bits as unsigned numbers.
+    #[inline(always)]
+    pub fn to_u32(self) -> U32x8 {
+        bytemuck::cast(self)
+    }
+}

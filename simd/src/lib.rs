@@ -1,0 +1,24 @@
+//! Eight lanes of everything a path tracer needs, over [`wide`] behind thin types of our own.
+//!
+//! This layer knows floats, integers, masks, vectors and elementary functions. It must not know rays,
+//! light or scenes.
+//!
+//! Two arithmetics: the default, *reproducible*, uses only IEEE `+ - * / sqrt`, comparisons and integer
+//! operations in a fixed order, so that every target computes the same bits. With the feature `fast`
+//! [`F32x8::mul_add`] fuses where the target can; nothing else changes.
+#![no_std]
+#![cfg_attr(not(all(target_arch = "arm", target_abi = "eabihf")), forbid(unsafe_code))]
+
+mod f32x8;
+mod int;
+mod mask;
+mod math;
+mod vec3;
+
+pub use f32x8::F32x8;
+pub use int::{I32x8, U32x8};
+pub use mask::Mask8;
+pub use vec3::{Frame8, Vec3x8};
+
+/// Lanes of every vector type here.
+pub const LANES: usize = 8;

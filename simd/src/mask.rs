@@ -1,0 +1,157 @@
+//! Lane masks: a type of their own, never floats.
+
+use core::ops::{BitAnd, BitAndAssign, BitOr, BitOrAssign, BitXor, Not};
+use wide::f32x8;
+
+/// One boolean per lane.
+#[derive(Clone, Copy)]
+#[repr(transparent)]
+pub struct Mask8(pub(crate) f32x8);
+
+const BITS: [u32; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
+
+impl Mask8 {
+    /// No lane.
+    pub const NONE: Self = Self(f32x8::splat(0.0));
+
+    /// All lanes equal to `b`.
+    #[inline(always)]
+    pub fn splat(b: bool) -> Self {
+        Self::from_bits(if b { 0xff } else { 0 })
+    }
+
+    /// All lanes.
+    #[inline(always)]
+    pub fn all_lanes() -> Self {
+        Self(!f32x8::splat(0.0))
+    }
+
+    /// Lane `i` from bit `i`; higher bits are ignored.
+    #[inline(always)]
+    pub fn from_bits(bits: u32) -> Self {
+        let b = wide::u32x8::new(BITS);
+        Self(bytemuck::cast((wide::u32x8::splat(bits) & b).simd_eq(b)))
+    }
+
+    /// The first `n` lanes.
+    #[inline(always)]
+    pub fn first(n: usize) -> Self {
+        Self::from_bits((1u32 << n.min(8)) - 1)
+    }
+
+    /// Lane `i` as bit `i`.
+    #[inline(always)]
+    pub fn bits(self) -> u32 {
+        self.0.to_bitmask()
+    }
+
+    /// Is any lane set?
+    #[inline(always)]
+    pub fn any(self) -> bool {
+        self.bits() != 0
+    }
+
+    /// Are all lanes set?
+    #[inline(always)]
+    pub fn all(self) -> bool {
+        self.bits() == 0xff
+    }
+
+    /// Is no lane set?
+    #[inline(always)]
+    pub fn none(self) -> bool {
+        self.bits() == 0
+    }
+
+    /// How many lanes are set.
+    #[inline(always)]
+    pub fn count(self) -> u32 {
+        self.bits().count_ones()
+    }
+
+    /// Lane `i`; `false` outside `0..8`.
+    #[inline(always)]
+    pub fn lane(self, i: usize) -> bool {
+        i < 8 && self.bits() >> i & 1 == 1
+    }
+
+    /// The set lanes' numbers, ascending.
+    #[inline(always)]
+    pub fn lanes(self) -> Lanes {
+        Lanes(self.bits())
+    }
+
+    /// `self` without the lanes of `other`.
+    #[inline(always)]
+    pub fn and_not(self, other: Self) -> Self {
+        self & !other
+    }
+}
+
+/// Iterator over the set lanes of a [`Mask8`].
+#[derive(Clone, Copy, Debug)]
+pub struct Lanes(u32);
+
+impl Iterator for Lanes {
+    type Item = usize;
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        if self.0 == 0 {
+            return None;
+        }
+        let i = self.0.trailing_zeros() as usize & 7;
+        self.0 &= self.0 - 1;
+        Some(i)
+    }
+}
+
+macro_rules! bit_op {
+    ($tr:ident, $f:ident, $op:tt) => {
+        impl $tr for Mask8 {
+            type Output = Self;
+            #[inline(always)]
+            fn $f(self, o: Self) -> Self {
+                Self(self.0 $op o.0)
+            }
+        }
+    };
+}
+bit_op!(BitAnd, bitand, &);
+bit_op!(BitOr, bitor, |);
+bit_op!(BitXor, bitxor, ^);
+
+impl Not for Mask8 {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        Self(!self.0)
+    }
+}
+
+impl BitAndAssign for Mask8 {
+    #[inline(always)]
+    fn bitand_assign(&mut self, o: Self) {
+        *self = *self & o;
+    }
+}
+
+impl BitOrAssign for Mask8 {
+    #[inline(always)]
+    fn bitor_assign(&mut self, o: Self) {
+        *self = *self | o;
+    }
+}
+
+impl core::fmt::Debug for Mask8 {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "Mask8({:08b})", self.bits())
+    }
+}
+
+impl PartialEq for Mask8 {
+    fn eq(&self, o: &Self) -> bool {
+        self.bits() == o.bits()
+    }
+}
+
+impl Eq for Mask8 {}

@@ -1,0 +1,1 @@
+//! Scalar f64 oracles and statistics shared by the integration tests.
