@@ -48,3 +48,12 @@ impl Key8 {
         Self { lo, hi }
     }
 }
+
+impl Key8 {
+    /// The key of a camera sample.
+    #[inline(always)]
+    pub fn camera(seed: u64, pixel: U32x8, sample: U32x8) -> Self {
+        let [lo, hi, ..] = pcg4d([pixel, sample, U32x8::splat(seed as u32), U32x8::splat((seed >> 32) as u32)]);
+        Self { lo, hi }
+    }
+}

@@ -1,0 +1,211 @@
+//! What a picture is made of: per pixel f64 sums, so that neither 1e9 samples nor one firefly spoils the mean
+//! (NUMERICS FLM-1), and what can be said from them.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Sums over the camera samples of one pixel.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct PixelStats {
+    /// Radiance, linear Rec. 709.
+    pub sum: [f64; 3],
+    /// Squared radiance.
+    pub sum_sqr: [f64; 3],
+    /// Camera samples.
+    pub samples: u64,
+    /// Rays traced for them.
+    pub rays: u64,
+}
+
+/// Sums of auxiliary values of one pixel.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct PixelAov {
+    /// Albedo of the first hit.
+    pub albedo: [f64; 3],
+    /// Shading normal of the first hit, world space.
+    pub normal: [f64; 3],
+    /// Distance to the first hit.
+    pub depth: f64,
+    /// Camera samples that hit something.
+    pub hits: f64,
+    /// Roulette factors at the vertices of depth 1, 2, 3 and above.
+    pub factor: [f64; 4],
+    /// How many vertices those are.
+    pub vertices: [f64; 4],
+}
+
+impl PixelStats {
+    /// Adds one camera sample.
+    pub(crate) fn add(&mut self, radiance: [f64; 3], rays: u32) {
+        for (c, x) in radiance.into_iter().enumerate() {
+            self.sum[c] += x;
+            self.sum_sqr[c] += x * x;
+        }
+        self.samples += 1;
+        self.rays += u64::from(rays);
+    }
+
+    fn merge(&mut self, o: &Self) {
+        for c in 0..3 {
+            self.sum[c] += o.sum[c];
+            self.sum_sqr[c] += o.sum_sqr[c];
+        }
+        self.samples += o.samples;
+        self.rays += o.rays;
+    }
+
+    /// Mean radiance; 0 before the first sample.
+    pub fn mean(&self) -> [f64; 3] {
+        let n = self.samples.max(1) as f64;
+        self.sum.map(|s| s / n)
+    }
+
+    /// Squared standard error of the mean per channel. One sample tells nothing of its error: its own square stands in.
+    pub fn variance_of_mean(&self) -> [f64; 3] {
+        let n = self.samples as f64;
+        core::array::from_fn(|c| match self.samples {
+            0 => 0.0,
+            1 => self.sum_sqr[c],
+            _ => ((self.sum_sqr[c] - self.sum[c] * self.sum[c] / n) / (n * (n - 1.0))).max(0.0),
+        })
+    }
+}
+
+impl PixelAov {
+    fn merge(&mut self, o: &Self) {
+        let (a, b): (&mut [f64; 16], &[f64; 16]) = (bytemuck::cast_mut(self), bytemuck::cast_ref(o));
+        for (a, b) in a.iter_mut().zip(b) {
+            *a += *b;
+        }
+    }
+}
+
+/// The whole picture, row 0 at the top.
+#[derive(Debug)]
+pub struct Film<'m> {
+    pub(crate) size: [u32; 2],
+    pub(crate) pixels: &'m mut [PixelStats],
+    pub(crate) aovs: &'m mut [PixelAov],
+}
+
+/// relMSE that the picture is estimated to have against its own expectation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ErrorEstimate {
+    /// Mean over pixels and channels of variance / (mean^2 + 0.01), without the worst 0.01 % of pixels.
+    pub rel_mse: f64,
+    /// Lower end of its 95 % interval.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// The same mean with every pixel.
+    pub rel_mse_all: f64,
+}
+
+/// Stabiliser of relMSE's denominator (DESIGN.md section 4).
+pub const REL_MSE_EPSILON: f64 = 1e-2;
+
+impl Film<'_> {
+    /// Columns and rows.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// Pixels row by row.
+    pub fn pixels(&self) -> &[PixelStats] {
+        self.pixels
+    }
+
+    /// Auxiliary sums row by row; empty if the settings did not ask for them.
+    pub fn aovs(&self) -> &[PixelAov] {
+        self.aovs
+    }
+
+    pub(crate) fn merge(&mut self, pixel: usize, stats: &PixelStats, aov: Option<&PixelAov>) {
+        if let Some(p) = self.pixels.get_mut(pixel) {
+            p.merge(stats);
+        }
+        if let (Some(a), Some(b)) = (self.aovs.get_mut(pixel), aov) {
+            a.merge(b);
+        }
+    }
+
+    /// Estimated error of the picture. The interval is the normal one over the pixels' contributions, which are
+    /// independent; it is wide while few samples carry most of the error.
+    pub fn error_estimate(&self) -> ErrorEstimate {
+        let n = self.pixels.len();
+        if n == 0 {
+            return ErrorEstimate::default();
+        }
+        let discard = n / 10_000;
+        let limit = if discard == 0 { f32::INFINITY } else { self.kth_largest_error(discard) };
+        let (mut all, mut kept, mut kept_sqr, mut count) = (0.0, 0.0, 0.0, 0u64);
+        for p in self.pixels.iter() {
+            let e = relative_error(p);
+            all += e;
+            if (e as f32) < limit {
+                kept += e;
+                kept_sqr += e * e;
+                count += 1;
+            }
+        }
+        let m = count.max(1) as f64;
+        let mean = kept / m;
+        let spread = ((kept_sqr / m - mean * mean).max(0.0) / m).sqrt_newton();
+        ErrorEstimate {
+            rel_mse: mean,
+            low: (mean - 1.96 * spread).max(0.0),
+            high: mean + 1.96 * spread,
+            rel_mse_all: all / n as f64,
+        }
+    }
+
+    /// The `k`-th largest relative error (k >= 1), by radix selection on the float's bits: four passes, no memory.
+    fn kth_largest_error(&self, k: usize) -> f32 {
+        let (mut prefix, mut left) = (0u32, k);
+        for shift in [24u32, 16, 8, 0] {
+            let mut histogram = [0usize; 256];
+            for p in self.pixels.iter() {
+                let bits = (relative_error(p) as f32).to_bits();
+                if shift == 24 || bits >> (shift + 8) == prefix >> (shift + 8) {
+                    histogram[(bits >> shift & 0xff) as usize] += 1;
+                }
+            }
+            for digit in (0..256usize).rev() {
+                if left <= histogram[digit] {
+                    prefix |= (digit as u32) << shift;
+                    break;
+                }
+                left -= histogram[digit];
+            }
+        }
+        f32::from_bits(prefix)
+    }
+}
+
+/// One pixel's share of relMSE: mean over channels of variance / (mean^2 + eps), the mean's square freed of its own
+/// variance.
+fn relative_error(p: &PixelStats) -> f64 {
+    let (m, v) = (p.mean(), p.variance_of_mean());
+    let share = |c: usize| v[c] / ((m[c] * m[c] - v[c]).max(0.0) + REL_MSE_EPSILON);
+    (share(0) + share(1) + share(2)) / 3.0
+}
+
+/// Square root where `core` has none: the same bits on every target.
+pub(crate) trait SqrtNewton {
+    fn sqrt_newton(self) -> f64;
+}
+
+impl SqrtNewton for f64 {
+    /// Newton's iteration from an estimate by halving the exponent; within 1 ulp for normal numbers.
+    fn sqrt_newton(self) -> f64 {
+        if self <= 0.0 || !self.is_finite() {
+            return if self > 0.0 { self } else { 0.0 };
+        }
+        let mut y = f64::from_bits((self.to_bits() >> 1) + 0x1ff8_0000_0000_0000);
+        for _ in 0..5 {
+            y = 0.5 * (y + self / y);
+        }
+        y
+    }
+}

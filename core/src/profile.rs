@@ -1,0 +1,58 @@
+//! Kernel profiles: which effects the compiled kernels contain. An effect outside the profile costs nothing, because the
+//! compiler removes it; a scene that calls for one outside is refused when the session starts.
+
+use crate::scene::Effects;
+
+/// A set of effects, fixed at compile time. A firmware defines its own; hosts choose one of the closed set here.
+pub trait Profile {
+    /// What the kernels contain.
+    const EFFECTS: Effects;
+    /// Name for reports.
+    const NAME: &'static str;
+}
+
+/// Diffuse surfaces under area lights or a constant sky.
+#[derive(Clone, Copy, Debug)]
+pub struct Matte;
+
+/// Everything.
+#[derive(Clone, Copy, Debug)]
+pub struct Full;
+
+impl Profile for Matte {
+    const EFFECTS: Effects = Effects::DIFFUSE
+        .with(Effects::AREA_LIGHTS)
+        .with(Effects::CONSTANT)
+        .with(Effects::SMOOTH_NORMALS)
+        .with(Effects::TEXTURES);
+    const NAME: &'static str = "matte";
+}
+
+impl Profile for Full {
+    const EFFECTS: Effects = Effects(u32::MAX);
+    const NAME: &'static str = "full";
+}
+
+/// The closed set, for hosts that load arbitrary scenes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AnyProfile {
+    /// [`Matte`].
+    Matte,
+    /// [`Full`].
+    Full,
+}
+
+impl AnyProfile {
+    /// The smallest of the set that holds `effects`.
+    pub const fn smallest(effects: Effects) -> Self {
+        if Matte::EFFECTS.contains(effects) { Self::Matte } else { Self::Full }
+    }
+
+    /// Its name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Matte => Matte::NAME,
+            Self::Full => Full::NAME,
+        }
+    }
+}

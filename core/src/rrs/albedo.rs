@@ -1,0 +1,33 @@
+//! Roulette by albedo (EARS sections 2 and 6.4): of this vertex, or of all vertices so far multiplied, which path guiding
+//! needs because a guided throughput says nothing about how much light is left.
+
+use super::{RrsStrategy, Vertices8};
+use croupier_simd::F32x8;
+
+/// Mean albedo of the vertex, or the product along the path.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Albedo {
+    /// Multiply the albedos of all vertices so far.
+    pub product: bool,
+}
+
+impl Albedo {
+    pub(super) fn parse(options: &str) -> Option<Self> {
+        match options {
+            "" => Some(Self { product: false }),
+            "product" => Some(Self { product: true }),
+            _ => Option::None,
+        }
+    }
+}
+
+impl RrsStrategy for Albedo {
+    const NEEDS_ALBEDO: bool = true;
+
+    #[inline(always)]
+    fn factor(&self, v: &Vertices8) -> F32x8 {
+        let a = v.albedo.mean();
+        let a = if self.product { a * v.albedo_product } else { a };
+        a.min(F32x8::ONE)
+    }
+}

@@ -1,0 +1,21 @@
+//! Roulette by the last bounce's weight (seed 002): the throughput then stays near what it was.
+
+use super::{RrsStrategy, Vertices8};
+use croupier_simd::F32x8;
+
+/// The largest rgb of the last bounce's weight, at most 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Contribution;
+
+impl Contribution {
+    pub(super) fn parse(options: &str) -> Option<Self> {
+        options.is_empty().then_some(Self)
+    }
+}
+
+impl RrsStrategy for Contribution {
+    #[inline(always)]
+    fn factor(&self, v: &Vertices8) -> F32x8 {
+        v.last_weight.max_component().min(F32x8::ONE)
+    }
+}

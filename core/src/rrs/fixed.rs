@@ -1,0 +1,29 @@
+//! A constant factor at every vertex: the workhorse that proves roulette and splitting.
+//!
+//! | parameter | unit | range | default |
+//! |---|---|---|---|
+//! | `factor` | samples per vertex | 0.05 to 20 | none |
+
+use super::{MAX_FACTOR, MIN_FACTOR, RrsStrategy, Vertices8};
+use croupier_simd::F32x8;
+
+/// The factor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fixed {
+    /// Samples per vertex.
+    pub factor: f32,
+}
+
+impl Fixed {
+    pub(super) fn parse(options: &str) -> Option<Self> {
+        let factor: f32 = options.parse().ok()?;
+        (MIN_FACTOR..=MAX_FACTOR).contains(&factor).then_some(Self { factor })
+    }
+}
+
+impl RrsStrategy for Fixed {
+    #[inline(always)]
+    fn factor(&self, _: &Vertices8) -> F32x8 {
+        F32x8::splat(self.factor)
+    }
+}

@@ -1,0 +1,157 @@
+//! Russian roulette and splitting: how many samples a vertex gets.
+//!
+//! A strategy gives a real factor `s` per lane; [`comb`] rounds the factors of a packet to sample counts with
+//! E\[n\] = s. Every estimate is divided by `s`, never by `n`, so any positive `s` that was fixed before the samples
+//! were drawn leaves the mean alone (RRS.md section 1; EARS, SIGGRAPH 2022, eq. 10).
+//!
+//! A new strategy is one file and one line in the table below.
+
+mod albedo;
+mod classic;
+mod comb;
+mod contribution;
+mod fixed;
+mod none;
+mod threshold;
+mod throughput;
+
+pub use albedo::Albedo;
+pub use classic::Classic;
+pub use comb::{COMB_ONE, comb};
+pub use contribution::Contribution;
+pub use fixed::Fixed;
+pub use none::None;
+pub use threshold::Threshold;
+pub use throughput::{Norm, Throughput};
+
+use core::fmt;
+use croupier_simd::{F32x8, U32x8, Vec3x8};
+
+/// Smallest factor of an unbiased strategy.
+pub const MIN_FACTOR: f32 = 0.05;
+/// Largest factor.
+pub const MAX_FACTOR: f32 = 20.0;
+
+/// What a strategy may look at, one vertex per lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Vertices8 {
+    /// Prefix weight: throughput over all factors so far.
+    pub beta: Vec3x8,
+    /// Weight of the last bounce, `f cos / pdf`; 1 at the first vertex.
+    pub last_weight: Vec3x8,
+    /// Albedo of this vertex seen from `wo`; 0 unless [`Strategy::needs_albedo`].
+    pub albedo: Vec3x8,
+    /// Product of the mean albedos of the vertices before this one.
+    pub albedo_product: F32x8,
+    /// Path segments from the camera; the first vertex has 1.
+    pub depth: U32x8,
+}
+
+/// One way to choose factors.
+pub trait RrsStrategy {
+    /// Does [`Self::factor`] read `albedo` or `albedo_product`?
+    const NEEDS_ALBEDO: bool = false;
+
+    /// The factor per lane, before clamping to [[`MIN_FACTOR`], [`MAX_FACTOR`]]. Lanes that are not finite count as 1.
+    fn factor(&self, v: &Vertices8) -> F32x8;
+}
+
+macro_rules! strategies {
+    ($($(#[$doc:meta])* $name:ident, $text:literal, $help:literal;)*) => {
+        /// A strategy with its parameters.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum Strategy { $($(#[$doc])* $name($name)),* }
+
+        impl Strategy {
+            /// Names and one-line descriptions.
+            pub const TABLE: &'static [(&'static str, &'static str)] = &[$(($text, $help)),*];
+
+            /// The name in [`Self::TABLE`].
+            pub const fn name(&self) -> &'static str {
+                match self { $(Self::$name(_) => $text),* }
+            }
+
+            /// Parses `name` or `name:options`; see [`Self::TABLE`].
+            pub fn parse(text: &str) -> Result<Self, ParseError> {
+                let (name, options) = text.split_once(':').unwrap_or((text, ""));
+                match name {
+                    $($text => $name::parse(options).map(Self::$name).ok_or(ParseError::Options($text)),)*
+                    _ => Err(ParseError::Name),
+                }
+            }
+
+            /// See [`RrsStrategy::NEEDS_ALBEDO`].
+            pub fn needs_albedo(&self) -> bool {
+                match self { $(Self::$name(_) => <$name as RrsStrategy>::NEEDS_ALBEDO),* }
+            }
+
+            /// May it end every path below some threshold for ever, so that the picture is biased?
+            pub const fn is_biased(&self) -> bool {
+                matches!(self, Self::Threshold(_))
+            }
+
+            /// The factor per lane: unbiased strategies are clamped to [[`MIN_FACTOR`], [`MAX_FACTOR`]], and a factor
+            /// that is not finite is 1 (NUMERICS RRS-3).
+            #[inline(always)]
+            pub fn factor(&self, v: &Vertices8) -> F32x8 {
+                let s = match self { $(Self::$name(x) => x.factor(v)),* };
+                let s = s.is_finite().select(s, F32x8::ONE);
+                if self.is_biased() { s } else { s.clamp(MIN_FACTOR, MAX_FACTOR) }
+            }
+        }
+    };
+}
+
+strategies! {
+    /// No roulette: 1 up to `max_depth`.
+    None, "none", "factor 1; paths end at max_depth only";
+    /// Deterministic cut, biased.
+    Threshold, "threshold", "threshold[:EPS]: 1 while throughput > EPS, else the path ends (biased on purpose)";
+    /// Last bounce's weight.
+    Contribution, "contribution", "largest rgb of the last bounce's weight";
+    /// Throughput.
+    Throughput, "throughput", "throughput[:max|luminance|mean[:LO:HI[:START]]]: clamped norm of the throughput";
+    /// Albedo.
+    Albedo, "albedo", "albedo[:product]: albedo of the vertex, or of all vertices so far multiplied";
+    /// Throughput times albedo.
+    Classic, "classic", "classic[:START]: throughput x albedo from the START-th bounce (5), absolute";
+    /// Constant.
+    Fixed, "fixed", "fixed:S: the constant factor S at every vertex, 0.05 to 20";
+}
+
+impl Default for Strategy {
+    fn default() -> Self {
+        Self::Classic(Classic::default())
+    }
+}
+
+/// Why a strategy's text is not understood.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ParseError {
+    /// No strategy of this name.
+    Name,
+    /// The options after the colon do not fit the named strategy.
+    Options(&'static str),
+}
+
+impl fmt::Display for ParseError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Name => {
+                f.write_str("unknown roulette strategy; known:")?;
+                Strategy::TABLE.iter().try_for_each(|(n, _)| write!(f, " {n}"))
+            }
+            Self::Options(name) => {
+                let help = Strategy::TABLE.iter().find(|t| t.0 == *name).map_or("", |t| t.1);
+                write!(f, "options of roulette strategy `{name}` not understood; {help}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for ParseError {}
+
+/// A number for an option, `default` where the text is empty.
+fn number<T: core::str::FromStr>(text: &str, default: T) -> Option<T> {
+    if text.is_empty() { Some(default) } else { text.parse().ok() }
+}

@@ -1,0 +1,28 @@
+//! Deterministic cut below a throughput (seed 003): biased on purpose, to show what bias looks like.
+//!
+//! | parameter | unit | range | default |
+//! |---|---|---|---|
+//! | `eps` | throughput, largest rgb | >= 0 | 0.1 |
+
+use super::{RrsStrategy, Vertices8};
+use croupier_simd::F32x8;
+
+/// Factor 1 while the largest rgb of the throughput exceeds `eps`, else 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Threshold {
+    /// Cut below this.
+    pub eps: f32,
+}
+
+impl Threshold {
+    pub(super) fn parse(options: &str) -> Option<Self> {
+        super::number(options, 0.1).filter(|&eps: &f32| eps >= 0.0).map(|eps| Self { eps })
+    }
+}
+
+impl RrsStrategy for Threshold {
+    #[inline(always)]
+    fn factor(&self, v: &Vertices8) -> F32x8 {
+        v.beta.max_component().gt(F32x8::splat(self.eps)).zero_unless(F32x8::ONE)
+    }
+}

@@ -1,0 +1,86 @@
+//! Roulette by throughput, the textbook rule (seeds 000, 003).
+//!
+//! | parameter | unit | range | default |
+//! |---|---|---|---|
+//! | `norm` | of the prefix weight's rgb | max, luminance, mean | max |
+//! | `low`, `high` | factor | 0.05 <= low <= high <= 20 | 0.05, 0.95 |
+//! | `start` | path segments from the camera | >= 1 | 1 |
+
+use super::{MAX_FACTOR, MIN_FACTOR, RrsStrategy, Vertices8};
+use croupier_simd::{F32x8, U32x8, Vec3x8};
+
+/// How a colour becomes a number.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Norm {
+    /// Largest of r, g, b.
+    #[default]
+    Max,
+    /// Rec. 709 luminance.
+    Luminance,
+    /// Mean of r, g, b.
+    Mean,
+}
+
+impl Norm {
+    /// The norm of each lane.
+    #[inline(always)]
+    pub fn of(self, c: Vec3x8) -> F32x8 {
+        match self {
+            Self::Max => c.max_component(),
+            Self::Luminance => c.luminance(),
+            Self::Mean => c.mean(),
+        }
+    }
+
+    fn parse(text: &str) -> Option<Self> {
+        match text {
+            "" | "max" => Some(Self::Max),
+            "luminance" => Some(Self::Luminance),
+            "mean" => Some(Self::Mean),
+            _ => None,
+        }
+    }
+}
+
+/// clamp(norm(throughput), low, high) from depth `start`, 1 before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Throughput {
+    /// Norm of the throughput.
+    pub norm: Norm,
+    /// Smallest factor.
+    pub low: f32,
+    /// Largest factor.
+    pub high: f32,
+    /// First depth that plays.
+    pub start: u32,
+}
+
+impl Default for Throughput {
+    fn default() -> Self {
+        Self { norm: Norm::Max, low: MIN_FACTOR, high: 0.95, start: 1 }
+    }
+}
+
+impl Throughput {
+    pub(super) fn parse(options: &str) -> Option<Self> {
+        let mut parts = options.split(':');
+        let mut part = || parts.next().unwrap_or("");
+        let d = Self::default();
+        let x = Self {
+            norm: Norm::parse(part())?,
+            low: super::number(part(), d.low)?,
+            high: super::number(part(), d.high)?,
+            start: super::number(part(), d.start)?,
+        };
+        let fits = MIN_FACTOR <= x.low && x.low <= x.high && x.high <= MAX_FACTOR;
+        (fits && parts.next().is_none()).then_some(x)
+    }
+}
+
+impl RrsStrategy for Throughput {
+    #[inline(always)]
+    fn factor(&self, v: &Vertices8) -> F32x8 {
+        let early = v.depth.lt(U32x8::splat(self.start));
+        early.select(F32x8::ONE, self.norm.of(v.beta).clamp(self.low, self.high))
+    }
+}

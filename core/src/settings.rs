@@ -1,0 +1,136 @@
+//! What the caller chooses, and how much memory it costs.
+
+use crate::film::{PixelAov, PixelStats};
+use crate::memory::{Layout, Measure};
+use crate::rrs::Strategy;
+use crate::scene::Scene;
+use crate::tiles::Tiles;
+use crate::tracer::shard_measure;
+use core::fmt;
+
+/// Paths end after this many segments whatever the settings say.
+pub const HARD_STOP: u32 = 200;
+
+/// Fewest waiting vertices a shard can work with: two packets.
+pub const MIN_RING: u32 = 16;
+
+/// All choices of a render.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Columns and rows of the picture.
+    pub size: [u32; 2],
+    /// Seed of every random number.
+    pub seed: u64,
+    /// Units of parallel work. The picture depends on it (rounding and the comb), never on threads.
+    pub shards: u32,
+    /// Path segments from the camera: 1 sees emitters only, 2 direct light. At most [`HARD_STOP`].
+    pub max_depth: u32,
+    /// Roulette and splitting.
+    pub strategy: Strategy,
+    /// Vertices that may wait in a shard, at least [`MIN_RING`]; 512 keep packets full with every material in the scene.
+    pub ring: u32,
+    /// Samples that splitting may add to one camera sample; beyond it factors are at most 1 (unbiased, counted).
+    pub split_budget: u32,
+    /// Also gather albedo, normal, depth and factors.
+    pub aovs: bool,
+}
+
+impl Settings {
+    /// Defaults for a scene: its camera's size and depth, one shard.
+    pub fn for_scene(scene: &Scene<'_>) -> Self {
+        Self {
+            size: scene.camera.size,
+            seed: 0,
+            shards: 1,
+            max_depth: scene.info.max_depth,
+            strategy: Strategy::default(),
+            ring: 512,
+            split_budget: 4096,
+            aovs: false,
+        }
+    }
+}
+
+/// Which setting cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SettingsError {
+    /// The picture has no pixel, or more than 2^31.
+    Size([u32; 2]),
+    /// No shard, or more than 65,536.
+    Shards(u32),
+    /// `max_depth` is 0.
+    Depth(u32),
+    /// The ring has fewer than [`MIN_RING`] or more than 2^24 vertices.
+    Ring(u32),
+    /// The memory would exceed what can be addressed.
+    Memory,
+}
+
+impl fmt::Display for SettingsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Size([w, h]) => write!(f, "picture of {w} x {h} pixels: need at least 1 and at most 2^31"),
+            Self::Shards(n) => write!(f, "{n} shards: need 1 to 65536"),
+            Self::Depth(n) => write!(f, "max_depth {n}: need at least 1"),
+            Self::Ring(n) => write!(f, "ring of {n} vertices: need {MIN_RING} to 2^24"),
+            Self::Memory => f.write_str("these settings need more memory than can be addressed"),
+        }
+    }
+}
+
+impl core::error::Error for SettingsError {}
+
+/// How many bytes a render needs.
+#[derive(Clone, Copy, Debug)]
+pub struct Plan {
+    pub(crate) settings: Settings,
+    pub(crate) tiles: Tiles,
+    session: Layout,
+    shard: Layout,
+}
+
+impl Plan {
+    /// Checks the settings and measures the blocks.
+    pub fn new(settings: &Settings) -> Result<Self, SettingsError> {
+        let s = *settings;
+        let pixels = u64::from(s.size[0]) * u64::from(s.size[1]);
+        if pixels == 0 || pixels > 1 << 31 {
+            return Err(SettingsError::Size(s.size));
+        }
+        if s.shards == 0 || s.shards > 65_536 {
+            return Err(SettingsError::Shards(s.shards));
+        }
+        if s.max_depth == 0 {
+            return Err(SettingsError::Depth(s.max_depth));
+        }
+        if s.ring < MIN_RING || s.ring > 1 << 24 {
+            return Err(SettingsError::Ring(s.ring));
+        }
+        let tiles = Tiles::new(s.size, s.shards);
+        let pixels = pixels as usize;
+        let session = Measure::new().add::<PixelStats>(pixels).add::<PixelAov>(if s.aovs { pixels } else { 0 });
+        let shard = shard_measure(&s, &tiles);
+        Ok(Self {
+            settings: s,
+            tiles,
+            session: session.layout().ok_or(SettingsError::Memory)?,
+            shard: shard.layout().ok_or(SettingsError::Memory)?,
+        })
+    }
+
+    /// The shared block.
+    pub fn session(&self) -> Layout {
+        self.session
+    }
+
+    /// The block of each shard.
+    pub fn shard(&self) -> Layout {
+        self.shard
+    }
+
+    /// The settings it was made for.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+}

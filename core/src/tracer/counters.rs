@@ -1,0 +1,94 @@
+//! What happened: work, lane utilisation and every event in which a bound was met.
+
+/// Lanes used of lanes offered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Utilisation {
+    /// Packets run.
+    pub packets: u64,
+    /// Active lanes in them.
+    pub lanes: u64,
+}
+
+impl Utilisation {
+    /// Active share of all lanes, in [0, 1]; 1 when nothing ran.
+    pub fn share(&self) -> f64 {
+        if self.packets == 0 { 1.0 } else { self.lanes as f64 / (self.packets * 8) as f64 }
+    }
+
+    #[inline(always)]
+    pub(crate) fn count(&mut self, lanes: u32) {
+        self.packets += 1;
+        self.lanes += u64::from(lanes);
+    }
+
+    fn merge(&mut self, o: &Self) {
+        self.packets += o.packets;
+        self.lanes += o.lanes;
+    }
+}
+
+/// Counts of one shard or of a whole render.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Closest-hit rays from the camera.
+    pub camera_rays: u64,
+    /// Closest-hit rays from scattering.
+    pub scatter_rays: u64,
+    /// Shadow rays.
+    pub shadow_rays: u64,
+    /// Camera samples finished.
+    pub camera_samples: u64,
+    /// Samples of vertices (scatter lanes).
+    pub vertex_samples: u64,
+    /// Vertices at which roulette ended the path.
+    pub roulette_kills: u64,
+    /// Samples that splitting added.
+    pub splits: u64,
+    /// Lanes whose factor was cut to 1 because the ring was nearly full.
+    pub ring_capped: u64,
+    /// Lanes whose factor was cut to 1 because their camera sample had used up its split budget.
+    pub budget_capped: u64,
+    /// Contributions or weights that were not finite and were not added.
+    pub non_finite: u64,
+    /// Film index of the pixel of the first of them, plus 1; 0 if there is none.
+    pub first_non_finite: u64,
+    /// Scatter stage.
+    pub scatter: Utilisation,
+    /// Closest-hit stage.
+    pub trace: Utilisation,
+    /// Shadow stage.
+    pub occlude: Utilisation,
+    /// Surface stage (hits only).
+    pub surface: Utilisation,
+    /// Most vertices that waited at once.
+    pub ring_peak: u64,
+}
+
+impl Counters {
+    /// Rays of all kinds.
+    pub fn rays(&self) -> u64 {
+        self.camera_rays + self.scatter_rays + self.shadow_rays
+    }
+
+    /// Adds another shard's counts.
+    pub fn merge(&mut self, o: &Self) {
+        self.camera_rays += o.camera_rays;
+        self.scatter_rays += o.scatter_rays;
+        self.shadow_rays += o.shadow_rays;
+        self.camera_samples += o.camera_samples;
+        self.vertex_samples += o.vertex_samples;
+        self.roulette_kills += o.roulette_kills;
+        self.splits += o.splits;
+        self.ring_capped += o.ring_capped;
+        self.budget_capped += o.budget_capped;
+        self.non_finite += o.non_finite;
+        if self.first_non_finite == 0 {
+            self.first_non_finite = o.first_non_finite;
+        }
+        self.scatter.merge(&o.scatter);
+        self.trace.merge(&o.trace);
+        self.occlude.merge(&o.occlude);
+        self.surface.merge(&o.surface);
+        self.ring_peak = self.ring_peak.max(o.ring_peak);
+    }
+}

@@ -1,0 +1,42 @@
+//! Eight rays on their way to the next vertex, and what they carry.
+
+use crate::accel::Ray8;
+use crate::rng::Key8;
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+
+/// One ray per lane, from the camera or from a vertex.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Flight8 {
+    /// Lanes in the air.
+    pub active: Mask8,
+    /// The rays; unit directions.
+    pub ray: Ray8,
+    /// The vertex they left (before the offset), from where light sampling could have found what they hit.
+    pub from: Vec3x8,
+    /// Geometric normal there.
+    pub normal: Vec3x8,
+    /// Prefix weight including the bounce.
+    pub beta: Vec3x8,
+    /// The bounce's own weight.
+    pub weight: Vec3x8,
+    /// Solid-angle density of the direction.
+    pub pdf: F32x8,
+    /// Lanes that light sampling cannot reach: emission counts in full.
+    pub alone: Mask8,
+    /// Root slots.
+    pub root: U32x8,
+    /// Random keys of the vertices to come.
+    pub key: Key8,
+    /// Path segments including this one.
+    pub depth: U32x8,
+    /// Product of the albedos of the vertices so far.
+    pub albedo_product: F32x8,
+}
+
+/// Power heuristic with beta = 2 (Veach 1997): the weight of a sample of density `f` that a technique of density `g` could
+/// have made too. Neither overflows nor divides 0 by 0 for finite densities (NUMERICS MIS-1).
+#[inline(always)]
+pub(crate) fn power_heuristic(f: F32x8, g: F32x8) -> F32x8 {
+    let r = g / f;
+    f.gt(F32x8::ZERO).zero_unless(1.0 / (1.0 + r * r))
+}

@@ -1,0 +1,49 @@
+//! The packet machine. One turn takes eight samples from waiting vertices of one class (or eight camera samples) through
+//! the stages, each its own file:
+//!
+//! `refill` -> `scatter` -> `occlude` -> `trace` -> `surface` -> `roulette` -> `settle`
+//!
+//! What goes on becomes a waiting vertex again. Every queue is fixed; see [`vertex::Pool`] for why none can overflow.
+
+mod counters;
+mod flight;
+mod occlude;
+mod refill;
+mod root;
+mod roulette;
+mod scatter;
+mod settle;
+mod shard;
+mod surface;
+mod trace;
+mod vertex;
+
+pub use counters::{Counters, Utilisation};
+pub use shard::{Budget, Progress, Shard, ShardError};
+
+use crate::film::{PixelAov, PixelStats};
+use crate::memory::Measure;
+use crate::settings::Settings;
+use crate::tiles::{TILE_PIXELS, Tiles};
+
+/// Bytes of a waiting vertex, its slots in the rings and its root: the state per path.
+pub const BYTES_PER_PATH: usize =
+    size_of::<vertex::Vertex>() + 4 * (vertex::CLASSES + 1) + size_of::<root::Root>() + 4;
+
+/// Camera samples in flight: every waiting vertex may have its own, and so may the lanes of a packet.
+fn roots_capacity(settings: &Settings) -> usize {
+    settings.ring as usize + 16
+}
+
+/// Pixel slots of one shard.
+fn pixel_slots(tiles: &Tiles) -> usize {
+    tiles.most_tiles() * TILE_PIXELS as usize
+}
+
+/// Bytes of a shard's block; [`Shard::new`] carves in the same order.
+pub(crate) fn shard_measure(settings: &Settings, tiles: &Tiles) -> Measure {
+    let pixels = pixel_slots(tiles);
+    let m = vertex::Pool::measure(Measure::new(), settings.ring as usize);
+    let m = root::Roots::measure(m, roots_capacity(settings));
+    m.add::<PixelStats>(pixels).add::<PixelAov>(if settings.aovs { pixels } else { 0 })
+}

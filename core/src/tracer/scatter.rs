@@ -1,0 +1,174 @@
+//! Stage `scatter`: eight samples of vertices of one class. Each sample is one light sample and one scattered ray
+//! (EARS' atomic sample), combined by multiple importance sampling.
+
+use super::flight::{Flight8, power_heuristic};
+use super::shard::Shard;
+use super::vertex::{Batch, CLASSES, Vertex8};
+use crate::accel::{Intersector, Ray8, spawn};
+use crate::bsdf::{self, Bsdf, Eval8, Inputs8, Sample8, Visitor};
+use crate::light::{self, LightSample8};
+use crate::profile::Profile;
+use crate::rng::Key8;
+use crate::scene::Scene;
+use crate::scene::blob::MaterialKind;
+use crate::session::Session;
+use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
+
+/// Random numbers of a sample: block 0 scatters, block 1 samples lights.
+const SCATTER_BLOCK: u32 = 0;
+const LIGHT_BLOCK: u32 = 1;
+
+/// What one class's kernel does to a packet.
+struct Scatter<'a, 's> {
+    scene: &'a Scene<'s>,
+    vertex: &'a Vertex8,
+    active: Mask8,
+    /// World directions of light samples; `None` where light sampling does not apply.
+    light: Option<Vec3x8>,
+    u: [F32x8; 3],
+}
+
+/// What comes out of it.
+struct Scattered {
+    /// Towards the light sample.
+    light: Eval8,
+    /// The scattered direction, world space in `wi`.
+    sample: Sample8,
+    /// The vertices' shading frames.
+    frame: Frame8,
+}
+
+impl<'s> Visitor<'s> for Scatter<'_, 's> {
+    type Out = Scattered;
+
+    #[inline(never)]
+    fn visit<B: Bsdf<'s>>(self) -> Scattered {
+        let v = self.vertex;
+        let frame = Frame8::from_normal(v.ns);
+        let wo = frame.to_local(v.wo);
+        let inputs = Inputs8 { material: v.material, reflectance: v.reflectance };
+        let b = B::gather(self.scene, &inputs, self.active);
+        let light = match self.light {
+            Some(wi) if !B::DELTA => b.eval(wo, frame.to_local(wi)),
+            _ => Eval8 { f: Vec3x8::ZERO, pdf: F32x8::ZERO },
+        };
+        Scattered { light, sample: b.sample(wo, self.u), frame }
+    }
+}
+
+/// Which classes have nothing but delta lobes.
+struct IsDelta;
+
+impl<'s> Visitor<'s> for IsDelta {
+    type Out = bool;
+
+    fn visit<B: Bsdf<'s>>(self) -> bool {
+        B::DELTA
+    }
+}
+
+impl Shard<'_> {
+    /// Scatters a packet of the fullest class, or of the next from which a sample fits.
+    pub(super) fn scatter<P: Profile, I: Intersector>(
+        &mut self,
+        session: &Session<'_, '_, P, I>,
+    ) -> Option<Flight8> {
+        let (fullest, _) = self.pool.fullest();
+        let mut taken = self.take(fullest).map(|b| (fullest, b));
+        for class in 0..CLASSES {
+            taken = taken.or_else(|| self.take(class).map(|b| (class, b)));
+        }
+        let (class, batch) = taken?;
+        let v = &batch.vertex;
+        let scene = session.scene();
+        let kind = MaterialKind::ALL[class];
+        let active = Mask8::first(batch.lanes);
+        self.counters.scatter.count(batch.lanes as u32);
+        self.counters.vertex_samples += batch.lanes as u64;
+
+        let key = v.key.child(batch.sample);
+        let [u0, u1, u2, _] = key.uniforms(SCATTER_BLOCK);
+        let lit = active & v.depth.lt(U32x8::splat(session.max_depth()));
+        let delta = bsdf::dispatch_in(P::EFFECTS, kind, IsDelta)?;
+        let light = if delta || lit.none() || scene.lights.is_empty() {
+            None
+        } else {
+            Some(sample_lights::<P>(scene, session, v, key, lit))
+        };
+        let kernel = Scatter { scene, vertex: v, active, light: light.map(|l| l.wi), u: [u0, u1, u2] };
+        let out = bsdf::dispatch_in(P::EFFECTS, kind, kernel)?;
+        if let Some(l) = light {
+            self.light_contribution(session, v, &l, &out.light, lit & l.valid);
+        }
+
+        let s = &out.sample;
+        let wi = out.frame.to_world(s.wi);
+        let beta = v.beta * s.weight;
+        let flying = lit & s.valid & beta.any_positive();
+        let broken = lit & s.valid & !beta.is_finite();
+        let root = v.root.to_array();
+        for i in broken.lanes() {
+            self.count_non_finite(root[i]);
+        }
+        let flying = flying.and_not(broken);
+        for i in active.and_not(flying).lanes() {
+            self.close(root[i]);
+        }
+        Some(Flight8 {
+            active: flying,
+            ray: Ray8 {
+                o: spawn::offset(v.p, v.ng, v.error, wi),
+                d: wi,
+                tmin: F32x8::ZERO,
+                tmax: F32x8::INFINITY,
+            },
+            from: v.p,
+            normal: v.ng,
+            beta,
+            weight: s.weight,
+            pdf: s.pdf,
+            alone: s.delta,
+            root: v.root,
+            key: key.child(U32x8::splat(0)),
+            depth: v.depth + U32x8::splat(1),
+            albedo_product: v.albedo_product,
+        })
+    }
+
+    /// Takes samples of a class and books them on their roots: a lane each, less the vertex if it is drained.
+    fn take(&mut self, class: usize) -> Option<Batch> {
+        let roots = &mut self.roots;
+        self.pool.take(class, |v, lanes, drained| roots.get(v.root()).open += lanes - u32::from(drained))
+    }
+
+    /// Adds the light samples' radiance where nothing is in the way.
+    fn light_contribution<P: Profile, I: Intersector>(
+        &mut self,
+        session: &Session<'_, '_, P, I>,
+        v: &Vertex8,
+        l: &LightSample8,
+        f: &Eval8,
+        mask: Mask8,
+    ) {
+        let weight = l.delta.select(F32x8::ONE, power_heuristic(l.pdf, f.pdf));
+        let radiance = v.beta * f.f * l.radiance * (weight / l.pdf);
+        let mask = mask & (radiance.any_positive() | !radiance.is_finite());
+        if mask.none() {
+            return;
+        }
+        let clear = self.occlude(session, v, l, mask);
+        self.gather(clear, v.root, radiance);
+    }
+}
+
+/// One light sample per lane.
+#[inline(never)]
+fn sample_lights<P: Profile>(
+    scene: &Scene<'_>,
+    session: &Session<'_, '_, P, impl Intersector>,
+    v: &Vertex8,
+    key: Key8,
+    active: Mask8,
+) -> LightSample8 {
+    light::sample(scene, session.selector(), v.p, v.ng, key.words(LIGHT_BLOCK), active)
+}

@@ -1,0 +1,195 @@
+//! One unit of parallel work: exclusively owned, bounded, deterministic.
+
+use super::counters::Counters;
+use super::refill::Cursor;
+use super::root::Roots;
+use super::vertex::{Pool, RESERVE};
+use super::{pixel_slots, roots_capacity};
+use crate::accel::Intersector;
+use crate::film::{PixelAov, PixelStats};
+use crate::memory::{Carver, MemoryError};
+use crate::profile::Profile;
+use crate::session::Session;
+use crate::settings::Plan;
+use crate::tiles::TILE_PIXELS;
+use core::fmt;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+/// How much a step may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Budget {
+    /// Rays of all kinds; exceeded by less than one packet (16 rays).
+    pub rays: u64,
+}
+
+/// What to do after a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// Step again.
+    More,
+    /// This shard has finished the iteration.
+    Done,
+}
+
+/// Why a shard cannot be made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShardError {
+    /// The plan has fewer shards.
+    Index {
+        /// Asked for.
+        index: u32,
+        /// In the plan.
+        shards: u32,
+    },
+    /// The block does not fit.
+    Memory(MemoryError),
+}
+
+impl fmt::Display for ShardError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Index { index, shards } => write!(f, "shard {index} of a plan with {shards} shards"),
+            Self::Memory(e) => write!(f, "shard: {e}"),
+        }
+    }
+}
+
+impl core::error::Error for ShardError {}
+
+/// All state of one unit of work, in the caller's block.
+#[derive(Debug)]
+pub struct Shard<'m> {
+    pub(super) plan: Plan,
+    pub(crate) index: u32,
+    /// Iteration that the accumulators belong to; 0 is none.
+    iteration: u64,
+    pub(super) cursor: Cursor,
+    pub(super) pool: Pool<'m>,
+    pub(super) roots: Roots<'m>,
+    pub(super) pixels: &'m mut [PixelStats],
+    pub(super) aovs: &'m mut [PixelAov],
+    /// Numbers of the combs, one per packet.
+    comb: Pcg32,
+    pub(super) counters: Counters,
+}
+
+impl<'m> Shard<'m> {
+    /// Carves shard `index` out of a block of at least `plan.shard()`.
+    pub fn new(plan: &Plan, index: u32, block: &'m mut [u8]) -> Result<Self, ShardError> {
+        let s = plan.settings();
+        if index >= s.shards {
+            return Err(ShardError::Index { index, shards: s.shards });
+        }
+        let memory = ShardError::Memory;
+        let mut c = Carver::new(block, plan.shard()).map_err(memory)?;
+        let pixels = pixel_slots(&plan.tiles);
+        Ok(Self {
+            plan: *plan,
+            index,
+            iteration: 0,
+            cursor: Cursor::finished(),
+            pool: Pool::carve(&mut c, s.ring as usize).map_err(memory)?,
+            roots: Roots::carve(&mut c, roots_capacity(s)).map_err(memory)?,
+            pixels: c.take(pixels).map_err(memory)?,
+            aovs: c.take(if s.aovs { pixels } else { 0 }).map_err(memory)?,
+            comb: Pcg32::seed_from_u64(0),
+            counters: Counters::default(),
+        })
+    }
+
+    /// Its number in the plan.
+    pub fn index(&self) -> u32 {
+        self.index
+    }
+
+    /// Counts of the current iteration.
+    pub fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
+    /// Starts no further camera samples; stepping on to [`Progress::Done`] finishes those in flight, so that what was
+    /// rendered stays unbiased.
+    pub fn stop(&mut self) {
+        self.cursor = Cursor::finished();
+    }
+
+    /// Works until the budget is used or the iteration is finished. Many small steps and one big step give the same bits.
+    pub fn step<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>, budget: Budget) -> Progress {
+        if self.iteration != session.iteration().number {
+            self.begin(session);
+        }
+        let start = self.counters.rays();
+        while self.counters.rays() - start < budget.rays {
+            if !self.turn(session) {
+                return Progress::Done;
+            }
+        }
+        Progress::More
+    }
+
+    fn begin<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>) {
+        let iteration = session.iteration();
+        self.iteration = iteration.number;
+        self.cursor = Cursor::new(&self.plan.tiles, self.index, iteration.samples);
+        self.counters = Counters::default();
+        self.pixels.fill(PixelStats::default());
+        self.aovs.fill(PixelAov::default());
+        let seed = self.plan.settings().seed ^ (iteration.number << 20 | u64::from(self.index)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        self.comb = Pcg32::seed_from_u64(seed);
+    }
+
+    /// One packet through all stages; `false` when nothing is left.
+    fn turn<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>) -> bool {
+        let (_, pending) = self.pool.fullest();
+        let room = self.pool.free() >= 2 * RESERVE && !self.cursor.is_finished();
+        let flight = if pending >= 8 || pending > 0 && !room {
+            self.scatter(session)
+        } else if room {
+            self.camera_rays(session)
+        } else {
+            return false;
+        };
+        let waiting = self.plan.settings().ring as usize - self.pool.free();
+        self.counters.ring_peak = self.counters.ring_peak.max(waiting as u64);
+        if let Some(f) = flight {
+            self.advance(session, &f);
+        }
+        true
+    }
+
+    /// 32 random bits for a packet's comb.
+    pub(super) fn comb_bits(&mut self) -> u32 {
+        self.comb.next_u32()
+    }
+
+    /// Film index of a pixel slot.
+    pub(super) fn film_index(&self, slot: u32) -> Option<usize> {
+        let mut tile = self.plan.tiles.next_of(self.index, 0)?;
+        for _ in 0..slot / TILE_PIXELS {
+            tile = self.plan.tiles.next_of(self.index, tile + 1)?;
+        }
+        self.plan.tiles.pixel(tile, slot % TILE_PIXELS).map(|p| self.plan.tiles.film_index(p))
+    }
+
+    /// Has it finished the iteration of this number?
+    pub(crate) fn is_done(&self, iteration: u64) -> bool {
+        self.iteration == iteration && self.cursor.is_finished() && self.pool.fullest().1 == 0
+    }
+
+    /// Calls `f(film index, sums, auxiliary sums)` for each of its pixels.
+    pub(crate) fn for_each_pixel(&self, mut f: impl FnMut(usize, &PixelStats, Option<&PixelAov>)) {
+        let tiles = &self.plan.tiles;
+        let mut next = tiles.next_of(self.index, 0);
+        let mut slot = 0;
+        while let Some(tile) = next {
+            for k in 0..TILE_PIXELS {
+                if let (Some(p), Some(stats)) = (tiles.pixel(tile, k), self.pixels.get(slot)) {
+                    f(tiles.film_index(p), stats, self.aovs.get(slot));
+                }
+                slot += 1;
+            }
+            next = tiles.next_of(self.index, tile + 1);
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! Stage `surface`: what was hit, what it emits, and the vertex that it becomes.
+
+use super::flight::{Flight8, power_heuristic};
+use super::roulette::Arrival8;
+use super::shard::Shard;
+use super::vertex::Vertex8;
+use crate::accel::{Hit8, Intersector, spawn};
+use crate::light;
+use crate::profile::Profile;
+use crate::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind, NONE, TRIANGLE_SMOOTH};
+use crate::scene::{Effects, Scene};
+use crate::session::Session;
+use crate::texture;
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+
+/// Kinds that scatter from behind as well.
+const TRANSMISSIVE: u32 = 1 << MaterialKind::Dielectric as u32
+    | 1 << MaterialKind::RoughDielectric as u32
+    | 1 << MaterialKind::ThinDielectric as u32
+    | 1 << MaterialKind::Null as u32;
+
+impl Shard<'_> {
+    /// Lanes that left the scene.
+    pub(super) fn escape<P: Profile, I: Intersector>(
+        &mut self,
+        session: &Session<'_, '_, P, I>,
+        f: &Flight8,
+        escaped: Mask8,
+    ) {
+        let scene = session.scene();
+        let sky = Effects::ENVIRONMENT.with(Effects::CONSTANT);
+        if P::EFFECTS.intersects(sky) && scene.environment.is_some() {
+            let radiance = light::environment_radiance(scene, f.ray.d, escaped);
+            let pdf = light::environment_pdf(scene, session.selector(), f.from, f.normal, f.ray.d, escaped);
+            let weight = f.alone.select(F32x8::ONE, power_heuristic(f.pdf, pdf));
+            self.gather(escaped, f.root, f.beta * radiance * weight);
+        }
+        self.close_lanes(escaped, f.root);
+    }
+
+    /// Lanes that hit a triangle.
+    pub(super) fn arrive<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>, f: &Flight8, hit: &Hit8) {
+        let scene = session.scene();
+        let mask = hit.hit;
+        self.counters.surface.count(mask.count());
+        let point = spawn::surface_point(scene, hit.triangle, hit.u, hit.v, mask);
+        let wo = -f.ray.d;
+        if P::EFFECTS.contains(Effects::AREA_LIGHTS) {
+            self.emission(session, f, hit, point.ng);
+        }
+        let first = mask & f.depth.eq(U32x8::splat(1));
+        let mut going = mask & f.depth.lt(U32x8::splat(session.max_depth()));
+        let wants_aov = !self.aovs.is_empty() && first.any();
+        if going.none() && !wants_aov {
+            return self.close_lanes(mask, f.root);
+        }
+        let s = shade::<P>(scene, hit, wo, point.ng);
+        if wants_aov {
+            self.record_first_hit(first, f, hit, &s);
+        }
+        going = going & s.scatters;
+        self.close_lanes(mask.and_not(going), f.root);
+        if going.none() {
+            return;
+        }
+        let vertex = Vertex8 {
+            p: point.p,
+            error: point.error,
+            ng: point.ng,
+            ns: s.ns,
+            wo,
+            beta: f.beta,
+            reflectance: s.reflectance,
+            material: s.material,
+            root: f.root,
+            key: f.key,
+            depth: f.depth,
+            albedo_product: f.albedo_product,
+            count: U32x8::splat(0),
+            next: U32x8::splat(0),
+        };
+        self.roulette(session, Arrival8 { vertex, weight: f.weight, kind: s.kind, active: going });
+    }
+
+    /// Emission of hit area lights, weighted against the light sample that could have found them.
+    fn emission<P: Profile, I: Intersector>(
+        &mut self,
+        session: &Session<'_, '_, P, I>,
+        f: &Flight8,
+        hit: &Hit8,
+        ng: Vec3x8,
+    ) {
+        let scene = session.scene();
+        let triangle = hit.triangle.to_array();
+        let mut bits = 0;
+        for i in hit.hit.lanes() {
+            let emits = scene.triangles.get(triangle[i] as usize).is_some_and(|t| t.light != NONE);
+            bits |= u32::from(emits) << i;
+        }
+        let mask = Mask8::from_bits(bits);
+        if mask.none() {
+            return;
+        }
+        let radiance = light::area_radiance(scene, hit.triangle, f.ray.d, ng, mask);
+        let sampled = mask.and_not(f.alone);
+        let weight = if sampled.any() {
+            let pdf = light::area_pdf(scene, session.selector(), f.from, f.normal, hit.triangle, f.ray.d, hit.t, sampled);
+            f.alone.select(F32x8::ONE, power_heuristic(f.pdf, pdf))
+        } else {
+            F32x8::ONE
+        };
+        self.gather(mask, f.root, f.beta * radiance * weight);
+    }
+
+    fn record_first_hit(&mut self, first: Mask8, f: &Flight8, hit: &Hit8, s: &Shading8) {
+        let root = f.root.to_array();
+        for i in first.lanes() {
+            let pixel = self.roots.get(root[i]).pixel as usize;
+            let Some(aov) = self.aovs.get_mut(pixel) else { continue };
+            let (albedo, normal) = (s.reflectance.lane(i), s.ns.lane(i));
+            for c in 0..3 {
+                aov.albedo[c] += f64::from(albedo[c]);
+                aov.normal[c] += f64::from(normal[c]);
+            }
+            aov.depth += f64::from(hit.t.lane(i));
+            aov.hits += 1.0;
+        }
+    }
+
+    pub(super) fn close_lanes(&mut self, mask: Mask8, root: U32x8) {
+        let root = root.to_array();
+        for i in mask.lanes() {
+            self.close(root[i]);
+        }
+    }
+}
+
+/// Shading data of eight hits.
+struct Shading8 {
+    material: U32x8,
+    kind: [u32; 8],
+    reflectance: Vec3x8,
+    /// Shading normal, turned towards `wo` on two-sided materials.
+    ns: Vec3x8,
+    /// Lanes whose front (or either side, if transmissive) faces `wo`.
+    scatters: Mask8,
+}
+
+/// Materials, shading normals and textures of the hit lanes.
+#[inline(never)]
+fn shade<P: Profile>(scene: &Scene<'_>, hit: &Hit8, wo: Vec3x8, ng: Vec3x8) -> Shading8 {
+    let index = hit.triangle.to_array();
+    let (mut material, mut kind, mut textures) = ([0u32; 8], [0u32; 8], [NONE; 8]);
+    let (mut smooth, mut two_sided, mut through, mut textured) = (0u32, 0u32, 0u32, 0u32);
+    let mut reflectance = [[0.0f32; 3]; 8];
+    let mut corners = [[0u32; 3]; 8];
+    for i in hit.hit.lanes() {
+        let Some(t) = scene.triangles.get(index[i] as usize) else { continue };
+        let Some(m) = scene.materials.get(t.material as usize) else { continue };
+        material[i] = t.material;
+        kind[i] = m.kind;
+        reflectance[i] = m.reflectance;
+        corners[i] = t.vertex;
+        textures[i] = m.texture;
+        smooth |= u32::from(t.flags & TRIANGLE_SMOOTH != 0) << i;
+        two_sided |= u32::from(m.flags & MATERIAL_TWO_SIDED != 0) << i;
+        through |= (TRANSMISSIVE >> m.kind & 1) << i;
+        textured |= u32::from(m.texture != NONE) << i;
+    }
+    let mut reflectance = Vec3x8::from_fn(|i| reflectance[i]);
+    let w = 1.0 - hit.u - hit.v;
+    let mut ns = ng;
+    if P::EFFECTS.contains(Effects::SMOOTH_NORMALS) && smooth != 0 {
+        let n = |k: usize| Vec3x8::from_fn(|i| scene.vertices.get(corners[i][k] as usize).map_or([0.0; 3], |v| v.n));
+        let sum = n(0) * w + n(1) * hit.u + n(2) * hit.v;
+        let len = sum.length();
+        // opposite normals may cancel: then the triangle's own serves (NUMERICS FRM-3)
+        let ok = Mask8::from_bits(smooth) & len.gt(F32x8::splat(1e-6));
+        ns = Vec3x8::select(ok, sum / len, ng);
+    }
+    if P::EFFECTS.contains(Effects::TEXTURES) && textured != 0 {
+        let uv = |k: usize, c: usize| F32x8::from_fn(|i| scene.vertices.get(corners[i][k] as usize).map_or(0.0, |v| v.uv[c]));
+        let at = |c: usize| uv(0, c) * w + uv(1, c) * hit.u + uv(2, c) * hit.v;
+        let mask = Mask8::from_bits(textured);
+        let texel = texture::lookup(scene, U32x8::new(textures), [at(0), at(1)], mask);
+        reflectance = Vec3x8::select(mask, texel, reflectance);
+    }
+    let cos = wo.dot(ns);
+    let behind = cos.lt(F32x8::ZERO);
+    let turn = behind & Mask8::from_bits(two_sided).and_not(Mask8::from_bits(through));
+    let ns = Vec3x8::select(turn, -ns, ns);
+    let scatters = (cos.gt(F32x8::ZERO) | turn | (Mask8::from_bits(through) & behind)) & hit.hit;
+    Shading8 { material: U32x8::new(material), kind, reflectance, ns, scatters }
+}

@@ -1,0 +1,36 @@
+//! Stage `trace`: closest hits, and what each ray finds.
+
+use super::flight::Flight8;
+use super::shard::Shard;
+use crate::accel::{Hit8, Intersector};
+use crate::profile::Profile;
+use crate::session::Session;
+
+impl Shard<'_> {
+    /// Traces a flight and hands it on: escaped lanes meet the environment, the others a surface and roulette.
+    pub(super) fn advance<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>, f: &Flight8) {
+        if f.active.none() {
+            return;
+        }
+        let hit = self.trace(session, f);
+        let escaped = f.active.and_not(hit.hit);
+        if escaped.any() {
+            self.escape(session, f, escaped);
+        }
+        if hit.hit.any() {
+            self.arrive(session, f, &hit);
+        }
+    }
+
+    fn trace<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>, f: &Flight8) -> Hit8 {
+        let n = f.active.count();
+        self.counters.trace.count(n);
+        if f.depth.lane(f.active.lanes().next().unwrap_or(0)) > 1 {
+            self.counters.scatter_rays += u64::from(n);
+        }
+        self.charge(f.active, f.root);
+        let mut hit = session.intersector().closest(&f.ray, f.active);
+        hit.hit = hit.hit & f.active;
+        hit
+    }
+}

@@ -1,0 +1,266 @@
+//! A path vertex that waits for its samples, and the fixed pool of them.
+
+use crate::memory::{Carver, Measure, MemoryError};
+use crate::rng::Key8;
+use crate::scene::blob::MaterialKind;
+use bytemuck::{Pod, Zeroable};
+use croupier_simd::{F32x8, U32x8, Vec3x8};
+
+/// Scattering classes: one per material kind, so that a packet runs one kernel.
+pub(crate) const CLASSES: usize = MaterialKind::ALL.len();
+
+/// One waiting vertex, 128 bytes: four rows of eight words, so that eight of them transpose into [`Vertex8`].
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Vertex {
+    rows: [[f32; 8]; 4],
+}
+
+/// Eight path vertices, one per lane.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Vertex8 {
+    /// Position, world space.
+    pub p: Vec3x8,
+    /// Bound of its rounding error along `ng`.
+    pub error: F32x8,
+    /// Geometric unit normal.
+    pub ng: Vec3x8,
+    /// Shading unit normal, already facing `wo` on two-sided materials.
+    pub ns: Vec3x8,
+    /// Unit direction back along the path.
+    pub wo: Vec3x8,
+    /// Prefix weight of every sample: throughput over all factors so far.
+    pub beta: Vec3x8,
+    /// Reflectance after texturing.
+    pub reflectance: Vec3x8,
+    /// Material index.
+    pub material: U32x8,
+    /// Root slot.
+    pub root: U32x8,
+    /// Random key.
+    pub key: Key8,
+    /// Path segments from the camera to here.
+    pub depth: U32x8,
+    /// Product of the albedos of the vertices before this one, mean over rgb.
+    pub albedo_product: F32x8,
+    /// Samples left.
+    pub count: U32x8,
+    /// Number of the next sample.
+    pub next: U32x8,
+}
+
+/// Row and column of the words that are read or changed while a vertex waits.
+const ROOT: (usize, usize) = (1, 6);
+const COUNT: (usize, usize) = (3, 2);
+const NEXT: (usize, usize) = (3, 3);
+
+impl Vertex {
+    pub(crate) fn count(&self) -> u32 {
+        self.rows[COUNT.0][COUNT.1].to_bits()
+    }
+
+    pub(crate) fn root(&self) -> u32 {
+        self.rows[ROOT.0][ROOT.1].to_bits()
+    }
+
+    /// Takes `m` of its samples; returns the number of the first.
+    fn take(&mut self, m: u32) -> u32 {
+        let first = self.rows[NEXT.0][NEXT.1].to_bits();
+        self.rows[COUNT.0][COUNT.1] = f32::from_bits(self.count().saturating_sub(m));
+        self.rows[NEXT.0][NEXT.1] = f32::from_bits(first.wrapping_add(m));
+        first
+    }
+}
+
+impl Vertex8 {
+    fn to_columns(self) -> [[F32x8; 8]; 4] {
+        let f = F32x8::from_bits;
+        let z = F32x8::ZERO;
+        [
+            [self.p.x, self.p.y, self.p.z, self.error, self.ng.x, self.ng.y, self.ng.z, f(self.material)],
+            [self.ns.x, self.ns.y, self.ns.z, self.wo.x, self.wo.y, self.wo.z, f(self.root), f(self.depth)],
+            [
+                self.beta.x,
+                self.beta.y,
+                self.beta.z,
+                self.reflectance.x,
+                self.reflectance.y,
+                self.reflectance.z,
+                f(self.key.lo),
+                f(self.key.hi),
+            ],
+            [self.albedo_product, z, f(self.count), f(self.next), z, z, z, z],
+        ]
+    }
+
+    fn from_columns(c: [[F32x8; 8]; 4]) -> Self {
+        let [a, b, d, e] = c;
+        Self {
+            p: Vec3x8::new(a[0], a[1], a[2]),
+            error: a[3],
+            ng: Vec3x8::new(a[4], a[5], a[6]),
+            material: a[7].to_bits(),
+            ns: Vec3x8::new(b[0], b[1], b[2]),
+            wo: Vec3x8::new(b[3], b[4], b[5]),
+            root: b[6].to_bits(),
+            depth: b[7].to_bits(),
+            beta: Vec3x8::new(d[0], d[1], d[2]),
+            reflectance: Vec3x8::new(d[3], d[4], d[5]),
+            key: Key8 { lo: d[6].to_bits(), hi: d[7].to_bits() },
+            albedo_product: e[0],
+            count: e[2].to_bits(),
+            next: e[3].to_bits(),
+        }
+    }
+
+    /// The eight lanes as records.
+    pub(crate) fn to_records(self) -> [Vertex; 8] {
+        let rows = self.to_columns().map(|c| F32x8::transpose(c).map(F32x8::to_array));
+        core::array::from_fn(|i| Vertex { rows: [rows[0][i], rows[1][i], rows[2][i], rows[3][i]] })
+    }
+
+    /// Loads one record per lane.
+    pub(crate) fn from_records(v: [&Vertex; 8]) -> Self {
+        Self::from_columns(core::array::from_fn(|r| F32x8::transpose(v.map(|v| F32x8::new(v.rows[r])))))
+    }
+}
+
+/// A fixed ring of slot numbers. The newest leaves first: depth-first order keeps few vertices waiting.
+#[derive(Debug)]
+struct Ring<'m> {
+    slots: &'m mut [u32],
+    head: usize,
+    len: usize,
+}
+
+impl Ring<'_> {
+    /// The pool never holds more vertices than a ring has slots, so there is always room.
+    fn push(&mut self, slot: u32) {
+        let n = self.slots.len();
+        if self.len < n {
+            self.slots[(self.head + self.len) % n] = slot;
+            self.len += 1;
+        }
+    }
+
+    fn newest(&self) -> Option<u32> {
+        let n = self.slots.len();
+        (self.len > 0).then(|| self.slots[(self.head + self.len - 1) % n])
+    }
+
+    fn pop_newest(&mut self) {
+        self.len = self.len.saturating_sub(1);
+    }
+}
+
+/// Samples drawn from waiting vertices for one packet.
+pub(crate) struct Batch {
+    /// Vertices, one per lane; lanes from `lanes` on repeat lane 0.
+    pub vertex: Vertex8,
+    /// Sample number within its vertex.
+    pub sample: U32x8,
+    /// How many lanes are filled.
+    pub lanes: usize,
+}
+
+/// All waiting vertices of a shard: a slab of records, a list of free slots and one ring per class.
+#[derive(Debug)]
+pub(crate) struct Pool<'m> {
+    records: &'m mut [Vertex],
+    free: &'m mut [u32],
+    free_len: usize,
+    rings: [Ring<'m>; CLASSES],
+    /// Samples waiting per class.
+    pending: [u64; CLASSES],
+}
+
+/// Vertices that may start while this many slots stay free can always run their packet to its end.
+pub(crate) const RESERVE: usize = 8;
+
+impl<'m> Pool<'m> {
+    pub(crate) fn measure(m: Measure, capacity: usize) -> Measure {
+        (0..CLASSES).fold(m.add::<Vertex>(capacity).add::<u32>(capacity), |m, _| m.add::<u32>(capacity))
+    }
+
+    pub(crate) fn carve(c: &mut Carver<'m>, capacity: usize) -> Result<Self, MemoryError> {
+        let records = c.take(capacity)?;
+        let free: &mut [u32] = c.take(capacity)?;
+        for (i, f) in free.iter_mut().enumerate() {
+            *f = i as u32;
+        }
+        let mut rings = core::array::from_fn(|_| Ring { slots: &mut [], head: 0, len: 0 });
+        for r in &mut rings {
+            r.slots = c.take(capacity)?;
+        }
+        Ok(Self { records, free, free_len: capacity, rings, pending: [0; CLASSES] })
+    }
+
+    /// Empty slots.
+    pub(crate) fn free(&self) -> usize {
+        self.free_len
+    }
+
+    /// The class with most samples waiting, and how many.
+    pub(crate) fn fullest(&self) -> (usize, u64) {
+        let mut best = (0, 0);
+        for (c, &n) in self.pending.iter().enumerate() {
+            if n > best.1 {
+                best = (c, n);
+            }
+        }
+        best
+    }
+
+    /// Stores a vertex with `count` samples; the caller has made sure that a slot is free.
+    pub(crate) fn push(&mut self, class: usize, v: Vertex) {
+        let Some(len) = self.free_len.checked_sub(1) else { return };
+        self.free_len = len;
+        let slot = self.free[len];
+        self.records[slot as usize] = v;
+        self.rings[class].push(slot);
+        self.pending[class] += u64::from(v.count());
+    }
+
+    /// Takes up to eight samples of `class`, newest vertices first, so that even if every one of them goes on there is a
+    /// slot for each. Calls `taken(vertex, lanes, drained)` per vertex. `None` if no sample fits.
+    pub(crate) fn take(&mut self, class: usize, mut taken: impl FnMut(&Vertex, u32, bool)) -> Option<Batch> {
+        let mut slot = [0u32; 8];
+        let mut sample = [0u32; 8];
+        let mut lanes = 0usize;
+        let mut room = self.free_len;
+        let ring = &mut self.rings[class];
+        while lanes < 8 {
+            let Some(s) = ring.newest() else { break };
+            let v = &mut self.records[s as usize];
+            let count = v.count();
+            let want = count.min((8 - lanes) as u32);
+            // a drained vertex gives its own slot back
+            let m = if want == count && want as usize <= room + 1 { want } else { want.min(room as u32).min(count.max(1) - 1) };
+            if m == 0 {
+                break;
+            }
+            let first = v.take(m);
+            let drained = m == count;
+            for k in 0..m {
+                slot[lanes] = s;
+                sample[lanes] = first.wrapping_add(k);
+                lanes += 1;
+            }
+            room = room + usize::from(drained) - m as usize;
+            self.pending[class] -= u64::from(m);
+            taken(v, m, drained);
+            if drained {
+                ring.pop_newest();
+                self.free[self.free_len] = s;
+                self.free_len += 1;
+            }
+        }
+        if lanes == 0 {
+            return None;
+        }
+        let first = slot[0];
+        slot[lanes..].fill(first);
+        let vertex = Vertex8::from_records(slot.map(|s| &self.records[s as usize]));
+        Some(Batch { vertex, sample: U32x8::new(sample), lanes })
+    }
+}
