@@ -1,7 +1,38 @@
 //! Scattering models in the local shading frame: +z is the shading normal, `wo` points to the viewer, `wi` to where the
-//! path goes on (or to the light). All directions are unit vectors. Radiance transport.
+//! path goes on (or to the light). All directions are unit vectors. Radiance transport: transmission into a medium of
+//! relative index eta scales radiance by 1 / eta^2.
+//!
+//! One model per file; [`dispatch`] is the table of them. Reflecting models return nothing for `wo.z <= 0` or
+//! `wi.z <= 0`; the dielectrics and the null boundary take both sides. Lanes that hold NaN scatter nothing and never
+//! touch their neighbours.
+
+mod conductor;
+mod dielectric;
+mod diffuse;
+pub mod fresnel;
+pub mod ggx;
+mod mirror;
+mod null;
+mod plastic;
+mod roughconductor;
+mod roughdielectric;
+mod roughplastic;
+mod thindielectric;
+pub mod warp;
+
+pub use conductor::Conductor;
+pub use dielectric::Dielectric;
+pub use diffuse::Diffuse;
+pub use mirror::Mirror;
+pub use null::Null;
+pub use plastic::Plastic;
+pub use roughconductor::RoughConductor;
+pub use roughdielectric::RoughDielectric;
+pub use roughplastic::{RoughPlastic, TABLE_SIZE};
+pub use thindielectric::ThinDielectric;
 
 use crate::scene::Scene;
+use crate::scene::blob::{Material, MaterialKind, NONE};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Value of `f(wo, wi) |cos wi|` and the solid-angle density of sampling `wi`.
@@ -11,6 +42,17 @@ pub struct Eval8 {
     pub f: Vec3x8,
     /// Density of [`Bsdf::sample`]'s non-delta part, 1/sr, lobe probabilities included.
     pub pdf: F32x8,
+}
+
+impl Eval8 {
+    /// Nothing in any lane: what models of delta lobes only return.
+    pub const ZERO: Self = Self { f: Vec3x8::ZERO, pdf: F32x8::ZERO };
+
+    /// `self` where `mask`, else 0.
+    #[inline(always)]
+    fn zero_unless(self, mask: Mask8) -> Self {
+        Self { f: self.f.zero_unless(mask), pdf: mask.zero_unless(self.pdf) }
+    }
 }
 
 /// One sampled direction per lane.
@@ -28,6 +70,26 @@ pub struct Sample8 {
     pub valid: Mask8,
 }
 
+impl Sample8 {
+    /// A sample of a delta lobe in the lanes of `valid`.
+    #[inline(always)]
+    fn delta(wi: Vec3x8, weight: Vec3x8, valid: Mask8) -> Self {
+        Self { wi, weight, pdf: F32x8::ZERO, delta: valid, valid }.masked()
+    }
+
+    /// Lanes that are not valid get weight 0 and a harmless unit direction.
+    #[inline(always)]
+    fn masked(self) -> Self {
+        Self {
+            wi: Vec3x8::select(self.valid, self.wi, Vec3x8::splat(0.0, 0.0, 1.0)),
+            weight: self.weight.zero_unless(self.valid),
+            pdf: self.valid.zero_unless(self.pdf),
+            delta: self.delta & self.valid,
+            valid: self.valid,
+        }
+    }
+}
+
 /// What a model reads per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs8 {
@@ -37,21 +99,104 @@ pub struct Inputs8 {
     pub reflectance: Vec3x8,
 }
 
-/// One scattering model over eight lanes. Two-sidedness is the caller's: for two-sided materials the frame already
-/// faces `wo`.
-pub trait Bsdf: Copy {
+/// One scattering model over eight lanes, `'s` the scene whose tables it may keep a reference to. Two-sidedness is the
+/// caller's: for two-sided materials the frame already faces `wo`.
+pub trait Bsdf<'s>: Copy {
     /// Only delta lobes: no light sampling.
     const DELTA: bool;
 
     /// Gathers the parameters of the lanes in `active`; other lanes may hold any material index.
-    fn gather(scene: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self;
+    fn gather(scene: &Scene<'s>, inputs: &Inputs8, active: Mask8) -> Self;
 
     /// Value and density of the non-delta part.
     fn eval(&self, wo: Vec3x8, wi: Vec3x8) -> Eval8;
 
-    /// Samples `wi` with three numbers in [0, 1).
+    /// Samples `wi` with three numbers in [0, 1): the first two choose the direction, the third the lobe.
     fn sample(&self, wo: Vec3x8, u: [F32x8; 3]) -> Sample8;
 
     /// Directional-hemispherical reflectance + transmittance to use in roulette by albedo; an estimate in [0, 1].
     fn albedo(&self, wo: Vec3x8) -> Vec3x8;
+}
+
+/// Code to run with the model of a material kind; see [`dispatch`].
+pub trait Visitor<'s> {
+    /// What it returns.
+    type Out;
+
+    /// Called with the model.
+    fn visit<B: Bsdf<'s>>(self) -> Self::Out;
+}
+
+/// Calls `v` with the model of `kind`: the one table of the models.
+#[inline(always)]
+pub fn dispatch<'s, V: Visitor<'s>>(kind: MaterialKind, v: V) -> V::Out {
+    match kind {
+        MaterialKind::Diffuse => v.visit::<Diffuse>(),
+        MaterialKind::Mirror => v.visit::<Mirror>(),
+        MaterialKind::Conductor => v.visit::<Conductor>(),
+        MaterialKind::RoughConductor => v.visit::<RoughConductor>(),
+        MaterialKind::Dielectric => v.visit::<Dielectric>(),
+        MaterialKind::RoughDielectric => v.visit::<RoughDielectric>(),
+        MaterialKind::ThinDielectric => v.visit::<ThinDielectric>(),
+        MaterialKind::Plastic => v.visit::<Plastic>(),
+        MaterialKind::RoughPlastic => v.visit::<RoughPlastic<'s>>(),
+        MaterialKind::Null => v.visit::<Null>(),
+    }
+}
+
+/// What lanes without a material read: parameters with which every model stays finite.
+const IDLE: &Material = &Material {
+    kind: 0,
+    flags: 0,
+    texture: NONE,
+    table: NONE,
+    reflectance: [0.0; 3],
+    alpha: 1.0,
+    eta: [1.5; 3],
+    fdr: 0.5,
+    k: [0.0; 3],
+    reserved: 0.0,
+    emission: [0.0; 3],
+    reserved2: 0.0,
+};
+
+/// The materials of eight lanes.
+#[derive(Clone, Copy)]
+struct Materials8<'s>([&'s Material; 8]);
+
+impl<'s> Materials8<'s> {
+    /// Lanes outside `active` get [`IDLE`], whatever index they hold.
+    #[inline(always)]
+    fn new(scene: &Scene<'s>, inputs: &Inputs8, active: Mask8) -> Self {
+        let (index, bits) = (inputs.material.to_array(), active.bits());
+        Self(core::array::from_fn(|i| {
+            let m = if bits >> i & 1 == 1 { scene.materials.get(index[i] as usize) } else { None };
+            m.unwrap_or(IDLE)
+        }))
+    }
+
+    /// One number per lane.
+    #[inline(always)]
+    fn get(&self, f: impl Fn(&Material) -> f32) -> F32x8 {
+        F32x8::from_fn(|i| f(self.0[i]))
+    }
+
+    /// One triple per lane.
+    #[inline(always)]
+    fn rgb(&self, f: impl Fn(&Material) -> [f32; 3]) -> Vec3x8 {
+        Vec3x8::from_fn(|i| f(self.0[i]))
+    }
+}
+
+/// `wo` mirrored at the normal.
+#[inline(always)]
+fn mirrored(wo: Vec3x8) -> Vec3x8 {
+    Vec3x8::new(-wo.x, -wo.y, wo.z)
+}
+
+/// `w` seen from the side of the interface that `below` lanes are on: z negated there. Isotropic models do not change
+/// under it.
+#[inline(always)]
+fn flip(w: Vec3x8, below: Mask8) -> Vec3x8 {
+    Vec3x8::new(w.x, w.y, below.select(-w.z, w.z))
 }

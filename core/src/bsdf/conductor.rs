@@ -1,0 +1,45 @@
+//! Smooth conductor: perfect reflection times the exact Fresnel reflectance per channel times a scale.
+//!
+//! | parameter | meaning | range |
+//! |---|---|---|
+//! | `eta` | real refractive index per channel | (0, 1e6] |
+//! | `k` | extinction per channel | [0, 1e6] |
+//! | `reflectance` | scale per channel, may be textured | [0, 1] |
+
+use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, fresnel, mirrored};
+use crate::scene::Scene;
+use croupier_simd::{F32x8, Mask8, Vec3x8};
+
+/// Smooth conductor.
+#[derive(Clone, Copy, Debug)]
+pub struct Conductor {
+    reflectance: Vec3x8,
+    eta: Vec3x8,
+    k: Vec3x8,
+}
+
+impl Bsdf<'_> for Conductor {
+    const DELTA: bool = true;
+
+    #[inline(always)]
+    fn gather(scene: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
+        let m = Materials8::new(scene, inputs, active);
+        Self { reflectance: inputs.reflectance.zero_unless(active), eta: m.rgb(|m| m.eta), k: m.rgb(|m| m.k) }
+    }
+
+    #[inline(always)]
+    fn eval(&self, _: Vec3x8, _: Vec3x8) -> Eval8 {
+        Eval8::ZERO
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: Vec3x8, _: [F32x8; 3]) -> Sample8 {
+        Sample8::delta(mirrored(wo), self.albedo(wo), wo.z.gt(F32x8::ZERO))
+    }
+
+    /// Exact.
+    #[inline(always)]
+    fn albedo(&self, wo: Vec3x8) -> Vec3x8 {
+        (fresnel::conductor(wo.z, self.eta, self.k) * self.reflectance).zero_unless(wo.z.gt(F32x8::ZERO))
+    }
+}

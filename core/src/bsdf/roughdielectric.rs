@@ -1,0 +1,138 @@
+//! GGX dielectric interface, Walter et al. 2007, equations 20 and 21; single scattering. Radiance scales by 1 / eta^2 on
+//! transmission.
+//!
+//! | parameter | meaning | range |
+//! |---|---|---|
+//! | `eta[0]` | int_ior / ext_ior; +z is the exterior | > 0 |
+//! | `alpha` | GGX width, clamped to [1e-4, 10] | (0, 1] |
+//!
+//! A microfacet m visible from `wo` is sampled, then reflection with probability F(wo.m). Everything is computed on the
+//! side of `wo` (z negated below), with eta = index behind / index before, k = eta^2 - 1, c = wo.m and e = eta cos_t.
+//! Because c^2 - e^2 = -k exactly:
+//!
+//! - the refracted direction is `-wo / eta - k m / (eta (c + e))` (NUMERICS REF-1);
+//! - the Jacobian `eta^2 cos_t / (c - e)^2` is `eta e (c + e)^2 / k^2`: no difference of close numbers.
+//!
+//! Rebuilding m from two rounded directions cannot be that good: the half vector has the length |eta - 1|, so D is off by
+//! 1e-7 / (alpha |eta - 1|) (REF-2). Where that reaches 1 %, `alpha |eta - 1| < 1e-5` or `|eta - 1| < 1e-4`, the transmitted
+//! lobe is narrower than 1e-4 rad and is a *delta* lobe to the caller: still sampled through m, so nothing is lost or
+//! bent, but evaluation and density do not know it. The reflected lobe stays rough.
+
+use super::ggx::{Ggx8, MIN_COS, mirrored_at};
+use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, flip, fresnel};
+use crate::scene::Scene;
+use croupier_simd::{F32x8, Mask8, Vec3x8};
+
+/// |eta - 1| below which transmission is a delta lobe.
+const MIN_CONTRAST: f32 = 1e-4;
+/// alpha |eta - 1| below which transmission is a delta lobe.
+const MIN_WIDTH: f32 = 1e-5;
+
+/// GGX dielectric interface.
+#[derive(Clone, Copy, Debug)]
+pub struct RoughDielectric {
+    eta: F32x8,
+    ggx: Ggx8,
+    /// Lanes whose transmitted lobe is a delta lobe.
+    narrow: Mask8,
+}
+
+/// The interface as seen from one side.
+#[derive(Clone, Copy)]
+struct Side {
+    below: Mask8,
+    eta: F32x8,
+    inverse: F32x8,
+    k: F32x8,
+}
+
+impl RoughDielectric {
+    #[inline(always)]
+    fn side(&self, wo: Vec3x8) -> Side {
+        let below = wo.z.lt(F32x8::ZERO);
+        let inverse = 1.0 / self.eta;
+        let eta = below.select(inverse, self.eta);
+        Side { below, eta, inverse: below.select(self.eta, inverse), k: (eta - 1.0) * (eta + 1.0) }
+    }
+
+    /// Density of the refracted direction given c, cos_t, D of its microfacet and wo.z + q(wo); without 1 - F.
+    #[inline(always)]
+    fn refraction_pdf(side: &Side, c: F32x8, cos_t: F32x8, d: F32x8, denominator: F32x8) -> F32x8 {
+        let e = side.eta * cos_t;
+        c * d * 2.0 / denominator * (side.eta * e) * ((c + e) / side.k).sqr()
+    }
+}
+
+impl Bsdf<'_> for RoughDielectric {
+    const DELTA: bool = false;
+
+    #[inline(always)]
+    fn gather(scene: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
+        let m = Materials8::new(scene, inputs, active);
+        let (eta, ggx) = (m.get(|m| m.eta[0]), Ggx8::new(m.get(|m| m.alpha)));
+        let contrast = (eta - 1.0).abs();
+        let narrow = contrast.lt(F32x8::splat(MIN_CONTRAST)) | (ggx.alpha() * contrast).lt(F32x8::splat(MIN_WIDTH));
+        Self { eta, ggx, narrow }
+    }
+
+    #[inline(always)]
+    fn eval(&self, wo: Vec3x8, wi: Vec3x8) -> Eval8 {
+        let side = self.side(wo);
+        let (wo, wi) = (flip(wo, side.below), flip(wi, side.below));
+        let reflect = wi.z.gt(F32x8::ZERO);
+
+        // h of any length along the microfacet normal; on transmission it is wo + eta wi, turned to the side of wo
+        let bent = wo + wi * side.eta;
+        let bent = Vec3x8::select(side.k.gt(F32x8::ZERO), -bent, bent);
+        let h = Vec3x8::select(reflect, wo + wi, bent);
+        let length = h.length();
+        let c = reflect.select(length * 0.5, wo.dot(h) / length);
+        let i = fresnel::dielectric(c, side.eta);
+        let (d, denominator) = (self.ggx.d(h), self.ggx.denominator(wo));
+
+        let pdf = reflect.select(
+            i.reflectance * d / (denominator * 2.0),
+            (1.0 - i.reflectance) * Self::refraction_pdf(&side, c, i.cos_t, d, denominator),
+        );
+        let scale = reflect.select(F32x8::ONE, side.inverse * side.inverse);
+        let transmits = wi.z.lt(F32x8::ZERO) & h.z.gt(F32x8::ZERO) & i.reflectance.lt(F32x8::ONE);
+        let valid = wo.z.gt(F32x8::ZERO) & c.gt(F32x8::splat(MIN_COS)) & (reflect | transmits.and_not(self.narrow));
+        Eval8 { f: Vec3x8::grey(pdf * self.ggx.g1(wi) * scale), pdf }.zero_unless(valid)
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: Vec3x8, [u, v, lobe]: [F32x8; 3]) -> Sample8 {
+        let side = self.side(wo);
+        let wo = flip(wo, side.below);
+        let m = self.ggx.sample_visible(wo, u, v);
+        let c = wo.dot(m);
+        let i = fresnel::dielectric(c, side.eta);
+        let reflect = lobe.lt(i.reflectance);
+        let through = -(wo * side.inverse) - m * (side.k * side.inverse / (c + side.eta * i.cos_t));
+        let wi = Vec3x8::select(reflect, mirrored_at(wo, m, c), through);
+
+        let (d, denominator) = (self.ggx.d(m), self.ggx.denominator(wo));
+        let pdf = reflect.select(
+            i.reflectance * d / (denominator * 2.0),
+            (1.0 - i.reflectance) * Self::refraction_pdf(&side, c, i.cos_t, d, denominator),
+        );
+        let scale = reflect.select(F32x8::ONE, side.inverse * side.inverse);
+        let delta = self.narrow.and_not(reflect);
+        let leaves = reflect.select(wi.z, -wi.z).gt(F32x8::ZERO);
+        let valid = wo.z.gt(F32x8::ZERO) & c.gt(F32x8::splat(MIN_COS)) & leaves;
+        Sample8 {
+            wi: flip(wi, side.below),
+            weight: Vec3x8::grey(self.ggx.g1(wi) * scale),
+            pdf: delta.select(F32x8::ZERO, pdf),
+            delta,
+            valid,
+        }
+        .masked()
+    }
+
+    /// 1: what single scattering loses is not counted.
+    #[inline(always)]
+    fn albedo(&self, _: Vec3x8) -> Vec3x8 {
+        Vec3x8::ONE
+    }
+}

@@ -1,0 +1,44 @@
+//! Thin dielectric sheet: both interfaces at once. Summing all inner reflections, it reflects R' = 2R / (1 + R) and passes
+//! the rest straight through; the two 1 / eta^2 factors cancel.
+//!
+//! | parameter | meaning | range |
+//! |---|---|---|
+//! | `eta[0]` | int_ior / ext_ior | > 0 |
+
+use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, fresnel, mirrored};
+use crate::scene::Scene;
+use croupier_simd::{F32x8, Mask8, Vec3x8};
+
+/// Thin dielectric sheet.
+#[derive(Clone, Copy, Debug)]
+pub struct ThinDielectric {
+    eta: F32x8,
+}
+
+impl Bsdf<'_> for ThinDielectric {
+    const DELTA: bool = true;
+
+    #[inline(always)]
+    fn gather(scene: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
+        Self { eta: Materials8::new(scene, inputs, active).get(|m| m.eta[0]) }
+    }
+
+    #[inline(always)]
+    fn eval(&self, _: Vec3x8, _: Vec3x8) -> Eval8 {
+        Eval8::ZERO
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: Vec3x8, [_, _, u]: [F32x8; 3]) -> Sample8 {
+        let cos = wo.z.abs();
+        let r = fresnel::dielectric(cos, self.eta).reflectance;
+        let reflect = u.lt((r + r) / (1.0 + r));
+        Sample8::delta(Vec3x8::select(reflect, mirrored(wo), -wo), Vec3x8::ONE, cos.gt(F32x8::ZERO))
+    }
+
+    /// 1: no energy is lost.
+    #[inline(always)]
+    fn albedo(&self, _: Vec3x8) -> Vec3x8 {
+        Vec3x8::ONE
+    }
+}
