@@ -1,1 +1,50 @@
-//! Rays through pixels.
+//! Rays through pixels: pinhole and thin lens.
+//!
+//! A pixel sample is a point (x, y) of the image in pixels, x to the right and y down from the upper left corner; the
+//! box filter is a sample uniform in the pixel's square, which the caller chooses. With x and y scaled to [-1, 1] the
+//! ray runs through `forward + right x + down y` at distance 1 along the axis.
+//!
+//! A thin lens (Kolb, Mitchell, Hanrahan, SIGGRAPH 1995, section 2) spreads the origins over a disk of radius
+//! `lens_radius` across the axis; all rays of an image point meet in the plane at `focus_distance` along the axis.
+
+use crate::scene::blob::Camera;
+use croupier_simd::{F32x8, Vec3x8};
+
+/// Eight camera rays: origins and unit directions, world space.
+///
+/// `size` is the image in pixels, (x, y) points of it, `u_lens` uniform in [0, 1)^2 (unused by a pinhole). An image of
+/// another shape than the camera's own `size` keeps the vertical field of view: `right` is scaled by the ratio of the
+/// two aspects, so pixels stay square if they were.
+#[inline(always)]
+pub fn generate(camera: &Camera, size: [u32; 2], x: F32x8, y: F32x8, u_lens: [F32x8; 2]) -> (Vec3x8, Vec3x8) {
+    let [width, height] = size.map(|s| s.max(1) as f32);
+    let [own_width, own_height] = camera.size.map(|s| s.max(1) as f32);
+    // Exactly 1 for the camera's own size.
+    let stretch = (width * own_height) / (height * own_width);
+    let v = |a: [f32; 3]| Vec3x8::splat(a[0], a[1], a[2]);
+    let (right, down) = (v(camera.right), v(camera.down));
+    let (sx, sy) = ((x * 2.0 / F32x8::splat(width) - 1.0) * stretch, y * 2.0 / F32x8::splat(height) - 1.0);
+    // Reaches the plane at distance 1 along the axis.
+    let through = v(camera.forward) + right * sx + down * sy;
+    let origin = v(camera.origin);
+    if camera.lens_radius <= 0.0 {
+        return (origin, through.normalize_fast());
+    }
+    let [a, b] = concentric_disk(u_lens).map(|c| c * camera.lens_radius);
+    let offset = right.normalize() * a + down.normalize() * b;
+    (origin + offset, (through * camera.focus_distance - offset).normalize_fast())
+}
+
+/// Area-preserving map of the unit square to the unit disk (Shirley and Chiu, JGT 2(3) 1997): squares around the centre
+/// become circles. The centre maps to the centre; on the diagonals both branches agree.
+#[inline(always)]
+pub fn concentric_disk(u: [F32x8; 2]) -> [F32x8; 2] {
+    let [a, b] = u.map(|c| c * 2.0 - 1.0);
+    let wide = a.abs().gt(b.abs());
+    let (radius, across) = (wide.select(a, b), wide.select(b, a));
+    // 1/8 of a turn per unit of across / radius; 0 / 0 is the centre.
+    let turn = radius.eq(F32x8::ZERO).select(F32x8::ZERO, across / radius) * 0.125;
+    let turn = wide.select(turn, 0.25 - turn);
+    let (sin, cos) = turn.sin_cos_2pi();
+    [radius * cos, radius * sin]
+}

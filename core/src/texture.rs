@@ -1,1 +1,82 @@
-//! Bilinear texture look-up.
+//! Bilinear texture look-up: 8-bit sRGB texels, decoded to linear before they are interpolated.
+//!
+//! Texel (i, j), j counted from the bottom row, has its centre at ((i + 1/2) / width, (j + 1/2) / height); both
+//! coordinates repeat. v = 0 is the lower edge of the bottom row (the OBJ convention).
+
+use crate::scene::Scene;
+use crate::scene::blob::Texture;
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+
+/// Linear value of each sRGB code (IEC 61966-2-1), every entry the nearest `f32` to the exact value.
+pub const SRGB_TO_LINEAR: [f32; 256] = {
+    let mut table = [0.0; 256];
+    let mut code = 0;
+    while code < 256 {
+        let c = code as f64 / 255.0;
+        table[code] = if c <= 0.04045 { c / 12.92 } else { power_12_5((c + 0.055) / 1.055) } as f32;
+        code += 1;
+    }
+    table
+};
+
+/// x^2.4 for 0.05 < x <= 1: the twelfth power of the fifth root, the root by Newton's iteration from above.
+const fn power_12_5(x: f64) -> f64 {
+    let mut y = 1.0;
+    let mut i = 0;
+    while i < 40 {
+        y -= (y - x / (y * y * y * y)) / 5.0;
+        i += 1;
+    }
+    let y4 = y * y * y * y;
+    y4 * y4 * y4
+}
+
+/// Position between texel centres along one axis of `size` texels: the lower texel and the weight of the next one.
+#[inline(always)]
+fn position(coordinate: F32x8, size: F32x8) -> (F32x8, F32x8) {
+    let c = coordinate.is_finite().zero_unless(coordinate);
+    let x = (c - c.floor()) * size - 0.5;
+    let lower = x.floor();
+    (lower, x - lower)
+}
+
+/// Linear Rec. 709 colour of `texture` at `uv`, per lane; 0 outside `active`, where `texture` and `uv` may be anything.
+///
+/// Non-finite coordinates count as 0; at magnitudes above 2^23 the coordinate has no fraction left, and the result is
+/// that of an integer. The error of the position is half an ulp of the coordinate times the size, in texels. Textures
+/// may have up to 2^24 columns and rows.
+pub fn lookup(scene: &Scene<'_>, texture: U32x8, uv: [F32x8; 2], active: Mask8) -> Vec3x8 {
+    const NOTHING: Texture = Texture { first: 0, width: 1, height: 1, reserved: 0 };
+    let index = texture.to_array();
+    let mut record = [NOTHING; 8];
+    for i in active.lanes() {
+        record[i] = scene.textures.get(index[i] as usize).copied().unwrap_or(NOTHING);
+    }
+    let (x, fx) = position(uv[0], F32x8::from_fn(|i| record[i].width as f32));
+    let (y, fy) = position(uv[1], F32x8::from_fn(|i| record[i].height as f32));
+    let (x, y) = (x.to_i32().to_array(), y.to_i32().to_array());
+    let mut corner = [[[0.0f32; 3]; 8]; 4];
+    for i in active.lanes() {
+        let t = &record[i];
+        let columns = [wrap(x[i], t.width), wrap(x[i].wrapping_add(1), t.width)];
+        let rows = [wrap(y[i], t.height), wrap(y[i].wrapping_add(1), t.height)];
+        for (c, out) in corner.iter_mut().enumerate() {
+            // The file's row 0 is the top.
+            let row = t.height.saturating_sub(1).saturating_sub(rows[c >> 1]) as usize;
+            let texel = t.first as usize + row * t.width as usize + columns[c & 1] as usize;
+            let bytes = scene.texels.get(texel).copied().unwrap_or(0).to_le_bytes();
+            out[i] = [bytes[0], bytes[1], bytes[2]].map(|b| SRGB_TO_LINEAR[b as usize]);
+        }
+    }
+    let [a, b, c, d] = corner.map(|k| Vec3x8::from_fn(|i| k[i]));
+    let lower = a * (1.0 - fx) + b * fx;
+    let upper = c * (1.0 - fx) + d * fx;
+    (lower * (1.0 - fy) + upper * fy).zero_unless(active)
+}
+
+/// `i` in -1..=size brought into 0..size; anything else to some texel.
+#[inline(always)]
+fn wrap(i: i32, size: u32) -> u32 {
+    let i = if i < 0 { size.wrapping_add_signed(i) } else { i as u32 };
+    if i < size { i } else { i.wrapping_sub(size).min(size.saturating_sub(1)) }
+}

@@ -1,6 +1,33 @@
 //! Emission and its sampling.
+//!
+//! | kind | file | technique | density |
+//! |---|---|---|---|
+//! | area | `area.rs` | uniform on the triangle | r^2 / (A cos) |
+//! | environment map | `environment.rs` | alias tables over cells, bilinear luminance inside | exact |
+//! | constant environment | `environment.rs` | uniform sphere | 1 / (4 pi) |
+//! | point | `point.rs` | the point | delta |
+//! | directional | `directional.rs` | the direction | delta |
+//!
+//! A light is chosen by a [`LightSelector`] (power-weighted: `power.rs`); every density stated here contains the
+//! selection probability. What [`sample`] states for a direction is what [`area_pdf`] and [`environment_pdf`] give for
+//! a scattered ray that finds the same light (NUMERICS MIS-3): for the environment bit for bit, for triangles up to the
+//! rounding of the hit. Densities are finite and never NaN; where one would be infinite (edge-on or touching) both
+//! the sampler and the density function give the direction up, and the scattered ray has it alone.
 
-use crate::scene::Scene;
+mod area;
+mod directional;
+mod environment;
+mod mis;
+mod point;
+mod power;
+
+pub use area::{area_pdf, area_radiance};
+pub use environment::{environment_pdf, environment_radiance};
+pub use mis::power_heuristic;
+pub use power::PowerSelector;
+
+use crate::scene::blob::{Light, LightKind};
+use crate::scene::{Effects, Scene};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// One light sample per lane, seen from the reference points.
@@ -10,7 +37,7 @@ pub struct LightSample8 {
     pub wi: Vec3x8,
     /// Point on the light; for the environment and directional lights meaningless (see `infinite`).
     pub point: Vec3x8,
-    /// Geometric unit normal of an area light at `point`.
+    /// Geometric unit normal of an area light at `point`; for point lights the direction back.
     pub normal: Vec3x8,
     /// Rounding error bound of `point` along `normal`, world units (NUMERICS OFF-1).
     pub point_error: F32x8,
@@ -26,6 +53,35 @@ pub struct LightSample8 {
     pub valid: Mask8,
 }
 
+impl LightSample8 {
+    /// No sample in any lane.
+    pub const NONE: Self = Self {
+        wi: Vec3x8::ZERO,
+        point: Vec3x8::ZERO,
+        normal: Vec3x8::ZERO,
+        point_error: F32x8::ZERO,
+        radiance: Vec3x8::ZERO,
+        pdf: F32x8::ZERO,
+        delta: Mask8::NONE,
+        infinite: Mask8::NONE,
+        valid: Mask8::NONE,
+    };
+
+    /// Takes over the lanes of `mask` from `other`.
+    #[inline(always)]
+    fn merge(&mut self, mask: Mask8, other: &Self) {
+        self.wi = Vec3x8::select(mask, other.wi, self.wi);
+        self.point = Vec3x8::select(mask, other.point, self.point);
+        self.normal = Vec3x8::select(mask, other.normal, self.normal);
+        self.point_error = mask.select(other.point_error, self.point_error);
+        self.radiance = Vec3x8::select(mask, other.radiance, self.radiance);
+        self.pdf = mask.select(other.pdf, self.pdf);
+        self.delta = (mask & other.delta) | self.delta.and_not(mask);
+        self.infinite = (mask & other.infinite) | self.infinite.and_not(mask);
+        self.valid = (mask & other.valid) | self.valid.and_not(mask);
+    }
+}
+
 /// How a light is chosen for a reference point; a light tree can replace the power-weighted table.
 pub trait LightSelector {
     /// Light index and its probability from a 32-bit random number.
@@ -35,6 +91,102 @@ pub trait LightSelector {
     fn probability(&self, point: Vec3x8, normal: Vec3x8, light: U32x8, mask: Mask8) -> F32x8;
 }
 
-/// Power-weighted selection through the scene's alias table.
-#[derive(Clone, Copy, Debug)]
-pub struct PowerSelector<'s>(pub Scene<'s>);
+/// The chosen lights of eight lanes; lanes outside `mask` hold a black light of no kind.
+struct Chosen {
+    record: [Light; 8],
+    emission: Vec3x8,
+    vector: Vec3x8,
+}
+
+impl Chosen {
+    #[inline(always)]
+    fn gather(scene: &Scene<'_>, light: U32x8, mask: Mask8) -> Self {
+        let index = light.to_array();
+        let mut record: [Light; 8] = bytemuck::Zeroable::zeroed();
+        for i in mask.lanes() {
+            if let Some(l) = scene.lights.get(index[i] as usize) {
+                record[i] = *l;
+            }
+        }
+        Self {
+            emission: Vec3x8::from_fn(|i| record[i].emission),
+            vector: Vec3x8::from_fn(|i| record[i].vector),
+            record,
+        }
+    }
+
+    /// Lanes of `mask` whose light is of `kind`.
+    #[inline(always)]
+    fn of_kind(&self, kind: LightKind, mask: Mask8) -> Mask8 {
+        mask & U32x8::from_fn(|i| self.record[i].kind).eq(U32x8::splat(kind as u32))
+    }
+}
+
+/// Chooses a light and a direction to it for every active lane.
+///
+/// `p` are the reference points, `n` their unit normals (a hint for the selector only; nothing below the horizon is
+/// dropped, since surfaces may transmit). `words` are four independent 32-bit random numbers: the first chooses the
+/// light, the others the place on it. Lanes that come out not `valid` scatter no direct light in this sample: black,
+/// edge-on, behind the light, touching it, or at a distance whose square overflows.
+#[inline(always)]
+pub fn sample<S: LightSelector>(
+    scene: &Scene<'_>,
+    selector: &S,
+    p: Vec3x8,
+    n: Vec3x8,
+    words: [U32x8; 4],
+    active: Mask8,
+) -> LightSample8 {
+    sample_of::<{ u32::MAX }, S>(scene, selector, p, n, words, active)
+}
+
+/// [`sample`] for a kernel profile: lights that need an effect outside `EFFECTS` (bits of [`Effects`]) are not compiled
+/// in, and give no sample.
+#[inline(always)]
+pub fn sample_of<const EFFECTS: u32, S: LightSelector>(
+    scene: &Scene<'_>,
+    selector: &S,
+    p: Vec3x8,
+    n: Vec3x8,
+    words: [U32x8; 4],
+    active: Mask8,
+) -> LightSample8 {
+    let profile = Effects(EFFECTS);
+    let (light, probability) = selector.select(p, n, words[0]);
+    let chosen = Chosen::gather(scene, light, active);
+    let possible = active & probability.gt(F32x8::ZERO);
+    let mut out = LightSample8::NONE;
+    if profile.contains(Effects::AREA_LIGHTS) {
+        let mask = chosen.of_kind(LightKind::Area, possible);
+        if mask.any() {
+            out.merge(mask, &area::sample(scene, &chosen, p, [words[1], words[2]].map(U32x8::to_unit), mask));
+        }
+    }
+    if profile.intersects(Effects::ENVIRONMENT.with(Effects::CONSTANT)) {
+        let mask = chosen.of_kind(LightKind::Environment, possible);
+        if mask.any() {
+            out.merge(mask, &environment::sample(scene, [words[1], words[2], words[3]], mask));
+        }
+    }
+    if profile.contains(Effects::DELTA_LIGHTS) {
+        let mask = chosen.of_kind(LightKind::Point, possible);
+        if mask.any() {
+            out.merge(mask, &point::sample(&chosen, p));
+        }
+        let mask = chosen.of_kind(LightKind::Directional, possible);
+        if mask.any() {
+            out.merge(mask, &directional::sample(&chosen));
+        }
+    }
+    out.pdf = out.pdf * probability;
+    out.valid &= usable(out.pdf) & out.wi.is_finite() & out.radiance.is_finite() & out.radiance.any_positive();
+    out.pdf = out.valid.zero_unless(out.pdf);
+    out.radiance = out.radiance.zero_unless(out.valid);
+    out
+}
+
+/// Densities to divide by: positive and finite.
+#[inline(always)]
+fn usable(pdf: F32x8) -> Mask8 {
+    pdf.gt(F32x8::ZERO) & pdf.is_finite()
+}

@@ -1,1 +1,4 @@
 //! Files, trees and threads around the croupier core.
+
+pub mod alias;
+pub mod environment;

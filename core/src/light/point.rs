@@ -1,0 +1,30 @@
+//! Isotropic point light.
+//!
+//! | parameter | unit | range |
+//! |---|---|---|
+//! | `vector` | position, world units | finite |
+//! | `emission` | intensity, power / sr | >= 0 |
+
+use super::{Chosen, LightSample8};
+use croupier_simd::{F32x8, Mask8, Vec3x8};
+
+/// Squared distances are not taken smaller than this (NUMERICS SOL-5).
+const MIN_DISTANCE_SQR: f32 = 1e-20;
+
+/// Irradiance I / r^2 on a surface facing the light. Nothing arrives at the point itself: no direction.
+#[inline(always)]
+pub(super) fn sample(light: &Chosen, p: Vec3x8) -> LightSample8 {
+    let d = light.vector - p;
+    let distance_sqr = d.length_sqr().max(F32x8::splat(MIN_DISTANCE_SQR));
+    let wi = d.normalize();
+    LightSample8 {
+        wi,
+        point: light.vector,
+        normal: -wi,
+        radiance: light.emission / distance_sqr,
+        pdf: F32x8::ONE,
+        delta: Mask8::all_lanes(),
+        valid: wi.is_finite(),
+        ..LightSample8::NONE
+    }
+}
