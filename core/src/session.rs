@@ -45,7 +45,9 @@ impl fmt::Display for SessionError {
                 let names = Effects::NAMES.iter().filter(|(e, _)| missing.intersects(*e));
                 names.enumerate().try_for_each(|(i, (_, n))| write!(f, "{}{n}", if i == 0 { " " } else { ", " }))
             }
-            Self::Shards { expected } => write!(f, "end_iteration needs every shard in order; shard {expected} is missing"),
+            Self::Shards { expected } => {
+                write!(f, "end_iteration needs every shard in order; shard {expected} is missing")
+            }
             Self::Unfinished { shard } => write!(f, "shard {shard} has not finished the iteration"),
             Self::NoIteration => f.write_str("no iteration has begun"),
         }

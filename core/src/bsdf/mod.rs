@@ -31,8 +31,8 @@ pub use roughdielectric::RoughDielectric;
 pub use roughplastic::{RoughPlastic, TABLE_SIZE};
 pub use thindielectric::ThinDielectric;
 
-use crate::scene::Scene;
 use crate::scene::blob::{Material, MaterialKind, NONE};
+use crate::scene::{Effects, Scene};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Value of `f(wo, wi) |cos wi|` and the solid-angle density of sampling `wi`.
@@ -127,21 +127,37 @@ pub trait Visitor<'s> {
     fn visit<B: Bsdf<'s>>(self) -> Self::Out;
 }
 
-/// Calls `v` with the model of `kind`: the one table of the models.
-#[inline(always)]
-pub fn dispatch<'s, V: Visitor<'s>>(kind: MaterialKind, v: V) -> V::Out {
-    match kind {
-        MaterialKind::Diffuse => v.visit::<Diffuse>(),
-        MaterialKind::Mirror => v.visit::<Mirror>(),
-        MaterialKind::Conductor => v.visit::<Conductor>(),
-        MaterialKind::RoughConductor => v.visit::<RoughConductor>(),
-        MaterialKind::Dielectric => v.visit::<Dielectric>(),
-        MaterialKind::RoughDielectric => v.visit::<RoughDielectric>(),
-        MaterialKind::ThinDielectric => v.visit::<ThinDielectric>(),
-        MaterialKind::Plastic => v.visit::<Plastic>(),
-        MaterialKind::RoughPlastic => v.visit::<RoughPlastic<'s>>(),
-        MaterialKind::Null => v.visit::<Null>(),
-    }
+macro_rules! models {
+    ($($kind:ident => $model:ty),* $(,)?) => {
+        /// Calls `v` with the model of `kind`: the one table of the models.
+        #[inline(always)]
+        pub fn dispatch<'s, V: Visitor<'s>>(kind: MaterialKind, v: V) -> V::Out {
+            match kind { $(MaterialKind::$kind => v.visit::<$model>()),* }
+        }
+
+        /// [`dispatch`] for a kernel profile: models outside the constant `profile` are not compiled in and give `None`.
+        #[inline(always)]
+        pub fn dispatch_in<'s, V: Visitor<'s>>(profile: Effects, kind: MaterialKind, v: V) -> Option<V::Out> {
+            match kind {
+                $(MaterialKind::$kind if profile.contains(Effects::of_material(MaterialKind::$kind)) =>
+                    Some(v.visit::<$model>()),)*
+                _ => None,
+            }
+        }
+    };
+}
+
+models! {
+    Diffuse => Diffuse,
+    Mirror => Mirror,
+    Conductor => Conductor,
+    RoughConductor => RoughConductor,
+    Dielectric => Dielectric,
+    RoughDielectric => RoughDielectric,
+    ThinDielectric => ThinDielectric,
+    Plastic => Plastic,
+    RoughPlastic => RoughPlastic<'s>,
+    Null => Null,
 }
 
 /// What lanes without a material read: parameters with which every model stays finite.

@@ -137,13 +137,14 @@ pub fn sample<S: LightSelector>(
     words: [U32x8; 4],
     active: Mask8,
 ) -> LightSample8 {
-    sample_of::<{ u32::MAX }, S>(scene, selector, p, n, words, active)
+    sample_of(Effects(u32::MAX), scene, selector, p, n, words, active)
 }
 
-/// [`sample`] for a kernel profile: lights that need an effect outside `EFFECTS` (bits of [`Effects`]) are not compiled
-/// in, and give no sample.
+/// [`sample`] for a kernel profile: lights that need an effect outside the constant `profile` are not compiled in, and
+/// give no sample.
 #[inline(always)]
-pub fn sample_of<const EFFECTS: u32, S: LightSelector>(
+pub fn sample_of<S: LightSelector>(
+    profile: Effects,
     scene: &Scene<'_>,
     selector: &S,
     p: Vec3x8,
@@ -151,7 +152,6 @@ pub fn sample_of<const EFFECTS: u32, S: LightSelector>(
     words: [U32x8; 4],
     active: Mask8,
 ) -> LightSample8 {
-    let profile = Effects(EFFECTS);
     let (light, probability) = selector.select(p, n, words[0]);
     let chosen = Chosen::gather(scene, light, active);
     let possible = active & probability.gt(F32x8::ZERO);

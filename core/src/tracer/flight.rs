@@ -32,11 +32,3 @@ pub(crate) struct Flight8 {
     /// Product of the albedos of the vertices so far.
     pub albedo_product: F32x8,
 }
-
-/// Power heuristic with beta = 2 (Veach 1997): the weight of a sample of density `f` that a technique of density `g` could
-/// have made too. Neither overflows nor divides 0 by 0 for finite densities (NUMERICS MIS-1).
-#[inline(always)]
-pub(crate) fn power_heuristic(f: F32x8, g: F32x8) -> F32x8 {
-    let r = g / f;
-    f.gt(F32x8::ZERO).zero_unless(1.0 / (1.0 + r * r))
-}

@@ -2,7 +2,7 @@
 
 use super::shard::Shard;
 use super::vertex::Vertex8;
-use crate::accel::{Intersector, Ray8, spawn};
+use crate::accel::{self, Intersector, Ray8};
 use crate::light::LightSample8;
 use crate::profile::Profile;
 use crate::session::Session;
@@ -17,8 +17,8 @@ impl Shard<'_> {
         l: &LightSample8,
         mask: Mask8,
     ) -> Mask8 {
-        let finite = spawn::shadow_ray(v.p, v.ng, v.error, l.point, l.normal, l.point_error);
-        let far_o = spawn::offset(v.p, v.ng, v.error, l.wi);
+        let finite = accel::shadow_ray(v.p, v.ng, v.error, l.point, l.normal, l.point_error);
+        let far_o = accel::offset(v.p, v.ng, v.error, l.wi);
         let ray = Ray8 {
             o: Vec3x8::select(l.infinite, far_o, finite.o),
             d: Vec3x8::select(l.infinite, l.wi, finite.d),

@@ -65,7 +65,10 @@ impl Cursor {
 
 impl Shard<'_> {
     /// Up to eight camera rays. `None` when the cursor ran out within empty slots.
-    pub(super) fn camera_rays<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>) -> Option<Flight8> {
+    pub(super) fn camera_rays<P: Profile, I: Intersector>(
+        &mut self,
+        session: &Session<'_, '_, P, I>,
+    ) -> Option<Flight8> {
         let first_sample = session.iteration().first_sample;
         let tiles = self.plan.tiles;
         let (mut x, mut y, mut pixel, mut sample, mut root) = ([0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8]);

@@ -106,7 +106,8 @@ impl Shard<'_> {
         } else {
             let budget = self.plan.settings().split_budget;
             let root = root.to_array();
-            let bits = splitting.lanes().filter(|&i| self.roots.get(root[i]).splits >= budget).fold(0, |m, i| m | 1 << i);
+            let bits =
+                splitting.lanes().filter(|&i| self.roots.get(root[i]).splits >= budget).fold(0, |m, i| m | 1 << i);
             cut = cut | Mask8::from_bits(bits);
             self.counters.budget_capped += u64::from(cut.count());
         }

@@ -1,12 +1,12 @@
 //! Stage `scatter`: eight samples of vertices of one class. Each sample is one light sample and one scattered ray
 //! (EARS' atomic sample), combined by multiple importance sampling.
 
-use super::flight::{Flight8, power_heuristic};
+use super::flight::Flight8;
 use super::shard::Shard;
 use super::vertex::{Batch, CLASSES, Vertex8};
-use crate::accel::{Intersector, Ray8, spawn};
+use crate::accel::{self, Intersector, Ray8};
 use crate::bsdf::{self, Bsdf, Eval8, Inputs8, Sample8, Visitor};
-use crate::light::{self, LightSample8};
+use crate::light::{self, LightSample8, power_heuristic};
 use crate::profile::Profile;
 use crate::rng::Key8;
 use crate::scene::Scene;
@@ -69,10 +69,7 @@ impl<'s> Visitor<'s> for IsDelta {
 
 impl Shard<'_> {
     /// Scatters a packet of the fullest class, or of the next from which a sample fits.
-    pub(super) fn scatter<P: Profile, I: Intersector>(
-        &mut self,
-        session: &Session<'_, '_, P, I>,
-    ) -> Option<Flight8> {
+    pub(super) fn scatter<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>) -> Option<Flight8> {
         let (fullest, _) = self.pool.fullest();
         let mut taken = self.take(fullest).map(|b| (fullest, b));
         for class in 0..CLASSES {
@@ -116,12 +113,7 @@ impl Shard<'_> {
         }
         Some(Flight8 {
             active: flying,
-            ray: Ray8 {
-                o: spawn::offset(v.p, v.ng, v.error, wi),
-                d: wi,
-                tmin: F32x8::ZERO,
-                tmax: F32x8::INFINITY,
-            },
+            ray: Ray8 { o: accel::offset(v.p, v.ng, v.error, wi), d: wi, tmin: F32x8::ZERO, tmax: F32x8::INFINITY },
             from: v.p,
             normal: v.ng,
             beta,
@@ -170,5 +162,5 @@ fn sample_lights<P: Profile>(
     key: Key8,
     active: Mask8,
 ) -> LightSample8 {
-    light::sample(scene, session.selector(), v.p, v.ng, key.words(LIGHT_BLOCK), active)
+    light::sample_of(P::EFFECTS, scene, session.selector(), v.p, v.ng, key.words(LIGHT_BLOCK), active)
 }

@@ -7,7 +7,8 @@ impl Shard<'_> {
     /// Adds radiance to the roots of the lanes in `mask`. What is not finite is counted, not added.
     #[inline]
     pub(super) fn gather(&mut self, mask: Mask8, root: U32x8, radiance: Vec3x8) {
-        let mask = mask & radiance.abs().max_component().gt(croupier_simd::F32x8::ZERO) | mask.and_not(radiance.is_finite());
+        let mask =
+            mask & radiance.abs().max_component().gt(croupier_simd::F32x8::ZERO) | mask.and_not(radiance.is_finite());
         if mask.none() {
             return;
         }

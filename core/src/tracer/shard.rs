@@ -135,7 +135,8 @@ impl<'m> Shard<'m> {
         self.counters = Counters::default();
         self.pixels.fill(PixelStats::default());
         self.aovs.fill(PixelAov::default());
-        let seed = self.plan.settings().seed ^ (iteration.number << 20 | u64::from(self.index)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let seed = self.plan.settings().seed
+            ^ (iteration.number << 20 | u64::from(self.index)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         self.comb = Pcg32::seed_from_u64(seed);
     }
 

@@ -1,11 +1,11 @@
 //! Stage `surface`: what was hit, what it emits, and the vertex that it becomes.
 
-use super::flight::{Flight8, power_heuristic};
+use super::flight::Flight8;
 use super::roulette::Arrival8;
 use super::shard::Shard;
 use super::vertex::Vertex8;
-use crate::accel::{Hit8, Intersector, spawn};
-use crate::light;
+use crate::accel::{self, Hit8, Intersector};
+use crate::light::{self, power_heuristic};
 use crate::profile::Profile;
 use crate::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind, NONE, TRIANGLE_SMOOTH};
 use crate::scene::{Effects, Scene};
@@ -39,11 +39,16 @@ impl Shard<'_> {
     }
 
     /// Lanes that hit a triangle.
-    pub(super) fn arrive<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>, f: &Flight8, hit: &Hit8) {
+    pub(super) fn arrive<P: Profile, I: Intersector>(
+        &mut self,
+        session: &Session<'_, '_, P, I>,
+        f: &Flight8,
+        hit: &Hit8,
+    ) {
         let scene = session.scene();
         let mask = hit.hit;
         self.counters.surface.count(mask.count());
-        let point = spawn::surface_point(scene, hit.triangle, hit.u, hit.v, mask);
+        let point = accel::surface_point(scene, hit.triangle, hit.u, hit.v, mask);
         let wo = -f.ray.d;
         if P::EFFECTS.contains(Effects::AREA_LIGHTS) {
             self.emission(session, f, hit, point.ng);
@@ -104,7 +109,8 @@ impl Shard<'_> {
         let radiance = light::area_radiance(scene, hit.triangle, f.ray.d, ng, mask);
         let sampled = mask.and_not(f.alone);
         let weight = if sampled.any() {
-            let pdf = light::area_pdf(scene, session.selector(), f.from, f.normal, hit.triangle, f.ray.d, hit.t, sampled);
+            let pdf =
+                light::area_pdf(scene, session.selector(), f.from, f.normal, hit.triangle, f.ray.d, hit.t, sampled);
             f.alone.select(F32x8::ONE, power_heuristic(f.pdf, pdf))
         } else {
             F32x8::ONE
@@ -179,7 +185,9 @@ fn shade<P: Profile>(scene: &Scene<'_>, hit: &Hit8, wo: Vec3x8, ng: Vec3x8) -> S
         ns = Vec3x8::select(ok, sum / len, ng);
     }
     if P::EFFECTS.contains(Effects::TEXTURES) && textured != 0 {
-        let uv = |k: usize, c: usize| F32x8::from_fn(|i| scene.vertices.get(corners[i][k] as usize).map_or(0.0, |v| v.uv[c]));
+        let uv = |k: usize, c: usize| {
+            F32x8::from_fn(|i| scene.vertices.get(corners[i][k] as usize).map_or(0.0, |v| v.uv[c]))
+        };
         let at = |c: usize| uv(0, c) * w + uv(1, c) * hit.u + uv(2, c) * hit.v;
         let mask = Mask8::from_bits(textured);
         let texel = texture::lookup(scene, U32x8::new(textures), [at(0), at(1)], mask);

@@ -235,7 +235,11 @@ impl<'m> Pool<'m> {
             let count = v.count();
             let want = count.min((8 - lanes) as u32);
             // a drained vertex gives its own slot back
-            let m = if want == count && want as usize <= room + 1 { want } else { want.min(room as u32).min(count.max(1) - 1) };
+            let m = if want == count && want as usize <= room + 1 {
+                want
+            } else {
+                want.min(room as u32).min(count.max(1) - 1)
+            };
             if m == 0 {
                 break;
             }
