@@ -66,19 +66,26 @@ impl F32x8 {
         return self * a + b;
     }
 
-    /// `self < o ? o : self`, so a NaN in either gives `self`.
+    /// `self < o ? o : self`: a NaN in either gives `self`, and so do two zeros of different sign.
     #[inline(always)]
     pub fn max(self, o: Self) -> Self {
-        self.lt(o).select(o, self)
+        // `maxps o, self` is this rule in one instruction; other targets' maxima treat NaN and zeros differently.
+        #[cfg(target_feature = "sse")]
+        return Self(o.0.fast_max(self.0));
+        #[cfg(not(target_feature = "sse"))]
+        return self.lt(o).select(o, self);
     }
 
-    /// `o < self ? o : self`, so a NaN in either gives `self`.
+    /// `o < self ? o : self`: a NaN in either gives `self`, and so do two zeros of different sign.
     #[inline(always)]
     pub fn min(self, o: Self) -> Self {
-        o.lt(self).select(o, self)
+        #[cfg(target_feature = "sse")]
+        return Self(o.0.fast_min(self.0));
+        #[cfg(not(target_feature = "sse"))]
+        return o.lt(self).select(o, self);
     }
 
-    /// Between `lo` and `hi`; a NaN becomes `lo`.
+    /// Between `lo` and `hi` (`lo <= hi`, no NaN); a NaN becomes `lo`.
     #[inline(always)]
     pub fn clamp(self, lo: f32, hi: f32) -> Self {
         Self::splat(lo).max(self).min(Self::splat(hi))
@@ -113,10 +120,31 @@ impl F32x8 {
         Self::ZERO.max(self).sqrt()
     }
 
-    /// Largest integer not above.
+    /// Nearest integer, ties to even. Keeps infinities, NaN and the sign of zero: -0.3 gives -0.
+    #[inline(always)]
+    pub fn round(self) -> Self {
+        #[cfg(any(target_feature = "sse4.1", target_feature = "simd128", target_arch = "aarch64"))]
+        return Self(self.0.round_ties_even());
+        // Without a rounding instruction: 2^23 pushes the fraction out of the significand. (`wide` loses the
+        // sign of zero here, so its fall-back would not give the same bits as the instruction.)
+        #[cfg(not(any(target_feature = "sse4.1", target_feature = "simd128", target_arch = "aarch64")))]
+        {
+            let a = self.abs();
+            let r = (a + 8_388_608.0) - 8_388_608.0;
+            a.lt(Self::splat(8_388_608.0)).select(r.copysign(self), self)
+        }
+    }
+
+    /// Largest integer not above. Keeps infinities, NaN and the sign of zero.
     #[inline(always)]
     pub fn floor(self) -> Self {
-        Self(self.0.floor())
+        #[cfg(any(target_feature = "sse4.1", target_feature = "simd128", target_arch = "aarch64"))]
+        return Self(self.0.floor());
+        #[cfg(not(any(target_feature = "sse4.1", target_feature = "simd128", target_arch = "aarch64")))]
+        {
+            let r = self.round();
+            r - self.lt(r).zero_unless(Self::ONE)
+        }
     }
 
     /// `self * self`.

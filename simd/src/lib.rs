@@ -22,3 +22,6 @@ pub use vec3::{Frame8, Vec3x8};
 
 /// Lanes of every vector type here.
 pub const LANES: usize = 8;
+
+/// Is this the arithmetic whose results have the same bits on every target? `false` with the feature `fast`.
+pub const REPRODUCIBLE: bool = !cfg!(feature = "fast");
