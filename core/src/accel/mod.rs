@@ -1,4 +1,23 @@
 //! Rays against triangles.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `wide` | [`WideBvh`]: the built-in [`Intersector`], grouping of rays |
+//! | `setup` | per-ray constants, eight rays at once |
+//! | `triangle` | the watertight triangle test, the same lanes for 8 triangles or 8 rays |
+//! | `single` | one ray against 8-wide nodes and 8-triangle leaves |
+//! | `packet` | up to eight rays of one octant together |
+//! | `spawn` | points on surfaces with error bounds, origins of secondary rays |
+
+mod packet;
+mod setup;
+mod single;
+mod spawn;
+mod triangle;
+mod wide;
+
+pub use spawn::{SurfacePoint8, offset, shadow_ray, surface_point};
+pub use wide::WideBvh;
 
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 

@@ -2,3 +2,4 @@
 
 pub mod alias;
 pub mod environment;
+pub mod bvh;

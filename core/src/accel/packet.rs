@@ -1,0 +1,207 @@
+//! Up to eight rays of one octant and one major axis together.
+//!
+//! ```text
+//! packet(node):
+//!     few rays left in it: each goes on alone
+//!     for each child that the interval of all rays meets, nearest first:
+//!         the rays that enter it before their closest hits: packet(child)
+//! ```
+//!
+//! 1. The eight children are tested at once against intervals of the packet's origins and inverse directions, then eight
+//!    rays at once against each survivor. Every step is monotone (see `setup`): the intervals never reject a child that
+//!    one of the rays enters.
+//! 2. A leaf costs one test per triangle (eight rays each) or one per ray (eight triangles each), whichever is fewer.
+//! 3. Entries are kept per ray on the stack, infinite in rays that miss: a popped entry knows its rays.
+
+use super::setup::{AXES, Setup};
+use super::single::{Hit1, Keys, Ray1, STACK, test_leaf, walk};
+use super::triangle::{Line, intersect};
+use crate::scene::blob::{CHILD_INDEX, LEAF_BIT, Leaf, NONE, Node};
+use croupier_simd::{F32x8, Mask8, U32x8};
+
+/// Groups of at most this many rays go one by one (3 and 4 measured alike).
+pub(super) const FEW: u32 = 4;
+
+/// Closest hits of eight rays; any hit: `triangle` other than [`NONE`] where there is one.
+pub(super) struct Best {
+    /// Limits: t of the closest hits; below every t in lanes that are done.
+    pub t: F32x8,
+    pub triangle: U32x8,
+    pub u: F32x8,
+    pub v: F32x8,
+}
+
+impl Best {
+    /// No hits up to and including `limit`.
+    #[inline(always)]
+    pub fn none(limit: F32x8) -> Self {
+        Self { t: limit, triangle: U32x8::splat(NONE), u: F32x8::ZERO, v: F32x8::ZERO }
+    }
+
+    #[inline(always)]
+    fn lane(&self, i: usize) -> Hit1 {
+        Hit1 { t: self.t.lane(i), triangle: self.triangle.lane(i), u: self.u.lane(i), v: self.v.lane(i) }
+    }
+
+    #[inline(always)]
+    pub fn set(&mut self, i: usize, h: &Hit1) {
+        self.t = self.t.with_lane(i, h.t);
+        let mut triangle = self.triangle.to_array();
+        triangle[i & 7] = h.triangle;
+        self.triangle = U32x8::new(triangle);
+        self.u = self.u.with_lane(i, h.u);
+        self.v = self.v.with_lane(i, h.v);
+    }
+}
+
+/// Stack entries beside the keys, which hold the packet's entry and the child.
+type Entries = [F32x8; STACK];
+
+/// Walks the rays `group` of `s` (one octant, one major axis) from the root. Closest: improves `best`. Any: returns the
+/// lanes with a hit.
+#[inline(never)]
+pub(super) fn walk_packet<const ANY: bool>(
+    tree: (&[Node], &[Leaf]),
+    s: &Setup,
+    group: u32,
+    best: &mut Best,
+    keys: &mut Keys,
+) -> u32 {
+    let lead = group.trailing_zeros() as usize & 7;
+    let members = Mask8::from_bits(group);
+    let axes = AXES[s.axis(lead)].map(|k| k.min(2));
+    let get = |a: &[[f32; 8]; 3]| axes.map(|k| F32x8::new(a[k]));
+    // lanes outside the group may hold anything: give them the values of the first ray
+    let only = |a: &[[f32; 8]; 3]| axes.map(|k| members.select(F32x8::new(a[k]), F32x8::splat(a[k][lead])));
+    let (near, far, ninv) = (only(&s.near), only(&s.far), only(&s.ninv));
+    let line = Line { o: get(&s.o), d: get(&s.d), shear: s.shear.map(F32x8::new), tmin: F32x8::new(s.tmin) };
+    let negative = axes.map(|k| s.negative[k] >> lead & 1 == 1);
+    let low = [0, 1, 2].map(|k| axes[k] + if negative[k] { 3 } else { 0 });
+    let high = [0, 1, 2].map(|k| axes[k] + if negative[k] { 0 } else { 3 });
+    // the earliest entry has the origin farthest along the direction, the latest exit the one farthest behind
+    let bound = |v: F32x8, largest: bool| F32x8::splat(if largest { v.max_lane() } else { v.min_lane() });
+    let in_o = [0, 1, 2].map(|k| bound(near[k], !negative[k]));
+    let out_o = [0, 1, 2].map(|k| bound(far[k], negative[k]));
+    let (inv_lo, inv_hi) = (ninv.map(|v| bound(v, false)), ninv.map(|v| bound(v, true)));
+    let earliest = F32x8::splat(members.select(line.tmin, F32x8::INFINITY).min_lane());
+
+    let never = F32x8::splat(f32::NEG_INFINITY);
+    let mut b = Best { t: members.select(best.t, never), ..*best };
+    let mut entries: Entries = [F32x8::ZERO; STACK];
+    let mut latest = F32x8::splat(b.t.max_lane());
+    let (mut sp, mut child, mut entry) = (0usize, 0u32, members.select(line.tmin, F32x8::INFINITY));
+    let mut occluded = 0u32;
+    'walk: loop {
+        let rays = entry.le(b.t).bits();
+        let n = rays.count_ones();
+        let mut changed = false;
+        if child & LEAF_BIT == 0 {
+            if n <= FEW {
+                for i in Mask8::from_bits(rays).lanes() {
+                    let mut h = b.lane(i);
+                    let before = h;
+                    let found = walk::<ANY>(tree, (child, entry.lane(i)), &Ray1::new(s, i), &mut h, keys, sp);
+                    if ANY && found {
+                        occluded |= 1 << i;
+                        b.t = b.t.with_lane(i, f32::NEG_INFINITY);
+                        changed = true;
+                    } else if !ANY && h.triangle != before.triangle {
+                        b.set(i, &h);
+                        changed = true;
+                    }
+                }
+            } else if let Some(node) = tree.0.get(child as usize) {
+                let rows = &node.bounds;
+                let (mut enter, mut leave) = (earliest, latest);
+                for k in 0..3 {
+                    let x = in_o[k] - F32x8::new(rows[low[k].min(5)]);
+                    let y = out_o[k] - F32x8::new(rows[high[k].min(5)]);
+                    enter = enter.max((x * inv_lo[k]).min(x * inv_hi[k]));
+                    leave = leave.min((y * inv_lo[k]).max(y * inv_hi[k]));
+                }
+                let met = enter.le(leave);
+                let enter = enter.to_array();
+                let start = sp;
+                for i in met.lanes() {
+                    let (mut t, mut e) = (line.tmin, b.t);
+                    for k in 0..3 {
+                        t = t.max((near[k] - F32x8::splat(rows[low[k].min(5)][i])) * ninv[k]);
+                        e = e.min((far[k] - F32x8::splat(rows[high[k].min(5)][i])) * ninv[k]);
+                    }
+                    let inside = t.le(e);
+                    if inside.none() {
+                        continue;
+                    }
+                    let key = u64::from(enter[i].to_bits()) << 32 | u64::from(node.child[i]);
+                    let mut p = sp;
+                    while !ANY && p > start && keys[(p - 1) & (STACK - 1)] < key {
+                        keys[p & (STACK - 1)] = keys[(p - 1) & (STACK - 1)];
+                        entries[p & (STACK - 1)] = entries[(p - 1) & (STACK - 1)];
+                        p -= 1;
+                    }
+                    keys[p & (STACK - 1)] = key;
+                    entries[p & (STACK - 1)] = inside.select(t, F32x8::INFINITY);
+                    sp += 1;
+                }
+            }
+        } else if let Some(leaf) = tree.1.get((child & CHILD_INDEX) as usize) {
+            let triangles = (child >> 27 & 15).min(8);
+            if n < triangles {
+                for i in Mask8::from_bits(rays).lanes() {
+                    let mut h = b.lane(i);
+                    if test_leaf::<ANY>(leaf, &Ray1::new(s, i), entry.lane(i), &mut h) {
+                        changed = true;
+                        if ANY {
+                            occluded |= 1 << i;
+                            b.t = b.t.with_lane(i, f32::NEG_INFINITY);
+                        } else {
+                            b.set(i, &h);
+                        }
+                    }
+                }
+            } else {
+                for i in 0..triangles as usize {
+                    let vertex = |v: usize| axes.map(|k| F32x8::splat(leaf.p[v + k][i]));
+                    let Some(c) = intersect(&[vertex(0), vertex(3), vertex(6)], &line, b.t) else { continue };
+                    // rays that miss the leaf's box miss its triangles, also when they go alone
+                    let mask = c.mask & entry.le(b.t);
+                    if ANY {
+                        occluded |= mask.bits();
+                        b.t = mask.select(never, b.t);
+                        changed = true;
+                        continue;
+                    }
+                    let (t, id) = (entry.max(c.t), U32x8::splat(leaf.triangle[i]));
+                    let mask = mask & (t.lt(b.t) | (t.eq(b.t) & id.lt(b.triangle)));
+                    b.t = mask.select(t, b.t);
+                    b.triangle = U32x8::select(mask, id, b.triangle);
+                    b.u = mask.select(c.u, b.u);
+                    b.v = mask.select(c.v, b.v);
+                    changed = true;
+                }
+            }
+        }
+        if changed {
+            latest = F32x8::splat(b.t.max_lane());
+            if ANY && occluded == group {
+                break 'walk;
+            }
+        }
+        loop {
+            if sp == 0 {
+                break 'walk;
+            }
+            sp -= 1;
+            entry = entries[sp & (STACK - 1)];
+            if entry.le(b.t).any() {
+                child = keys[sp & (STACK - 1)] as u32;
+                break;
+            }
+        }
+    }
+    best.t = members.select(b.t, best.t);
+    best.triangle = U32x8::select(members, b.triangle, best.triangle);
+    best.u = members.select(b.u, best.u);
+    best.v = members.select(b.v, best.v);
+    occluded
+}

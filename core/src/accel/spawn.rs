@@ -1,0 +1,59 @@
+//! Points on surfaces with error bounds, and the rays that leave them.
+
+use super::Ray8;
+use crate::scene::Scene;
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+
+/// Points on triangles, world space.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoint8 {
+    /// Position, from the barycentric weights (never `o + t d`: NUMERICS OFF-1).
+    pub p: Vec3x8,
+    /// Unit geometric normal, on the side from which the vertices run counter-clockwise.
+    pub ng: Vec3x8,
+    /// Bound of the rounding error of `p` along `ng`, world units.
+    pub error: F32x8,
+}
+
+/// The points with weights `1 - u - v`, `u`, `v` on the triangles; lanes outside `mask` may hold anything and give the
+/// point 0 with the normal +z. A triangle without area has the normal +z.
+///
+/// `error` is `32 2^-24 sum |b_i p_i| . |ng|` (NUMERICS OFF-1): vertices are exact, so weights, products and sums leave a
+/// few roundings of each term; 32 leaves room for the rounding of the offset and of the triangle test.
+pub fn surface_point(scene: &Scene<'_>, triangle: U32x8, u: F32x8, v: F32x8, mask: Mask8) -> SurfacePoint8 {
+    let triangle = U32x8::select(mask, triangle, U32x8::splat(0)).to_array();
+    let (u, v) = (mask.zero_unless(u), mask.zero_unless(v));
+    let at = |corner: usize| {
+        Vec3x8::from_fn(|i| {
+            let t = scene.triangles.get(triangle[i] as usize);
+            let vertex = t.and_then(|t| scene.vertices.get(t.vertex[corner] as usize));
+            vertex.map_or([0.0; 3], |vertex| vertex.p)
+        })
+        .zero_unless(mask)
+    };
+    let (a, b, c) = (at(0), at(1), at(2));
+    let w = F32x8::ONE - u - v;
+    let (pa, pb, pc) = (a * w, b * u, c * v);
+    let n = (b - a).cross(c - a);
+    let size = n.abs().max_component();
+    // scaled before the length: edges of 1e-12 square to nothing; `max` also turns a NaN into the tiny value
+    let tiny = F32x8::splat(1e-37);
+    let n = n / tiny.max(size);
+    let up = Vec3x8::splat(0.0, 0.0, 1.0);
+    let ng = Vec3x8::select(size.gt(tiny) & size.is_finite(), n / n.length(), up);
+    let sum = pa.abs() + pb.abs() + pc.abs();
+    SurfacePoint8 { p: pa + pb + pc, ng, error: sum.dot(ng.abs()) * (32.0 / 16_777_216.0) }
+}
+
+/// `p` moved along `ng` by `error` to the side that `d` points to. Rounding the sum moves it by at most `error / 32`.
+pub fn offset(p: Vec3x8, ng: Vec3x8, error: F32x8, d: Vec3x8) -> Vec3x8 {
+    p + ng * error.copysign(d.dot(ng))
+}
+
+/// The segments from `p` to `q`, both moved off their surfaces, as rays with `d = q' - p'` and `0 < t < 1`.
+pub fn shadow_ray(p: Vec3x8, ng: Vec3x8, error: F32x8, q: Vec3x8, q_ng: Vec3x8, q_error: F32x8) -> Ray8 {
+    let d = q - p;
+    let o = offset(p, ng, error, d);
+    let d = offset(q, q_ng, q_error, -d) - o;
+    Ray8 { o, d, tmin: F32x8::ZERO, tmax: F32x8::ONE }
+}

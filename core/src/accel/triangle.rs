@@ -1,0 +1,115 @@
+//! The watertight ray-triangle test of Woop, Benthin and Wald, JCGT 2(1) 2013.
+//!
+//! ```text
+//! p  = vertex - o                       for a, b, c, axes permuted so that |d.z| is largest
+//! x' = p.x - d.x/d.z p.z,  y' alike     the ray becomes the z axis
+//! U  = c.x' b.y' - c.y' b.x'            V, W cyclic; hit if no two have opposite signs
+//! t  = (U a.z + V b.z + W c.z) / (U + V + W) / d.z
+//! ```
+//!
+//! 1. Both triangles of an edge compute the same x', y' for its vertices and then `fl(pq) - fl(rs)` or exactly its
+//!    negative: no ray passes between them. A fused product would round one side only and leak (NUMERICS TRI-1), hence
+//!    plain `*` and `-` here in every arithmetic.
+//! 2. The same lanes serve one ray against eight triangles and eight rays against one triangle: the two ways of
+//!    traversal agree in every bit.
+//! 3. Where vertices lie on both sides of the origin along the ray, t near 0 may have the wrong sign: a needle that a ray
+//!    has just left can be hit again. If t is within its error bound of 0 (pbrt-v4's bound for this test, section 6.8.8)
+//!    the side of the plane decides, in f64. This rejects hits of the own surface without opening gaps: a triangle that
+//!    lies in front is never rejected.
+
+use croupier_simd::{F32x8, Mask8};
+
+/// Three vertices, axes permuted.
+pub(super) type Vertices = [[F32x8; 3]; 3];
+
+/// Unit roundoff of f32.
+const U: f32 = 1.0 / 16_777_216.0;
+
+/// Hits that pass the edges and the interval.
+pub(super) struct Candidates {
+    /// Lanes.
+    pub mask: Mask8,
+    /// Ray parameter.
+    pub t: F32x8,
+    /// Weight of vertex b.
+    pub u: F32x8,
+    /// Weight of vertex c.
+    pub v: F32x8,
+}
+
+/// Constants of a ray (or of eight) that the test reads, axes permuted.
+pub(super) struct Line {
+    pub o: [F32x8; 3],
+    pub d: [F32x8; 3],
+    pub shear: [F32x8; 3],
+    pub tmin: F32x8,
+}
+
+/// Lanes with `tmin < t <= limit` inside the triangle. Degenerate triangles (no area seen along the ray) are missed.
+#[inline(always)]
+pub(super) fn intersect(p: &Vertices, r: &Line, limit: F32x8) -> Option<Candidates> {
+    let shear = |p: &[F32x8; 3]| {
+        let z = p[2] - r.o[2];
+        [(p[0] - r.o[0]) - r.shear[0] * z, (p[1] - r.o[1]) - r.shear[1] * z, z]
+    };
+    let (a, b, c) = (shear(&p[0]), shear(&p[1]), shear(&p[2]));
+    let edge = |p: &[F32x8; 3], q: &[F32x8; 3]| p[0] * q[1] - p[1] * q[0];
+    let (u, v, w) = (edge(&c, &b), edge(&a, &c), edge(&b, &a));
+    let det = u + v + w;
+    let zero = F32x8::ZERO;
+    let inside = u.min(v).min(w).ge(zero) | u.max(v).max(w).le(zero);
+    // false for NaN as well
+    let inside = inside & (det.lt(zero) | det.gt(zero));
+    if inside.none() {
+        return None;
+    }
+    let scale = F32x8::ONE / det;
+    let t = (u * a[2] + v * b[2] + w * c[2]) * scale * r.shear[2];
+    let mut mask = inside & t.gt(r.tmin) & t.le(limit);
+    if mask.none() {
+        return None;
+    }
+    let behind = (a[2] * r.shear[2]).min(b[2] * r.shear[2]).min(c[2] * r.shear[2]).lt(zero);
+    if (mask & behind).any() {
+        let doubt = mask & behind & t.le(error(&a, &b, &c, [u, v, w], scale, r.shear[2]));
+        if doubt.any() {
+            mask = mask.and_not(not_ahead(p, r, doubt));
+            if mask.none() {
+                return None;
+            }
+        }
+    }
+    Some(Candidates { mask, t, u: v * scale, v: w * scale })
+}
+
+/// Bound of the absolute error of t (pbrt-v4, section 6.8.8).
+#[inline(always)]
+fn error(a: &[F32x8; 3], b: &[F32x8; 3], c: &[F32x8; 3], e: [F32x8; 3], scale: F32x8, inv_d: F32x8) -> F32x8 {
+    let max = |x: F32x8, y: F32x8, z: F32x8| x.abs().max(y.abs()).max(z.abs());
+    let (x, y, z) = (max(a[0], b[0], c[0]), max(a[1], b[1], c[1]), max(a[2], b[2], c[2]));
+    let e = max(e[0], e[1], e[2]);
+    let dz = z * (3.0 * U);
+    let (dx, dy) = ((x + z) * (5.0 * U), (y + z) * (5.0 * U));
+    let de = (x * y * (2.0 * U) + dy * x + dx * y) * 2.0;
+    (e * z * (3.0 * U) + de * z + dz * e) * 3.0 * (scale * inv_d).abs()
+}
+
+/// The lanes of `doubt` whose triangle's plane is not ahead of the origin, decided in f64: differences of floats, and
+/// products of those with 2^-53 relative error, against heights that are at least some 2^-24 of the coordinates.
+#[cold]
+#[inline(never)]
+fn not_ahead(p: &Vertices, r: &Line, doubt: Mask8) -> Mask8 {
+    let mut bits = 0;
+    for i in doubt.lanes() {
+        let at = |v: &[F32x8; 3]| v.map(|x| f64::from(x.lane(i)));
+        let sub = |p: [f64; 3], q: [f64; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
+        let dot = |p: [f64; 3], q: [f64; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
+        let (a, b, c) = (at(&p[0]), at(&p[1]), at(&p[2]));
+        let (e, f) = (sub(b, a), sub(c, a));
+        let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
+        let (height, slope) = (dot(sub(a, at(&r.o)), n), dot(at(&r.d), n));
+        let ahead = (height > 0.0 && slope > 0.0) || (height < 0.0 && slope < 0.0);
+        bits |= u32::from(!ahead) << i;
+    }
+    Mask8::from_bits(bits)
+}

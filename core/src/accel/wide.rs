@@ -1,0 +1,101 @@
+//! The built-in [`Intersector`]: which rays go together.
+//!
+//! Rays are grouped by direction octant and major axis; groups of more than [`FEW`] walk the tree as a packet, which
+//! doubles the throughput of coherent rays; the others go one by one, which is best for incoherent ones.
+
+use super::packet::{Best, FEW, walk_packet};
+use super::setup::Setup;
+use super::single::{Hit1, Keys, Ray1, STACK, walk};
+use super::{Hit8, Intersector, Ray8};
+use crate::scene::Scene;
+use crate::scene::blob::{Leaf, NONE, Node};
+use croupier_simd::{F32x8, Mask8, U32x8};
+
+/// The scene's own tree of 8-wide nodes and 8-triangle leaves.
+///
+/// Watertight: no ray passes between triangles that share an edge or a vertex. A hit is the closest by computed t, among
+/// equal ones the triangle with the lowest index; which rays share a packet never changes a bit of the result. `tmin`
+/// below 0 counts as 0. Calls need about 10 KiB of stack.
+#[derive(Clone, Copy, Debug)]
+pub struct WideBvh<'s> {
+    nodes: &'s [Node],
+    leaves: &'s [Leaf],
+    /// Largest |coordinate|.
+    extent: f32,
+}
+
+impl<'s> WideBvh<'s> {
+    /// The tree of a validated scene.
+    pub fn new(scene: &Scene<'s>) -> Self {
+        Self::from_parts(scene.nodes, scene.leaves)
+    }
+
+    /// A tree outside a scene; the root is node 0, the rules of [`crate::scene::blob`] hold. Any other content gives
+    /// wrong hits but stays safe.
+    pub fn from_parts(nodes: &'s [Node], leaves: &'s [Leaf]) -> Self {
+        let mut extent = 0.0f32;
+        if let Some(root) = nodes.first() {
+            for x in root.bounds.as_flattened() {
+                let x = x.abs();
+                if x > extent && x < f32::INFINITY {
+                    extent = x;
+                }
+            }
+        }
+        Self { nodes, leaves, extent }
+    }
+
+    /// Traces the valid rays of `s`; returns the lanes with a hit if `ANY`.
+    #[inline(always)]
+    fn trace<const ANY: bool>(&self, s: &Setup, best: &mut Best) -> u32 {
+        let tree = (self.nodes, self.leaves);
+        let mut stack: Keys = [0; STACK];
+        let (mut left, mut alone, mut occluded) = (s.valid, 0, 0);
+        while left != 0 {
+            let group = s.alike(left.trailing_zeros() as usize & 7, left);
+            left &= !group;
+            if group.count_ones() <= FEW {
+                alone |= group;
+            } else {
+                occluded |= walk_packet::<ANY>(tree, s, group, best, &mut stack);
+            }
+        }
+        for i in Mask8::from_bits(alone).lanes() {
+            let mut h = Hit1::none(s.limit[i]);
+            let found = walk::<ANY>(tree, (0, s.tmin[i]), &Ray1::new(s, i), &mut h, &mut stack, 0);
+            if ANY {
+                occluded |= u32::from(found) << i;
+            } else if h.triangle != NONE {
+                best.set(i, &h);
+            }
+        }
+        occluded
+    }
+}
+
+impl Intersector for WideBvh<'_> {
+    fn closest(&self, rays: &Ray8, active: Mask8) -> Hit8 {
+        let s = Setup::new(rays, active, self.extent);
+        let mut best = Best::none(F32x8::new(s.limit));
+        if !self.nodes.is_empty() && s.valid != 0 {
+            self.trace::<false>(&s, &mut best);
+        }
+        let hit = !best.triangle.eq(U32x8::splat(NONE));
+        Hit8 {
+            hit,
+            t: hit.select(best.t, rays.tmax),
+            triangle: best.triangle,
+            u: hit.zero_unless(best.u),
+            v: hit.zero_unless(best.v),
+        }
+    }
+
+    fn occluded(&self, rays: &Ray8, active: Mask8) -> Mask8 {
+        let s = Setup::new(rays, active, self.extent);
+        if self.nodes.is_empty() || s.valid == 0 {
+            return Mask8::NONE;
+        }
+        let mut best = Best::none(F32x8::new(s.limit));
+        Mask8::from_bits(self.trace::<true>(&s, &mut best))
+    }
+}

@@ -1,0 +1,247 @@
+//! Binary tree to 8-wide tree at the lowest expected cost (surface area heuristic), by dynamic programming as for
+//! compressed wide trees (Ylitie, Karras, Laine, HPG 2017, section 4), with leaves of up to eight triangles.
+//!
+//! `cost[i][j]` is the least cost of the subtree i as at most j siblings: one wide node or leaf (j = 1), or its children
+//! with k and j - k of them.
+
+use super::Tree;
+use super::binary::{Binary, Bounds};
+use bytemuck::Zeroable;
+use croupier::scene::blob::{LEAF_BIT, Leaf, MAX_TREE_DEPTH, NONE, Node};
+
+/// Cost of a visited node per half area; measured, in units of a leaf's eight-triangle test.
+const NODE_COST: f32 = 1.0;
+/// Cost of a visited leaf per half area.
+const LEAF_COST: f32 = 1.0;
+/// Triangles in a leaf, children of a node.
+const WIDTH: usize = 8;
+
+/// What the dynamic programme decided for one binary node.
+#[derive(Clone, Copy)]
+struct Plan {
+    /// Least cost as at most j + 1 siblings.
+    cost: [f32; WIDTH - 1],
+    /// As at most j siblings: this many for the first child; 0: no better than j - 1 siblings. `split[8]`: the children
+    /// of a wide node.
+    split: [u8; WIDTH + 1],
+    /// As one sibling: a leaf, not a node.
+    leaf: bool,
+    triangles: u32,
+    /// Levels of wide nodes as one sibling; 0 for a leaf.
+    height: u8,
+}
+
+/// The wide tree of `tree`.
+pub(super) fn widen(tree: &[Binary], triangles: &[[[f32; 3]; 3]]) -> Tree {
+    if tree.is_empty() {
+        return Tree::default();
+    }
+    let plans = plan(tree);
+    let mut w = Writer { tree, plans: &plans, triangles, out: Tree::default() };
+    w.node(Source::Binary(0), 1);
+    w.out
+}
+
+fn plan(tree: &[Binary]) -> Vec<Plan> {
+    let zero = Plan { cost: [0.0; 7], split: [0; 9], leaf: true, triangles: 1, height: 0 };
+    let mut plans = vec![zero; tree.len()];
+    let root = tree[0].bounds.half_area().max(f64::MIN_POSITIVE);
+    for i in (0..tree.len()).rev() {
+        let n = &tree[i];
+        let area = (n.bounds.half_area() / root) as f32;
+        if n.leaf {
+            plans[i].cost = [area * LEAF_COST; 7];
+            continue;
+        }
+        let (l, r) = (plans[n.index as usize], plans[n.index as usize + 1]);
+        let best = |j: usize| {
+            let mut best = (f32::INFINITY, 1u8);
+            for k in j.saturating_sub(7).max(1)..j.min(8) {
+                let c = l.cost[k - 1] + r.cost[j - k - 1];
+                if c < best.0 {
+                    best = (c, k as u8);
+                }
+            }
+            best
+        };
+        let p = &mut plans[i];
+        p.triangles = l.triangles + r.triangles;
+        let (inner, split) = best(WIDTH);
+        let as_node = area * NODE_COST + inner;
+        let as_leaf = if p.triangles as usize <= WIDTH { area * LEAF_COST } else { f32::INFINITY };
+        p.split[WIDTH] = split;
+        p.leaf = as_leaf <= as_node;
+        p.cost[0] = as_leaf.min(as_node);
+        for j in 2..WIDTH {
+            let (c, k) = best(j);
+            (p.cost[j - 1], p.split[j]) = if c < p.cost[j - 2] { (c, k) } else { (p.cost[j - 2], 0) };
+        }
+    }
+    // levels of wide nodes in the subtree if it becomes one sibling
+    for i in (0..tree.len()).rev() {
+        if !plans[i].leaf {
+            let mut children = Vec::with_capacity(WIDTH);
+            wide_children(tree, &plans, i, &mut children);
+            let below = children.iter().map(|&c| plans[c].height).max().unwrap_or(0);
+            plans[i].height = below.saturating_add(1);
+        }
+    }
+    plans
+}
+
+/// The siblings that make up the wide node of binary node `i`.
+fn wide_children(tree: &[Binary], plans: &[Plan], i: usize, out: &mut Vec<usize>) {
+    let mut todo = vec![(i, WIDTH)];
+    while let Some((i, mut j)) = todo.pop() {
+        let p = &plans[i];
+        while j > 1 && (tree[i].leaf || p.split[j] == 0) {
+            j -= 1;
+        }
+        if j == 1 {
+            out.push(i);
+            continue;
+        }
+        let (k, first) = (p.split[j] as usize, tree[i].index as usize);
+        todo.push((first + 1, j - k));
+        todo.push((first, k));
+    }
+}
+
+/// What becomes of a subtree.
+enum Source {
+    /// As planned.
+    Binary(usize),
+    /// Balanced over these triangles: the plan was too deep.
+    Median(Vec<u32>),
+}
+
+struct Writer<'a> {
+    tree: &'a [Binary],
+    plans: &'a [Plan],
+    triangles: &'a [[[f32; 3]; 3]],
+    out: Tree,
+}
+
+impl Writer<'_> {
+    /// Writes a wide node at `level` (the root's is 1) and everything below; returns its index.
+    fn node(&mut self, source: Source, level: u32) -> u32 {
+        self.out.depth = self.out.depth.max(level);
+        let me = self.out.nodes.len();
+        let mut node = Node::zeroed();
+        for k in 0..3 {
+            (node.bounds[k], node.bounds[k + 3]) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
+        }
+        node.child = [NONE; 8];
+        self.out.nodes.push(node);
+        for (slot, source) in self.children(source, level).into_iter().enumerate() {
+            let (bounds, leaf) = match &source {
+                Source::Binary(i) => (self.tree[*i].bounds, self.plans[*i].leaf),
+                Source::Median(ids) => (self.bounds(ids), ids.len() <= WIDTH),
+            };
+            let child = if leaf { self.leaf(source) } else { self.node(source, level + 1) };
+            let node = &mut self.out.nodes[me];
+            node.child[slot] = child;
+            for k in 0..3 {
+                node.bounds[k][slot] = bounds.min[k];
+                node.bounds[k + 3][slot] = bounds.max[k];
+            }
+        }
+        me as u32
+    }
+
+    /// At most eight children of a node at `level`.
+    fn children(&self, source: Source, level: u32) -> Vec<Source> {
+        let ids = match source {
+            Source::Binary(i) if self.plans[i].leaf => return vec![Source::Binary(i)],
+            Source::Binary(i) if self.fits(i, level) => {
+                let mut children = Vec::with_capacity(WIDTH);
+                wide_children(self.tree, self.plans, i, &mut children);
+                return children.into_iter().map(Source::Binary).collect();
+            }
+            Source::Binary(i) => self.gather(i),
+            Source::Median(ids) => ids,
+        };
+        self.median(ids)
+    }
+
+    /// May binary node `i` become a wide node at `level` as planned: is its subtree shallow enough, or is there room to
+    /// rebuild its children by median splits?
+    fn fits(&self, i: usize, level: u32) -> bool {
+        let p = &self.plans[i];
+        let as_planned = level + u32::from(p.height) - 1 <= MAX_TREE_DEPTH;
+        as_planned || level + median_levels(p.triangles as usize) <= MAX_TREE_DEPTH
+    }
+
+    fn gather(&self, i: usize) -> Vec<u32> {
+        let (mut ids, mut todo) = (Vec::new(), vec![i]);
+        while let Some(i) = todo.pop() {
+            let n = &self.tree[i];
+            if n.leaf {
+                ids.push(n.index);
+            } else {
+                todo.push(n.index as usize + 1);
+                todo.push(n.index as usize);
+            }
+        }
+        ids
+    }
+
+    fn bounds(&self, ids: &[u32]) -> Bounds {
+        ids.iter().fold(Bounds::EMPTY, |b, &id| b.with(&Bounds::of(&self.triangles[id as usize])))
+    }
+
+    /// Up to eight parts of equal size, by three median splits of box centres along the longest axis.
+    fn median(&self, ids: Vec<u32>) -> Vec<Source> {
+        let mut parts = vec![ids];
+        while parts.len() < WIDTH && parts.iter().any(|p| p.len() > WIDTH) {
+            let mut next = Vec::with_capacity(parts.len() * 2);
+            for mut p in parts {
+                if p.len() <= WIDTH {
+                    next.push(p);
+                    continue;
+                }
+                let b = self.bounds(&p);
+                let extent = |k: usize| f64::from(b.max[k]) - f64::from(b.min[k]);
+                let axis = (1..3).fold(0, |a, k| if extent(k) > extent(a) { k } else { a });
+                let centre = |id: &u32| {
+                    let b = Bounds::of(&self.triangles[*id as usize]);
+                    f64::from(b.min[axis]) + f64::from(b.max[axis])
+                };
+                let half = p.len() / 2;
+                p.select_nth_unstable_by(half, |x, y| centre(x).total_cmp(&centre(y)).then(x.cmp(y)));
+                let second = p.split_off(half);
+                next.extend([p, second]);
+            }
+            parts = next;
+        }
+        parts.into_iter().map(Source::Median).collect()
+    }
+
+    fn leaf(&mut self, source: Source) -> u32 {
+        let mut ids = match source {
+            Source::Binary(i) => self.gather(i),
+            Source::Median(ids) => ids,
+        };
+        ids.sort_unstable();
+        let mut leaf = Leaf { p: [[0.0; 8]; 9], triangle: [NONE; 8] };
+        for (slot, &id) in ids.iter().enumerate().take(WIDTH) {
+            leaf.triangle[slot] = id;
+            for (row, x) in self.triangles[id as usize].as_flattened().iter().enumerate() {
+                leaf.p[row][slot] = *x;
+            }
+        }
+        let index = self.out.leaves.len() as u32;
+        self.out.leaves.push(leaf);
+        LEAF_BIT | (ids.len().min(WIDTH) as u32) << 27 | index
+    }
+}
+
+/// Levels of nodes of a median-split subtree over `n` triangles: each divides by eight until leaves hold eight.
+fn median_levels(n: usize) -> u32 {
+    let (mut n, mut levels) = (n, 1);
+    while n > WIDTH * WIDTH {
+        n = n.div_ceil(WIDTH) + 1;
+        levels += 1;
+    }
+    levels
+}
