@@ -1,1 +1,6 @@
 //! Scalar f64 oracles and statistics shared by the integration tests.
+
+pub mod light_oracle;
+pub mod light_scene;
+pub mod light_stats;
+pub mod texture_oracle;
