@@ -159,10 +159,10 @@ impl Map {
         let n = 2000;
         let step = PI / (self.height - 1) as f64;
         (0..n)
-            .map(|k| (k as f64 + 0.5) / f64::from(n as i32))
+            .map(|k| (f64::from(k) + 0.5) / f64::from(n))
             .map(|y| self.blend(column, row, 0.5, y, luminance) * ((row as f64 + y) * step).sin())
             .sum::<f64>()
-            / f64::from(n as i32)
+            / f64::from(n)
             * step
             * TAU
             / self.width as f64

@@ -159,7 +159,7 @@ fn density_is_normalised_and_agrees_with_the_oracle() {
         let [w, h] = case.map.cells();
         let probability = case.map.probabilities();
         let mut integral = 0.0;
-        for k in 0..w * h {
+        for (k, probability) in probability.iter().copied().enumerate() {
             let (i, j) = (k % w, k / w);
             let [above, below] = case.map.cosines(j);
             let solid_angle = (above - below) * TAU / w as f64;
@@ -172,7 +172,7 @@ fn density_is_normalised_and_agrees_with_the_oracle() {
             for (l, (x, t)) in points.into_iter().enumerate() {
                 let got = f64::from(pdf.lane(l)) / 0.75;
                 integral += got * solid_angle / 4.0;
-                let want = probability[k] * if probability[k] > 0.0 { case.map.inside(i, j, x, t) } else { 0.0 };
+                let want = probability * if probability > 0.0 { case.map.inside(i, j, x, t) } else { 0.0 };
                 let want = want / solid_angle;
                 assert!((got - want).abs() <= 1e-4 * want + 1e-7, "{} cell {i}, {j}: {got} for {want}", case.name);
             }
