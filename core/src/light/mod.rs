@@ -178,7 +178,7 @@ pub fn sample_of<S: LightSelector>(
             out.merge(mask, &directional::sample(&chosen));
         }
     }
-    out.pdf = out.pdf * probability;
+    out.pdf *= probability;
     out.valid &= usable(out.pdf) & out.wi.is_finite() & out.radiance.is_finite() & out.radiance.any_positive();
     out.pdf = out.valid.zero_unless(out.pdf);
     out.radiance = out.radiance.zero_unless(out.valid);

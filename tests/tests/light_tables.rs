@@ -1,0 +1,167 @@
+//! Alias tables and light powers: what sampling does is what the tables state.
+
+use bytemuck::Zeroable;
+use croupier::light::{LightSelector, PowerSelector};
+use croupier::scene::blob::*;
+use croupier::simd::{Mask8, U32x8, Vec3x8};
+use croupier_host::{alias, environment};
+use croupier_tests::light_oracle::{Map, luminance, wide};
+use croupier_tests::light_scene::{IDENTITY, LightScene};
+use croupier_tests::light_stats::Rng;
+
+const RANGE: u64 = 1 << 32;
+
+/// n weights over many magnitudes, a third of them 0.
+fn weights(n: usize, rng: &mut Rng) -> Vec<f64> {
+    (0..n).map(|i| if i % 3 == 1 { 0.0 } else { rng.unit().powi(4) * 3.7 }).collect()
+}
+
+fn owner(weights: &[f64]) -> LightScene {
+    let mut s = LightScene::default();
+    for _ in weights {
+        s = s.delta(LightKind::Point, [0.0; 3], [1.0; 3]);
+    }
+    s.select_by(weights)
+}
+
+/// Random numbers per item, counted: in each slot of the table they change item at most once, found by bisection.
+fn count(owner: &LightScene, n: usize) -> Vec<u64> {
+    let selector = PowerSelector(owner.scene());
+    let pick = |r: u64| selector.select(Vec3x8::ZERO, Vec3x8::ZERO, U32x8::splat(r as u32)).0.lane(0) as usize;
+    let mut counts = vec![0; n];
+    let mut start = 0u64;
+    for slot in 0..n as u64 {
+        // The last number r with floor(r n / 2^32) = slot, one more.
+        let end = ((slot + 1) * RANGE).div_ceil(n as u64);
+        let (first, last) = (pick(start), pick(end - 1));
+        let (mut low, mut high) = (start, end - 1);
+        while high - low > 1 {
+            let middle = (low + high) / 2;
+            if pick(middle) == first { low = middle } else { high = middle }
+        }
+        let change = if first == last { end } else { high };
+        counts[first] += change - start;
+        counts[last] += end - change;
+        start = end;
+    }
+    counts
+}
+
+/// Killed by: threshold off by one, `<=` in the pick, probabilities from the weights, slots of equal capacity.
+#[test]
+fn every_random_number_is_accounted_for() {
+    let mut rng = Rng(10);
+    let tables: Vec<Vec<f64>> = [1, 2, 3, 5, 7, 64, 1000, 1024]
+        .into_iter()
+        .flat_map(|n| [weights(n, &mut rng), (0..n).map(|i| 1e-12 + (i % 2) as f64).collect(), vec![0.3; n]])
+        .chain([vec![1e308, 1e308, 1e-308], vec![f64::NAN, 1.0, f64::INFINITY, -5.0], vec![0.0, 0.0, 1e-300]])
+        .collect();
+    for w in tables {
+        let widths = alias::widths(&w).unwrap();
+        assert_eq!(widths.iter().sum::<u64>(), RANGE);
+        let s = owner(&w);
+        assert_eq!(count(&s, w.len()), widths, "{w:?}");
+        for (i, width) in widths.iter().enumerate() {
+            assert_eq!(*width > 0, w[i] > 0.0 && w[i].is_finite());
+            assert_eq!(s.light_alias[i].probability, (*width as f64 / RANGE as f64) as f32);
+        }
+    }
+}
+
+/// Widths follow the weights within one unit each, plus the unit that every positive weight is given. Killed by: dealing
+/// out the rest to one item, f32 sums.
+#[test]
+fn widths_follow_the_weights() {
+    let mut rng = Rng(11);
+    for n in [1usize, 2, 3, 1024, 1 << 20] {
+        let w = weights(n, &mut rng);
+        let total: f64 = w.iter().sum();
+        let positive = w.iter().filter(|w| **w > 0.0).count() as f64;
+        let widths = alias::widths(&w).unwrap();
+        assert_eq!(widths.iter().sum::<u64>(), RANGE);
+        for (w, width) in w.iter().zip(&widths) {
+            let share = w / total * RANGE as f64;
+            let bound = 2.0 + share * positive / RANGE as f64 + share * 1e-12;
+            assert!((*width as f64 - share).abs() <= bound, "{width} for {share}");
+            assert_eq!(*width > 0, *w > 0.0);
+        }
+        let table = alias::build(&w);
+        let sum: f64 = table.iter().map(|a| f64::from(a.probability)).sum();
+        assert!((sum - 1.0).abs() < 1e-7);
+        assert!(table.iter().enumerate().all(|(i, a)| a.threshold < u32::MAX || a.alias as usize == i));
+    }
+}
+
+/// Killed by: returning a uniform table.
+#[test]
+fn nothing_to_choose_gives_an_empty_table_and_no_light() {
+    assert!(alias::build(&[]).is_empty());
+    assert!(alias::build(&[0.0, -1.0, f64::NAN, f64::INFINITY]).is_empty());
+    let s = owner(&[0.0, 0.0]);
+    let selector = PowerSelector(s.scene());
+    let (light, p) = selector.select(Vec3x8::ZERO, Vec3x8::ZERO, U32x8::splat(77));
+    assert_eq!(p.to_array(), [0.0; 8]);
+    assert_eq!(selector.probability(Vec3x8::ZERO, Vec3x8::ZERO, light, Mask8::all_lanes()).to_array(), [0.0; 8]);
+}
+
+/// Random maps; the cells' probabilities against numerical integration. Killed by: omitting the sine, exchanging the
+/// rows of a cell, no wrap in the last column, not counting a row's weight in the first table.
+#[test]
+fn map_tables_follow_the_integral_of_the_luminance() {
+    let mut rng = Rng(12);
+    for [w, h] in [[1usize, 2usize], [2, 2], [4, 3], [7, 6], [16, 9]] {
+        let texels: Vec<[f32; 3]> = (0..w * h)
+            .map(|_| std::array::from_fn(|_| if rng.word() % 3 == 0 { 0.0 } else { rng.unit().powi(3) as f32 * 90.0 }))
+            .collect();
+        let map = Map::new(&texels, w, h);
+        let tables = environment::map_tables(&texels, w as u32, h as u32);
+        assert_eq!(tables.len(), (h - 1) * (w + 1));
+        for (k, want) in map.probabilities().into_iter().enumerate() {
+            let (i, j) = (k % w, k / w);
+            let got = f64::from(tables[j].probability) * f64::from(tables[h - 1 + j * w + i].probability);
+            assert!((got - want).abs() <= 1e-6 * want + 1e-9, "cell {i}, {j} of {w} x {h}: {got} for {want}");
+        }
+    }
+    assert!(environment::map_tables(&[[0.0; 3]; 12], 4, 3).is_empty());
+}
+
+/// Each power against its closed form, the map's against a dense grid of directions. Killed by: pi -> 1 in any of
+/// them, the scale left out, the environment's integral taken over a hemisphere.
+#[test]
+fn lights_weigh_their_power() {
+    use std::f64::consts::PI;
+    let mut rng = Rng(13);
+    let (w, h) = (6usize, 5usize);
+    let texels: Vec<[f32; 3]> = (0..w * h).map(|_| std::array::from_fn(|_| rng.unit() as f32)).collect();
+    let map = Map::new(&texels, w, h);
+    let n = 600;
+    let mut integral = 0.0;
+    for i in 0..n {
+        for j in 0..n {
+            let y = 1.0 - 2.0 * (f64::from(j) + 0.5) / f64::from(n);
+            let (r, phi) = ((1.0 - y * y).sqrt(), 2.0 * PI * (f64::from(i) + 0.5) / f64::from(n));
+            integral += luminance(map.lookup([r * phi.cos(), y, r * phi.sin()]));
+        }
+    }
+    integral *= 4.0 * PI / f64::from(n) / f64::from(n);
+    let e = Environment {
+        kind: EnvironmentKind::Map as u32,
+        light: 3,
+        width: w as u32,
+        height: h as u32,
+        to_local: IDENTITY,
+        radiance: [2.5; 3],
+    };
+    let c = [3.0f32, 1.0, 0.25];
+    let y = luminance(wide(c));
+    let kinds = [LightKind::Area, LightKind::Point, LightKind::Directional, LightKind::Environment];
+    let lights = kinds.map(|k| Light { kind: k as u32, area: 0.75, emission: c, ..Light::zeroed() });
+    let radius = 3.0;
+    let got = environment::light_weights(&lights, Some(&e), &texels, radius);
+    let disk = PI * radius * radius;
+    for (got, want) in got.iter().zip([PI * 0.75 * y, 4.0 * PI * y, disk * y, disk * 2.5 * integral]) {
+        assert!((got / want - 1.0).abs() < 1e-5, "{got} for {want}");
+    }
+    let constant = Environment { kind: EnvironmentKind::Constant as u32, radiance: c, ..e };
+    assert!((environment::power(&constant, &[], radius) / (disk * 4.0 * PI * y) - 1.0).abs() < 1e-12);
+}
