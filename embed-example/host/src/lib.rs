@@ -1,1 +1,6 @@
 //! Files, trees and threads around the croupier core.
+
+pub mod compare;
+pub mod flip;
+pub mod image;
+pub mod tonemap;
