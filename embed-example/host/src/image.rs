@@ -114,12 +114,7 @@ impl Rgb {
 
     /// The RGB picture of an EXR file: the unnamed layer, or the first other one with channels R, G, B.
     pub fn read_exr(path: &Path) -> Result<Self, ImageError> {
-        let picture = Picture::read_exr(path)?;
-        let pixels = picture
-            .rgb("")
-            .or_else(|| picture.layers.iter().find_map(Layer::rgb))
-            .ok_or_else(|| ImageError::NoRgb(path.into()))?;
-        Ok(Self { width: picture.width, height: picture.height, pixels })
+        Picture::read_exr(path)?.main().ok_or_else(|| ImageError::NoRgb(path.into()))
     }
 }
 
@@ -160,9 +155,15 @@ impl Picture {
         self.layers.iter().find(|l| l.name == name)
     }
 
-    /// The RGB pixels of the layer of this name.
-    pub fn rgb(&self, layer: &str) -> Option<Vec<[f32; 3]>> {
-        self.layer(layer)?.rgb()
+    /// The RGB pixels of the layer of this name, of full size.
+    pub fn rgb(&self, layer: &str) -> Option<Rgb> {
+        Rgb::new(self.width, self.height, self.layer(layer)?.rgb()?)
+    }
+
+    /// The picture itself: the unnamed layer, or the first other one with channels R, G, B.
+    pub fn main(&self) -> Option<Rgb> {
+        let first = || Rgb::new(self.width, self.height, self.layers.iter().find_map(Layer::rgb)?);
+        self.rgb("").or_else(first)
     }
 
     /// Reads every layer of an EXR file (one part or many, scan lines or tiles, 16- or 32-bit; the largest

@@ -3,4 +3,5 @@
 pub mod compare;
 pub mod flip;
 pub mod image;
+pub mod render;
 pub mod tonemap;
