@@ -3,3 +3,8 @@
 pub mod alias;
 pub mod environment;
 pub mod bvh;
+pub mod compare;
+pub mod flip;
+pub mod image;
+pub mod render;
+pub mod tonemap;

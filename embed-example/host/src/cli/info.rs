@@ -1,0 +1,86 @@
+//! `croupier info`
+
+use super::{Outcome, say, say_json, scene};
+use croupier::scene::Effects;
+use croupier::{Scene, SceneError};
+use croupier_host::render::{PlanSummary, RenderOptions, plan};
+use serde::Serialize;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folder with scene.json, .obj file, or baked .crp file; the built-in Cornell box if absent
+    scene: Option<PathBuf>,
+    /// Print the facts as one line of JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Facts {
+    bytes: usize,
+    hash: String,
+    triangles: usize,
+    dropped_triangles: u32,
+    vertices: usize,
+    nodes: usize,
+    leaves: usize,
+    materials: usize,
+    textures: usize,
+    texels: usize,
+    lights: usize,
+    bounds: [[f32; 3]; 2],
+    size: [u32; 2],
+    max_depth: u32,
+    effects: Vec<&'static str>,
+    /// Absent in builds that cannot render.
+    plan: Option<PlanSummary>,
+}
+
+impl Facts {
+    fn of(bytes: &[u8]) -> Result<Self, SceneError> {
+        let scene = Scene::from_bytes(bytes)?;
+        let called_for = Effects::NAMES.iter().filter(|(effect, _)| scene.effects.contains(*effect));
+        Ok(Self {
+            bytes: bytes.len(),
+            hash: format!("{:016x}", scene.hash),
+            triangles: scene.triangles.len(),
+            dropped_triangles: scene.info.dropped_triangles,
+            vertices: scene.vertices.len(),
+            nodes: scene.nodes.len(),
+            leaves: scene.leaves.len(),
+            materials: scene.materials.len(),
+            textures: scene.textures.len(),
+            texels: scene.texels.len(),
+            lights: scene.lights.len(),
+            bounds: [scene.info.bounds_min, scene.info.bounds_max],
+            size: scene.camera.size,
+            max_depth: scene.info.max_depth,
+            effects: called_for.map(|(_, name)| *name).collect(),
+            plan: plan(bytes, &RenderOptions::default()).ok(),
+        })
+    }
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Outcome {
+    let path = args.scene.as_deref();
+    let bytes = scene::open(path)?;
+    let f = Facts::of(&bytes).map_err(|e| scene::about(path)(&e))?;
+    if args.json {
+        return say_json(&f);
+    }
+    let Facts { triangles, dropped_triangles, vertices, nodes, leaves, materials, textures, texels, lights, .. } = f;
+    let line = |name: &str, text: String| say(&format!("{name:12}{text}"));
+    line("bytes", format!("{} (hash {})", f.bytes, f.hash))?;
+    line("triangles", format!("{triangles} ({dropped_triangles} degenerate ones dropped), {vertices} vertices"))?;
+    line("tree", format!("{nodes} nodes, {leaves} leaves"))?;
+    line("materials", format!("{materials}, {textures} textures of {texels} texels in all"))?;
+    line("lights", lights.to_string())?;
+    line("bounds", format!("{:?} to {:?}", f.bounds[0], f.bounds[1]))?;
+    line("picture", format!("{}x{} pixels, paths of up to {} segments", f.size[0], f.size[1], f.max_depth))?;
+    line("effects", f.effects.join(", "))?;
+    let Some(p) = f.plan else { return Ok(()) };
+    line("profile", p.profile)?;
+    line("memory", format!("{} bytes shared + {} shards of {} bytes", p.shared_bytes, p.shards, p.shard_bytes))
+}

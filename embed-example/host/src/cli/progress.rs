@@ -1,0 +1,119 @@
+//! Progress bars on stderr; nothing is shown where stderr is no terminal.
+
+use croupier_host::render::{Observer, Progress, Target};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Steps of a bar.
+const STEPS: u64 = 1000;
+
+fn bar(template: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::new(STEPS).with_style(style.progress_chars("=> "));
+    bar.enable_steady_tick(Duration::from_millis(250));
+    bar
+}
+
+/// Shows how far baking is. Disappears when dropped.
+pub struct Baking(ProgressBar);
+
+impl Baking {
+    pub fn start() -> Self {
+        Self(bar("baking [{bar:30}] {percent:>3} %  {msg}"))
+    }
+
+    /// `part` of `stage` is done, 0 to 1.
+    pub fn show(&self, stage: &str, part: f32) {
+        self.0.set_message(stage.to_lowercase());
+        self.0.set_position((f64::from(part).clamp(0.0, 1.0) * STEPS as f64) as u64);
+    }
+}
+
+impl Drop for Baking {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+/// Shows the error so far and the time left, and ends the render on Ctrl-C.
+pub struct Rendering {
+    bar: ProgressBar,
+    target: Target,
+}
+
+/// Set by Ctrl-C. A second one ends the program at once.
+static STOP: AtomicBool = AtomicBool::new(false);
+
+impl Rendering {
+    pub fn start(target: Target) -> Self {
+        // Fails only if a handler is there already; then that one decides.
+        let _ = ctrlc::set_handler(|| {
+            if STOP.swap(true, Ordering::Relaxed) {
+                std::process::exit(130);
+            }
+        });
+        Self { bar: bar("rendering [{bar:30}] {percent:>3} %  {msg}"), target }
+    }
+}
+
+impl Observer for Rendering {
+    fn progress(&self, p: &Progress) {
+        let left = self.target.seconds_left(p);
+        self.bar.set_message(message(p, left));
+        if let Some(left) = left.filter(|left| p.seconds + left > 0.0) {
+            self.bar.set_position((p.seconds / (p.seconds + left) * STEPS as f64) as u64);
+        }
+    }
+
+    fn stop(&self) -> bool {
+        STOP.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Rendering {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+fn message(p: &Progress, left: Option<f64>) -> String {
+    let error = p.relmse_estimate.map_or_else(|| "?".into(), |e| format!("{e:.2e}"));
+    let left = left.map_or_else(|| "?".into(), duration);
+    let speed = p.rays as f64 / p.seconds.max(1e-3) * 1e-6;
+    format!("{:.0} spp, relMSE {error}, {speed:.1} Mrays/s, {left} left", p.spp)
+}
+
+/// `42 s`, `3:05 min`, `2:07 h`.
+fn duration(seconds: f64) -> String {
+    let s = seconds.ceil() as u64;
+    match s {
+        0..60 => format!("{s} s"),
+        60..3600 => format!("{}:{:02} min", s / 60, s % 60),
+        _ => format!("{}:{:02} h", s / 3600, s % 3600 / 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Dies if the error is taken to fall as 1 / sqrt(work), or a stop watch shows NaN at the start.
+    #[test]
+    fn time_left() {
+        let p = Progress { spp: 16.0, rays: 1_000_000, seconds: 10.0, relmse_estimate: Some(0.04) };
+        assert_eq!(Target::Spp(64).seconds_left(&p), Some(30.0));
+        assert_eq!(Target::Seconds(12.5).seconds_left(&p), Some(2.5));
+        assert_eq!(Target::Rays(4_000_000).seconds_left(&p), Some(30.0));
+        let left = Target::Error(0.01).seconds_left(&p).unwrap();
+        assert!((left - 30.0).abs() < 1e-9, "{left}");
+        assert_eq!(Target::Error(0.1).seconds_left(&p), Some(0.0));
+        assert_eq!(message(&p, Some(185.0)), "16 spp, relMSE 4.00e-2, 0.1 Mrays/s, 3:05 min left");
+        let nothing = Progress::default();
+        for target in [Target::Spp(4), Target::Rays(4), Target::Error(0.1)] {
+            assert_eq!(target.seconds_left(&nothing), None);
+        }
+        assert_eq!(message(&nothing, None), "0 spp, relMSE ?, 0.0 Mrays/s, ? left");
+        assert_eq!([duration(0.2), duration(59.0), duration(7620.0)], ["1 s", "59 s", "2:07 h"]);
+    }
+}

@@ -1,0 +1,193 @@
+//! `croupier render`
+
+use super::progress::Rendering;
+use super::{Outcome, say, say_json, scene};
+use croupier_host::image::write_png;
+use croupier_host::render::{RenderOptions, RenderResult, RenderStats, Target, check_strategy, render};
+use croupier_host::tonemap::{Curve, tonemap};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Path segments at which every path ends, whatever the settings.
+const HARD_STOP: i64 = 200;
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folder with scene.json, .obj file, or baked .crp file; the built-in Cornell box if absent
+    pub scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub flags: Flags,
+}
+
+/// How to render and where to put it.
+#[derive(clap::Args)]
+pub struct Flags {
+    /// Where the picture goes; a tone-mapped PNG goes beside it
+    #[arg(short, long, value_name = "FILE", default_value = "croupier.exr", value_parser = exr_path)]
+    output: PathBuf,
+    /// Roulette strategy: none, threshold, contribution, throughput, albedo, classic or fixed:S
+    #[arg(long, value_name = "NAME", default_value_t = RenderOptions::default().strategy, value_parser = strategy)]
+    rrs: String,
+    #[command(flatten)]
+    until: Until,
+    /// Path segments from the camera: 1 shows emitters only; the scene's own number if absent
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=HARD_STOP))]
+    max_depth: Option<u32>,
+    /// Size in pixels; the scene's own if absent
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    size: Option<[u32; 2]>,
+    /// Another number gives another, independent image
+    #[arg(long, value_name = "N", default_value_t = RenderOptions::default().seed)]
+    seed: u64,
+    /// Threads, 0 for one per processor; the image does not depend on them
+    #[arg(long, value_name = "N", default_value_t = RenderOptions::default().threads)]
+    threads: usize,
+    /// Units of parallel work; the image depends on their number
+    #[arg(long, value_name = "N", default_value_t = RenderOptions::default().shards, value_parser = clap::value_parser!(u32).range(1..=65536))]
+    shards: u32,
+    /// Stops of exposure for the PNG
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = stops, allow_negative_numbers = true)]
+    exposure: f32,
+    /// Print the figures as one line of JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// When to stop; 64 samples per pixel if nothing is given.
+#[derive(clap::Args)]
+#[group(multiple = false)]
+struct Until {
+    /// Stop after this many samples per pixel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    spp: Option<u32>,
+    /// Stop after this time
+    #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
+    seconds: Option<f64>,
+    /// Stop after this many rays
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    rays: Option<u64>,
+    /// Stop when the estimated relMSE is below this
+    #[arg(long, value_name = "E", value_parser = positive, allow_negative_numbers = true)]
+    until_error: Option<f64>,
+}
+
+impl Until {
+    fn target(&self) -> Target {
+        let given = self.spp.map(Target::Spp).or(self.seconds.map(Target::Seconds));
+        let given = given.or(self.rays.map(Target::Rays)).or(self.until_error.map(Target::Error));
+        given.unwrap_or(RenderOptions::default().target)
+    }
+}
+
+impl Flags {
+    /// The same for the library.
+    fn options(&self) -> RenderOptions {
+        RenderOptions {
+            strategy: self.rrs.clone(),
+            target: self.until.target(),
+            max_depth: self.max_depth,
+            size: self.size,
+            seed: self.seed,
+            threads: self.threads,
+            shards: self.shards,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    #[serde(flatten)]
+    stats: &'a RenderStats,
+    width: usize,
+    height: usize,
+    strategy: &'a str,
+    seed: u64,
+    stopped_early: bool,
+    output: &'a Path,
+    png: &'a Path,
+}
+
+/// Runs the command.
+pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
+    let png = flags.output.with_extension("png");
+    // Said now, not after an hour of rendering.
+    let folder = flags.output.parent().filter(|p| !p.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|f| !f.is_dir()) {
+        return Err(format!("cannot write {}: {} is not a folder", flags.output.display(), folder.display()).into());
+    }
+    let options = flags.options();
+    let bytes = scene::open(path)?;
+    let watch = Rendering::start(options.target);
+    let result = render(&bytes, &options, &watch).map_err(|e| scene::about(path)(&e))?;
+    drop(watch);
+    let RenderResult { picture, stats, stopped_early } = &result;
+    picture.write_exr(&flags.output)?;
+    let (width, height) = (picture.width, picture.height);
+    let image = picture.rgb("").ok_or_else(|| format!("{}: the picture has no colours", flags.output.display()))?;
+    write_png(&png, width, height, &tonemap(&image, flags.exposure, Curve::Shoulder))?;
+    if flags.json {
+        return say_json(&Report {
+            stats,
+            width,
+            height,
+            strategy: &options.strategy,
+            seed: options.seed,
+            stopped_early: *stopped_early,
+            output: &flags.output,
+            png: &png,
+        });
+    }
+    let early = if *stopped_early { "stopped early: " } else { "" };
+    let RenderStats { spp, rays, seconds, mrays_per_s, .. } = *stats;
+    say(&format!(
+        "{early}{width}x{height} pixels, {spp:.1} samples per pixel, {:.1} million rays in {seconds:.1} s, {mrays_per_s:.2} Mrays/s",
+        rays as f64 * 1e-6
+    ))?;
+    if let Some(e) = stats.relmse_estimate {
+        let interval = stats.relmse_interval.map_or(String::new(), |[a, b]| format!(" ({a:.3e} to {b:.3e})"));
+        say(&format!("estimated relMSE {e:.3e}{interval}"))?;
+    }
+    for (name, count) in stats.counters.iter().filter(|(_, count)| **count > 0) {
+        say(&format!("{name}: {count}"))?;
+    }
+    say(&format!("wrote {} and {}", flags.output.display(), png.display()))
+}
+
+fn exr_path(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
+        Ok(path)
+    } else {
+        Err("the name must end in .exr".into())
+    }
+}
+
+fn strategy(name: &str) -> Result<String, croupier_host::render::UnknownStrategy> {
+    check_strategy(name).map(|()| name.into())
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let parts = text.split_once(['x', 'X']).ok_or("write it as 640x480")?;
+    let side = |s: &str| s.parse::<u32>().map_err(|e| format!("{s:?}: {e}"));
+    match [side(parts.0)?, side(parts.1)?] {
+        [0, _] | [_, 0] => Err("a picture needs at least 1x1 pixels".into()),
+        [w, h] if u64::from(w) * u64::from(h) > 1 << 30 => Err("more than 2^30 pixels".into()),
+        size => Ok(size),
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
+        Ok(_) => Err("must be above 0 and finite".into()),
+        Err(e) => Err(e.to_string()),
+    }
+}
+
+fn stops(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(x) if x.abs() <= 100.0 => Ok(x),
+        Ok(_) => Err("must be between -100 and 100".into()),
+        Err(e) => Err(e.to_string()),
+    }
+}

@@ -1,0 +1,71 @@
+//! From a path to scene bytes.
+
+use super::progress;
+use super::standin::{bake, builtin, load};
+use memmap2::Mmap;
+use std::error::Error;
+use std::fs::File;
+use std::ops::Deref;
+use std::path::Path;
+
+/// A scene blob, in memory or on disk.
+pub enum SceneBytes {
+    /// A baked file, mapped: pages are read when they are touched.
+    Mapped(Mmap),
+    /// Baked just now.
+    Baked(bake::Baked),
+}
+
+impl Deref for SceneBytes {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match self {
+            Self::Mapped(map) => map,
+            Self::Baked(baked) => &baked.bytes,
+        }
+    }
+}
+
+/// Opens a scene: a baked `.crp` file, anything that loads and bakes (a folder with `scene.json`, an `.obj`), or, without
+/// a path, the built-in one.
+pub fn open(path: Option<&Path>) -> Result<SceneBytes, Box<dyn Error>> {
+    match path {
+        Some(path) if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")) => map(path),
+        Some(path) => {
+            let (description, _) = load::load(path)?;
+            Ok(SceneBytes::Baked(bake(&description)?))
+        }
+        None => Ok(SceneBytes::Baked(bake(&builtin::cornell_box())?)),
+    }
+}
+
+fn bake(description: &super::standin::SceneDescription) -> Result<bake::Baked, Box<dyn Error>> {
+    let bar = progress::Baking::start();
+    Ok(bake::bake(description, &bake::BakeOptions::default(), |stage, part| bar.show(&format!("{stage:?}"), part))?)
+}
+
+fn map(path: &Path) -> Result<SceneBytes, Box<dyn Error>> {
+    let failed = |e| format!("cannot read {}: {e}", path.display());
+    let file = File::open(path).map_err(failed)?;
+    let data = file.metadata().map_err(failed)?;
+    if !data.is_file() {
+        return Err(format!("cannot read {}: it is not a file", path.display()).into());
+    }
+    if data.len() == 0 {
+        return Err(format!("{}: the file is empty", path.display()).into());
+    }
+    // SAFETY: the bytes must not change while they are mapped. This program never writes into an existing file
+    // (`image::write_whole` renames a new one over it, which leaves the mapped one as it is); that no other program does
+    // is asked of the user in the help text of `bake`.
+    let map = unsafe { Mmap::map(&file) }.map_err(failed)?;
+    Ok(SceneBytes::Mapped(map))
+}
+
+/// Puts the scene's name in front of an error about its content.
+pub fn about<'a>(path: Option<&'a Path>) -> impl Fn(&dyn Error) -> String + 'a {
+    move |e| match path {
+        Some(path) => format!("{}: {e}", path.display()),
+        None => format!("built-in scene: {e}"),
+    }
+}
