@@ -5,3 +5,5 @@ pub mod light_oracle;
 pub mod light_scene;
 pub mod light_stats;
 pub mod texture_oracle;
+pub mod blob;
+pub mod walk;

@@ -21,6 +21,22 @@ pub const CHILD_INDEX: u32 = (1 << 27) - 1;
 /// Deepest tree that validates: with 7 pushed siblings per level a traversal stack of 256 never overflows.
 pub const MAX_TREE_DEPTH: u32 = 34;
 
+/// Largest magnitude of a coordinate: cross products of two edges then have a squared length that `f32` can hold
+/// (edges up to 2e9, products up to 8e18, squares of three components up to 1.92e38).
+pub const MAX_COORDINATE: f32 = 1e9;
+/// Largest emission (radiance, intensity or irradiance, any channel): its square still fits `f32`.
+pub const MAX_EMISSION: f32 = 1e18;
+/// Most columns or rows of a texture, an environment map or an image: an `f32` position in it keeps 8 bits of fraction.
+pub const MAX_SIDE: u32 = 1 << 16;
+/// GGX widths of rough materials.
+pub const ALPHA_RANGE: [f32; 2] = [1e-4, 1.0];
+/// Relative refractive indices of dielectrics and plastics.
+pub const ETA_RANGE: [f32; 2] = [0.01, 100.0];
+/// Largest refractive index and extinction of a conductor.
+pub const MAX_CONDUCTOR: f32 = 1e4;
+/// Entries of a rough plastic's transmittance table.
+pub const ROUGH_PLASTIC_ENTRIES: u32 = 64;
+
 macro_rules! kinds {
     ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $v:ident = $n:expr, $text:literal;)* }) => {
         $(#[$doc])*
@@ -67,17 +83,18 @@ kinds! {
         Tables = 8, "tables";
         /// [`Light`]s.
         Lights = 9, "lights";
-        /// [`Alias`] table over the lights, as many entries as lights.
+        /// [`Alias`] table over the lights, as many entries as lights; empty if no light has a probability above 0.
         LightAlias = 10, "light alias table";
         /// [`Environment`], none or one.
         Environment = 11, "environment";
         /// `[f32; 3]` radiance texels of the environment map, row 0 first.
         EnvTexels = 12, "environment texels";
-        /// [`Alias`] tables of the environment map: one over the cell rows, then one per row over its cells.
+        /// [`Alias`] tables of the environment map: one over the cell rows, then one per row over its cells. Empty if the
+        /// map is black. Rows of probability 0 may hold any well-formed table.
         EnvAlias = 13, "environment alias tables";
         /// [`Camera`], exactly one.
         Cameras = 14, "camera";
-        /// Bytes: material names, each ended by a newline, in material order.
+        /// Bytes: material names, each ended by a newline, in material order, UTF-8; or nothing.
         Names = 15, "names";
     }
 }
@@ -168,7 +185,7 @@ pub struct Section {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct SceneInfo {
-    /// Smallest coordinates of the triangles, world space.
+    /// Smallest coordinates of the triangles, world space; zeros in an empty scene.
     pub bounds_min: [f32; 3],
     /// Largest coordinates.
     pub bounds_max: [f32; 3],
@@ -179,6 +196,10 @@ pub struct SceneInfo {
 }
 
 /// Eight child boxes and references. Unused slots hold an empty box (+inf, -inf) and [`NONE`].
+///
+/// Nodes and leaves are numbered depth-first in preorder, children in slot order: walking the tree from node 0 that way
+/// meets nodes 0, 1, 2 ... and, counted apart, leaves 0, 1, 2 ... Each triangle is in exactly one leaf, every vertex
+/// inside (closed, exactly) the boxes of all its ancestors, at most [`MAX_TREE_DEPTH`] nodes lie on a path.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Node {
@@ -190,7 +211,7 @@ pub struct Node {
     pub reserved: [u32; 8],
 }
 
-/// Up to eight triangles; unused slots hold zeros and [`NONE`].
+/// Up to eight triangles in the first slots; unused slots hold zeros and [`NONE`].
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Leaf {
@@ -223,7 +244,7 @@ pub const TRIANGLE_SMOOTH: u32 = 1;
 pub struct Vertex {
     /// Position.
     pub p: [f32; 3],
-    /// Unit normal; used where the triangle is smooth.
+    /// Unit normal (within 1e-3 of the squared length) where a smooth triangle uses it, else any finite vector.
     pub n: [f32; 3],
     /// Texture coordinates, v upwards.
     pub uv: [f32; 2],

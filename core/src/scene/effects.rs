@@ -1,6 +1,6 @@
 //! Which effects a scene calls for.
 
-use super::blob::{EnvironmentKind, Light, LightKind, Material, MaterialKind, NONE};
+use super::blob::MaterialKind;
 
 /// A set of effects, one bit each; bits 0..16 are material kinds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -72,38 +72,5 @@ impl Effects {
     /// The effect of a material kind.
     pub const fn of_material(kind: MaterialKind) -> Self {
         Self(1 << kind as u32)
-    }
-
-    pub(crate) fn of_materials(materials: &[Material]) -> Self {
-        let mut e = Self::default();
-        for m in materials {
-            if let Some(k) = MaterialKind::from_u32(m.kind) {
-                e = e.with(Self::of_material(k));
-            }
-            if m.texture != NONE {
-                e = e.with(Self::TEXTURES);
-            }
-        }
-        e
-    }
-
-    pub(crate) fn of_lights(lights: &[Light]) -> Self {
-        let mut e = Self::default();
-        for l in lights {
-            e = e.with(match LightKind::from_u32(l.kind) {
-                Some(LightKind::Area) => Self::AREA_LIGHTS,
-                Some(LightKind::Point | LightKind::Directional) => Self::DELTA_LIGHTS,
-                Some(LightKind::Environment) | None => Self::default(),
-            });
-        }
-        e
-    }
-
-    pub(crate) fn of_environment(kind: u32) -> Self {
-        match EnvironmentKind::from_u32(kind) {
-            Some(EnvironmentKind::Constant) => Self::CONSTANT,
-            Some(EnvironmentKind::Map) => Self::ENVIRONMENT,
-            None => Self::default(),
-        }
     }
 }

@@ -1,8 +1,17 @@
 //! The scene blob: Pod sections in one block of bytes, validated once, read in place.
+//!
+//! [`blob`] is the layout, `sections` finds the records, `validate` proves what everything downstream relies on
+//! (`tree`, `geometry`, `materials`, `lights`, `environment`, one file each), `view` is what is left: slices.
+//! Caller's data is handled with checked arithmetic and checked access only.
+#![deny(clippy::arithmetic_side_effects, clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 pub mod blob;
 mod effects;
+mod error;
+mod sections;
+mod validate;
 mod view;
 
 pub use effects::Effects;
-pub use view::{Scene, SceneError};
+pub use error::{ChildFault, Field, SceneError, SectionFault, SlotFault};
+pub use view::Scene;

@@ -1,0 +1,323 @@
+//! Why bytes are not a scene: the object, its index and the number that is wrong.
+
+use super::blob::{MAX_TREE_DEPTH, SectionKind, VERSION};
+use core::fmt;
+
+/// A number of a record that must lie in a stated range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Field {
+    /// A coordinate: finite, at most [`super::blob::MAX_COORDINATE`] from 0.
+    Position,
+    /// A component or, as the squared length, the unit length of a direction.
+    Direction,
+    /// A texture coordinate, limited like a position.
+    TextureCoordinate,
+    /// Bounds: smallest not above largest, and around every triangle.
+    Bounds,
+    /// Reflectance or tabulated transmittance, 0 to 1.
+    Reflectance,
+    /// GGX width, [`super::blob::ALPHA_RANGE`].
+    Alpha,
+    /// Refractive index: relative, [`super::blob::ETA_RANGE`]; of a conductor, 0 to [`super::blob::MAX_CONDUCTOR`].
+    Eta,
+    /// Extinction of a conductor, 0 to [`super::blob::MAX_CONDUCTOR`], not 0 together with eta.
+    Extinction,
+    /// Internal diffuse reflectance, 0 up to but without 1.
+    InternalReflectance,
+    /// Emission, 0 to [`super::blob::MAX_EMISSION`]; of an area light, that of its triangle's material.
+    Emission,
+    /// Area, above 0 and that of the light's triangle within 1e-3.
+    Area,
+    /// Probability, 0 to 1.
+    Probability,
+    /// Columns of an image, 1 to [`super::blob::MAX_SIDE`].
+    Width,
+    /// Rows of an image, 1 (environment map: 2) to [`super::blob::MAX_SIDE`].
+    Height,
+    /// Lens radius, from 0.
+    LensRadius,
+    /// Distance in focus, above 0 if there is a lens.
+    FocusDistance,
+    /// Volume spanned by the camera's three axes over the product of their lengths, away from 0.
+    ImagePlane,
+}
+
+impl Field {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Position => "position",
+            Self::Direction => "direction (or its squared length)",
+            Self::TextureCoordinate => "texture coordinate",
+            Self::Bounds => "bound",
+            Self::Reflectance => "reflectance",
+            Self::Alpha => "alpha",
+            Self::Eta => "eta",
+            Self::Extinction => "k",
+            Self::InternalReflectance => "fdr",
+            Self::Emission => "emission",
+            Self::Area => "area",
+            Self::Probability => "probability",
+            Self::Width => "width",
+            Self::Height => "height",
+            Self::LensRadius => "lens radius",
+            Self::FocusDistance => "focus distance",
+            Self::ImagePlane => "image plane",
+        }
+    }
+}
+
+/// What is wrong with an entry of the section table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SectionFault {
+    /// Two sections of this kind.
+    Repeated,
+    /// Bytes per record.
+    Stride(u32),
+    /// Not a multiple of [`super::blob::ALIGN`], or inside the header and table.
+    Offset(u64),
+    /// Records: too many for the blob or for 31-bit indices, or not the number that other sections call for.
+    Count(u64),
+    /// Shares bytes with another section.
+    Overlaps(SectionKind),
+}
+
+/// What is wrong with a child slot of a node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ChildFault {
+    /// An unused slot whose box is not (+inf, -inf).
+    EmptyBox(f32),
+    /// A box with a bound that is not finite, or above its opposite.
+    Bounds(f32),
+    /// A bound outside the parent's box (of the root: outside the scene's bounds).
+    Outside(f32),
+    /// A node or leaf that is not the next in depth-first order; excludes cycles and sharing.
+    Order {
+        /// The next unvisited index.
+        expected: u32,
+        /// The reference's index.
+        found: u32,
+    },
+    /// A leaf of no or more than eight triangles.
+    Count(u32),
+    /// A node deeper than [`MAX_TREE_DEPTH`].
+    Deep,
+}
+
+/// What is wrong with a triangle slot of a leaf.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum SlotFault {
+    /// Beyond the leaf's count, but not zeros and [`super::blob::NONE`].
+    Unused,
+    /// A coordinate that is not the triangle's vertex.
+    Vertex(f32),
+    /// A coordinate outside the leaf's box.
+    Outside(f32),
+}
+
+/// Why bytes are not a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// Fewer bytes than needed.
+    Truncated {
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes given.
+        given: u64,
+    },
+    /// The first bytes are not `CROUPIER`.
+    Magic,
+    /// Made by another version.
+    Version(u32),
+    /// The bytes must start at a multiple of 4.
+    Misaligned,
+    /// The content is not what was written.
+    Hash {
+        /// In the header.
+        stated: u64,
+        /// Of the bytes.
+        found: u64,
+    },
+    /// More sections than there are kinds.
+    SectionCount(u32),
+    /// A section of unknown kind.
+    UnknownSection(u32),
+    /// A section with an impossible place, stride or count.
+    Section {
+        /// Which.
+        kind: SectionKind,
+        /// Why.
+        fault: SectionFault,
+    },
+    /// The header's reserved bytes are not 0.
+    Header,
+    /// Reserved or unused bits that are not 0.
+    Reserved {
+        /// Section.
+        of: SectionKind,
+        /// Record.
+        index: u32,
+    },
+    /// A kind that does not exist.
+    Kind {
+        /// Section.
+        of: SectionKind,
+        /// Record.
+        index: u32,
+        /// Number found.
+        found: u32,
+    },
+    /// A reference that is out of range, missing, or not answered by the object it names.
+    Reference {
+        /// Section.
+        of: SectionKind,
+        /// Record.
+        index: u32,
+        /// Section referred to.
+        to: SectionKind,
+        /// Index found there.
+        found: u32,
+        /// Records there.
+        count: u32,
+    },
+    /// A number out of its range (see [`Field`]).
+    Number {
+        /// Section.
+        of: SectionKind,
+        /// Record.
+        index: u32,
+        /// Which number.
+        field: Field,
+        /// Its value.
+        found: f32,
+    },
+    /// A node's child slot.
+    Child {
+        /// Node.
+        node: u32,
+        /// Slot, 0 to 7.
+        slot: u32,
+        /// Why.
+        fault: ChildFault,
+    },
+    /// A leaf's triangle slot.
+    Slot {
+        /// Leaf.
+        leaf: u32,
+        /// Slot, 0 to 7.
+        slot: u32,
+        /// Why.
+        fault: SlotFault,
+    },
+    /// Records that the walk from the root does not reach, or a childless node.
+    Unreached {
+        /// Nodes or leaves.
+        of: SectionKind,
+        /// First one.
+        index: u32,
+    },
+    /// The leaves do not hold every triangle exactly once.
+    Coverage {
+        /// Triangles.
+        triangles: u32,
+        /// Triangle slots in use over all leaves.
+        slots: u64,
+    },
+    /// An alias table whose thresholds do not give the stated probabilities.
+    AliasTable {
+        /// Section.
+        of: SectionKind,
+        /// First entry of the table.
+        first: u32,
+        /// Its length.
+        length: u32,
+        /// Sum over the items of (stated - actual) / stated probability, each weighed by up to +-1.
+        deviation: f32,
+    },
+    /// Names are not one line of UTF-8 per material.
+    Names {
+        /// Lines found.
+        lines: u64,
+        /// Materials.
+        materials: u32,
+    },
+}
+
+impl fmt::Display for SectionFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Repeated => write!(f, "occurs twice"),
+            Self::Stride(s) => write!(f, "has {s} bytes per record, not this version's"),
+            Self::Offset(o) => write!(f, "starts at byte {o}: inside the header or not a multiple of 64"),
+            Self::Count(n) => write!(f, "has {n} records: not what the blob's length or its other sections allow"),
+            Self::Overlaps(k) => write!(f, "shares bytes with section `{}`", k.name()),
+        }
+    }
+}
+
+impl fmt::Display for ChildFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::EmptyBox(x) => write!(f, "is unused, but its box has a bound {x}, not infinity"),
+            Self::Bounds(x) => write!(f, "has an invalid bound {x}"),
+            Self::Outside(x) => write!(f, "has a bound {x} outside its parent's box"),
+            Self::Order { expected, found } => write!(f, "refers to {found}, depth-first order has {expected} here"),
+            Self::Count(n) => write!(f, "is a leaf of {n} triangles, not 1 to 8"),
+            Self::Deep => write!(f, "is a node below {MAX_TREE_DEPTH} levels"),
+        }
+    }
+}
+
+impl fmt::Display for SlotFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unused => write!(f, "is beyond the leaf's count, but not empty"),
+            Self::Vertex(x) => write!(f, "has a coordinate {x} that is not its triangle's"),
+            Self::Outside(x) => write!(f, "has a coordinate {x} outside the leaf's box"),
+        }
+    }
+}
+
+impl fmt::Display for SceneError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Truncated { needed, given } => write!(f, "scene blob needs {needed} bytes, {given} given"),
+            Self::Magic => write!(f, "not a scene blob: the first bytes are not CROUPIER"),
+            Self::Version(v) => write!(f, "scene blob of version {v}, this library reads version {VERSION}"),
+            Self::Misaligned => write!(f, "scene blob must start at an address that is a multiple of 4"),
+            Self::Hash { stated, found } => {
+                write!(f, "scene blob is damaged: its header states hash {stated:016x}, its bytes have {found:016x}")
+            }
+            Self::SectionCount(n) => write!(f, "{n} sections, there are {} kinds", SectionKind::ALL.len()),
+            Self::UnknownSection(k) => write!(f, "unknown section kind {k}"),
+            Self::Section { kind, fault } => write!(f, "section `{}` {fault}", kind.name()),
+            Self::Header => write!(f, "reserved bytes of the header are not 0"),
+            Self::Reserved { of, index } => write!(f, "{}[{index}]: reserved bits are not 0", of.name()),
+            Self::Kind { of, index, found } => write!(f, "{}[{index}]: kind {found} does not exist", of.name()),
+            Self::Reference { of, index, to, found, count } => {
+                write!(f, "{}[{index}]: wrong reference to {}[{found}], there are {count}", of.name(), to.name())
+            }
+            Self::Number { of, index, field, found } => {
+                write!(f, "{}[{index}]: {} is {found}, out of range", of.name(), field.name())
+            }
+            Self::Child { node, slot, fault } => write!(f, "nodes[{node}]: child {slot} {fault}"),
+            Self::Slot { leaf, slot, fault } => write!(f, "leaves[{leaf}]: triangle slot {slot} {fault}"),
+            Self::Unreached { of, index } => write!(f, "{}[{index}]: not part of the tree, or childless", of.name()),
+            Self::Coverage { triangles, slots } => {
+                write!(f, "the leaves' {slots} slots do not hold each of {triangles} triangles exactly once")
+            }
+            Self::AliasTable { of, first, length, deviation } => {
+                write!(f, "{}[{first}..+{length}]: probabilities disagree with thresholds by {deviation}", of.name())
+            }
+            Self::Names { lines, materials } => {
+                write!(f, "names must be one line of UTF-8 per material: {lines} lines, {materials} materials")
+            }
+        }
+    }
+}
+
+impl core::error::Error for SceneError {}

@@ -1,0 +1,46 @@
+//! Vertices and triangles.
+
+use super::{materials, records};
+use crate::scene::blob::*;
+use crate::scene::error::{Field, SceneError};
+use crate::scene::{Effects, Scene};
+
+/// Positions and texture coordinates are finite and not huge; normals are finite.
+pub(super) fn vertices(scene: &Scene<'_>) -> Result<(), SceneError> {
+    for (at, v) in records(SectionKind::Vertices, scene.vertices) {
+        at.position(&v.p)?;
+        at.finite(Field::Direction, &v.n)?;
+        at.all_within(Field::TextureCoordinate, &v.uv, -MAX_COORDINATE, MAX_COORDINATE)?;
+    }
+    Ok(())
+}
+
+/// Triangles refer to vertices, materials and lights that exist; smooth ones to unit normals. Returns the effects of
+/// the materials they use. That a light refers back is for `lights` to check.
+///
+/// A triangle of no area is allowed: no ray hits it, so nothing divides by its area.
+pub(super) fn triangles(scene: &Scene<'_>) -> Result<Effects, SceneError> {
+    let mut effects = Effects::default();
+    for (at, t) in records(SectionKind::Triangles, scene.triangles) {
+        at.zero(t.flags & !TRIANGLE_SMOOTH == 0)?;
+        let smooth = t.flags & TRIANGLE_SMOOTH != 0;
+        for v in t.vertex {
+            let vertex = at.follow(SectionKind::Vertices, v, scene.vertices)?;
+            if smooth {
+                super::Record { of: SectionKind::Vertices, index: v as usize }.unit(vertex.n)?;
+            }
+        }
+        let material = at.follow(SectionKind::Materials, t.material, scene.materials)?;
+        effects = effects.with(materials::effects(material));
+        if smooth {
+            effects = effects.with(Effects::SMOOTH_NORMALS);
+        }
+        if t.light != NONE {
+            let light = at.follow(SectionKind::Lights, t.light, scene.lights)?;
+            if light.kind != LightKind::Area as u32 || light.triangle as usize != at.index {
+                return Err(at.wrong_reference(SectionKind::Lights, t.light, scene.lights.len()));
+            }
+        }
+    }
+    Ok(effects)
+}

@@ -1,0 +1,176 @@
+//! The tree: shape, boxes, leaves.
+//!
+//! Nodes and leaves must be numbered in the order in which a depth-first walk meets them. So the walk needs no marks:
+//! each child reference has exactly one legal index, the next of a counter. A counter only grows, hence the walk ends
+//! after at most as many steps as there are child slots, no record is met twice (neither cycles nor sharing), and the
+//! counters at the end say whether all were met. The stack is the path to the current node.
+
+use super::mark;
+use crate::scene::Scene;
+use crate::scene::blob::*;
+use crate::scene::error::{ChildFault, SceneError, SlotFault};
+
+/// A closed box: smallest and largest corner.
+#[derive(Clone, Copy)]
+struct Bounds {
+    min: [f32; 3],
+    max: [f32; 3],
+}
+
+impl Bounds {
+    /// Of a node's child.
+    fn of_child(node: &Node, slot: usize) -> Self {
+        let [x0, y0, z0, x1, y1, z1] = node.bounds.map(|row| row.get(slot).copied().unwrap_or(f32::NAN));
+        Self { min: [x0, y0, z0], max: [x1, y1, z1] }
+    }
+
+    /// A coordinate of `p` that is outside; NaN is.
+    fn excludes(&self, p: [f32; 3]) -> Option<f32> {
+        let axes = p.iter().zip(self.min.iter().zip(&self.max));
+        axes.filter(|(x, (lo, hi))| !(*x >= lo && *x <= hi)).map(|(x, _)| *x).next()
+    }
+
+    /// Finite, ordered, inside `parent`.
+    fn check(&self, parent: &Self) -> Result<(), ChildFault> {
+        for (lo, hi) in self.min.iter().zip(&self.max) {
+            if !(*lo <= *hi && *lo >= f32::MIN && *hi <= f32::MAX) {
+                return Err(ChildFault::Bounds(if hi.is_finite() { *lo } else { *hi }));
+            }
+        }
+        let outside = parent.excludes(self.min).or(parent.excludes(self.max));
+        outside.map_or(Ok(()), |x| Err(ChildFault::Outside(x)))
+    }
+
+    /// The box of an unused slot, bit for bit.
+    fn check_empty(&self) -> Result<(), ChildFault> {
+        let wrong_min = self.min.iter().find(|x| **x != f32::INFINITY);
+        let wrong_max = self.max.iter().find(|x| **x != f32::NEG_INFINITY);
+        wrong_min.or(wrong_max).map_or(Ok(()), |x| Err(ChildFault::EmptyBox(*x)))
+    }
+}
+
+/// One node of the path from the root: its index, its box, the next slot to look at.
+#[derive(Clone, Copy)]
+struct Step {
+    node: u32,
+    slot: u32,
+    bounds: Bounds,
+}
+
+/// What the walk has met.
+#[derive(Default)]
+struct Met {
+    nodes: u32,
+    leaves: u32,
+    slots: u64,
+    /// Sum of [`mark`]s of the triangles met.
+    marks: u64,
+}
+
+/// Walks the whole tree.
+pub(super) fn tree(scene: &Scene<'_>) -> Result<(), SceneError> {
+    let mut met = Met::default();
+    if !scene.nodes.is_empty() {
+        walk(scene, &mut met)?;
+    }
+    for (of, met, count) in
+        [(SectionKind::Nodes, met.nodes, scene.nodes.len()), (SectionKind::Leaves, met.leaves, scene.leaves.len())]
+    {
+        if met as usize != count {
+            return Err(SceneError::Unreached { of, index: met });
+        }
+    }
+    // As many slots as triangles, all in range, and equal sums of 64-bit marks: a multiset other than {0, 1, ... n-1}
+    // passes by accident with probability 2^-64. On purpose it can; that wrongs the picture, not memory.
+    let triangles = u32::try_from(scene.triangles.len()).unwrap_or(u32::MAX);
+    let marks = (0..triangles).fold(0u64, |sum, t| sum.wrapping_add(mark(u64::from(t))));
+    if met.slots != u64::from(triangles) || met.marks != marks {
+        return Err(SceneError::Coverage { triangles, slots: met.slots });
+    }
+    Ok(())
+}
+
+fn walk(scene: &Scene<'_>, met: &mut Met) -> Result<(), SceneError> {
+    let bounds = Bounds { min: scene.info.bounds_min, max: scene.info.bounds_max };
+    let mut path = [Step { node: 0, slot: 0, bounds }; MAX_TREE_DEPTH as usize];
+    let mut depth = 0usize;
+    met.nodes = 1;
+    // `depth` indexes the last step of the path and is kept below its length.
+    while let Some(step) = path.get_mut(depth) {
+        let (Step { node: index, slot, bounds }, Some(node)) = (*step, scene.nodes.get(step.node as usize)) else {
+            break;
+        };
+        let Some(child) = node.child.get(slot as usize).copied() else {
+            let Some(up) = depth.checked_sub(1) else { break };
+            depth = up;
+            continue;
+        };
+        step.slot = slot.saturating_add(1);
+        let bad = |fault| SceneError::Child { node: index, slot, fault };
+        if slot == 0 && (node.reserved != [0; 8] || node.child == [NONE; 8]) {
+            return Err(match node.reserved {
+                [0, 0, 0, 0, 0, 0, 0, 0] => SceneError::Unreached { of: SectionKind::Nodes, index },
+                _ => SceneError::Reserved { of: SectionKind::Nodes, index },
+            });
+        }
+        let own = Bounds::of_child(node, slot as usize);
+        if child == NONE {
+            own.check_empty().map_err(bad)?;
+            continue;
+        }
+        own.check(&bounds).map_err(bad)?;
+        let found = child & if child & LEAF_BIT == 0 { !LEAF_BIT } else { CHILD_INDEX };
+        let (next, count) = if child & LEAF_BIT == 0 {
+            (&mut met.nodes, scene.nodes.len())
+        } else {
+            (&mut met.leaves, scene.leaves.len())
+        };
+        if found != *next || found as usize >= count {
+            return Err(bad(ChildFault::Order { expected: *next, found }));
+        }
+        *next = next.saturating_add(1);
+        if child & LEAF_BIT == 0 {
+            depth = depth.saturating_add(1);
+            *path.get_mut(depth).ok_or(bad(ChildFault::Deep))? = Step { node: found, slot: 0, bounds: own };
+        } else {
+            let count = (child & !LEAF_BIT) >> 27;
+            if !(1..=8).contains(&count) {
+                return Err(bad(ChildFault::Count(count)));
+            }
+            leaf(scene, found, count, &own, met)?;
+        }
+    }
+    Ok(())
+}
+
+/// The leaf holds the corners of its triangles, inside its box; the rest of it is empty.
+fn leaf(scene: &Scene<'_>, index: u32, count: u32, bounds: &Bounds, met: &mut Met) -> Result<(), SceneError> {
+    let Some(leaf) = scene.leaves.get(index as usize) else { return Ok(()) };
+    for (slot, t) in (0u32..).zip(leaf.triangle) {
+        let bad = |fault| SceneError::Slot { leaf: index, slot, fault };
+        let stored = leaf.p.map(|row| row.get(slot as usize).copied().unwrap_or(f32::NAN));
+        if slot >= count {
+            if t != NONE || stored.map(f32::to_bits) != [0; 9] {
+                return Err(bad(SlotFault::Unused));
+            }
+            continue;
+        }
+        let of = SectionKind::Leaves;
+        let (to, triangles) = (SectionKind::Triangles, u32::try_from(scene.triangles.len()).unwrap_or(u32::MAX));
+        let range = SceneError::Reference { of, index, to, found: t, count: triangles };
+        let triangle = scene.triangles.get(t as usize).ok_or(range)?;
+        for (v, p) in triangle.vertex.iter().zip(stored.chunks_exact(3)) {
+            let &[x, y, z] = p else { continue };
+            let vertex = scene.vertices.get(*v as usize).map_or([f32::NAN; 3], |v| v.p);
+            if let Some((wrong, _)) = [x, y, z].iter().zip(vertex).find(|(a, b)| a.to_bits() != b.to_bits()) {
+                return Err(bad(SlotFault::Vertex(*wrong)));
+            }
+            if let Some(x) = bounds.excludes(vertex) {
+                return Err(bad(SlotFault::Outside(x)));
+            }
+        }
+        met.slots = met.slots.saturating_add(1);
+        met.marks = met.marks.wrapping_add(mark(u64::from(t)));
+    }
+    Ok(())
+}

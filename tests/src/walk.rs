@@ -1,0 +1,116 @@
+//! Follows everything in a scene the way rendering does, with plain indexing: an index that validation let through
+//! and that is out of range panics.
+
+use croupier::Scene;
+use croupier::scene::blob::*;
+
+/// Entries of a traversal stack that pushes all children of a node but the one it enters.
+const STACK: usize = 256;
+
+/// Touches every record; returns how many steps that took.
+pub fn everything(scene: &Scene<'_>) -> usize {
+    let mut steps = tree(scene);
+    for t in scene.triangles {
+        for v in t.vertex.map(|v| &scene.vertices[v as usize]) {
+            assert!(v.p.iter().chain(&v.n).chain(&v.uv).all(|x| x.is_finite()));
+            if t.flags & TRIANGLE_SMOOTH != 0 {
+                let length = v.n.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
+                assert!((length - 1.0).abs() < 1.1e-3);
+            }
+        }
+        material(scene, &scene.materials[t.material as usize]);
+        if t.light != NONE {
+            assert_eq!(scene.lights[t.light as usize].kind, LightKind::Area as u32);
+        }
+        steps += 1;
+    }
+    scene.materials.iter().for_each(|m| material(scene, m));
+    pick(scene.light_alias);
+    for (l, a) in scene.lights.iter().zip(scene.light_alias) {
+        assert!(l.probability == a.probability && l.emission.iter().all(|x| x.is_finite() && *x >= 0.0));
+        if l.kind == LightKind::Area as u32 {
+            assert!(l.area > 0.0 && scene.triangles[l.triangle as usize].light != NONE);
+        }
+    }
+    if let Some(e) = scene.environment {
+        assert_eq!(scene.lights[e.light as usize].kind, LightKind::Environment as u32);
+        if e.kind == EnvironmentKind::Map as u32 {
+            environment(scene, e);
+        }
+    }
+    let c = scene.camera;
+    for corner in 0..4 {
+        let [x, y] = [corner & 1, corner >> 1].map(|s| if s == 0 { -1.0 } else { 1.0 });
+        let d: [f32; 3] = core::array::from_fn(|i| c.forward[i] + x * c.right[i] + y * c.down[i]);
+        assert!(d.iter().all(|x| x.is_finite()) && d.iter().any(|x| *x != 0.0));
+    }
+    steps
+}
+
+/// Depth-first through boxes and leaves, as far as a stack of [`STACK`] allows (it must).
+fn tree(scene: &Scene<'_>) -> usize {
+    let mut stack = [0u32; STACK];
+    let mut n = 0;
+    if !scene.nodes.is_empty() {
+        n = 1;
+    }
+    let (mut steps, mut seen) = (0, vec![0u32; scene.triangles.len()]);
+    while n > 0 {
+        n -= 1;
+        let r = stack[n];
+        steps += 1;
+        if r & LEAF_BIT != 0 {
+            let leaf = &scene.leaves[(r & CHILD_INDEX) as usize];
+            let count = (r & !LEAF_BIT) >> 27;
+            leaf.triangle[..count as usize].iter().for_each(|t| seen[*t as usize] += 1);
+            continue;
+        }
+        for child in scene.nodes[r as usize].child {
+            if child != NONE {
+                stack[n] = child;
+                n += 1;
+            }
+        }
+    }
+    assert!(seen.iter().all(|s| *s == 1), "every triangle once");
+    steps
+}
+
+fn material(scene: &Scene<'_>, m: &Material) {
+    let kind = MaterialKind::from_u32(m.kind).unwrap();
+    if kind == MaterialKind::RoughPlastic {
+        let table = &scene.tables[m.table as usize..][..64];
+        assert!(table.iter().all(|x| (0.0..=1.0).contains(x)));
+    }
+    if m.texture != NONE {
+        let t = &scene.textures[m.texture as usize];
+        let _ = scene.texels[(t.first + (t.height - 1) * t.width + t.width - 1) as usize];
+    }
+}
+
+/// Picks with many numbers; what is picked has a probability.
+fn pick(table: &[Alias]) {
+    let n = table.len() as u64;
+    for i in 0..if n == 0 { 0 } else { 64 * n } {
+        let r = (i * 0x0123_4567_89ab) & 0xffff_ffff;
+        let (slot, low) = ((r * n) >> 32, (r * n) as u32);
+        let a = &table[slot as usize];
+        let item = if a.threshold == u32::MAX || low < a.threshold { slot as usize } else { a.alias as usize };
+        assert!(table[item].probability > 0.0);
+    }
+}
+
+fn environment(scene: &Scene<'_>, e: &Environment) {
+    let (w, h) = (e.width as usize, e.height as usize);
+    assert!(scene.env_texels[w * h - 1].iter().all(|x| x.is_finite()));
+    if scene.env_alias.is_empty() {
+        return;
+    }
+    let (rows, cells) = scene.env_alias.split_at(h - 1);
+    pick(rows);
+    for (row, table) in rows.iter().enumerate().map(|(i, r)| (r, &cells[i * w..(i + 1) * w])) {
+        if row.probability > 0.0 {
+            pick(table);
+        }
+    }
+}
