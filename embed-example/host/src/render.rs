@@ -1,311 +1,224 @@
-//! Drives the core: memory, threads, iterations and when to stop. The core has no clock; time lives here.
+//! Rendering a scene blob to a picture: what the program asks for and gets.
 
-use crate::blob::AlignedBytes;
-use croupier::accel::WideBvh;
+use crate::image::Picture;
+use crate::drive::{Options, Rendered, drive_scene};
 use croupier::film::{PixelAov, PixelStats};
-use croupier::profile::{AnyProfile, Full, Matte, Profile};
-use croupier::{
-    Budget, Counters, ErrorEstimate, Plan, Progress, Scene, SceneError, Session, SessionError, Settings, SettingsError,
-    Shard, ShardError,
-};
-use rayon::prelude::*;
-use std::fmt;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
-
-/// Rays between two looks at the clock and at [`Observer::should_stop`].
-const STEP_RAYS: u64 = 1 << 16;
-
-/// Iterations grow to this many samples per pixel.
-const LARGEST_ITERATION: u32 = 64;
+use croupier::profile::AnyProfile;
+use croupier::{Plan, Scene, Settings, Strategy};
+use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// When a render is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Target {
-    /// Camera samples per pixel.
+    /// Samples per pixel, >= 1.
     Spp(u32),
-    /// Seconds of wall time; a whole iteration is never cut, so it ends a little early.
+    /// Wall-clock seconds, > 0. The image then depends on the machine.
     Seconds(f64),
-    /// Rays of all kinds, to the nearest iteration below (at least one).
+    /// Rays of all kinds, >= 1; passed by at most one iteration.
     Rays(u64),
-    /// Estimated relMSE at or below this.
+    /// Estimated relMSE of the whole image, > 0.
     Error(f64),
 }
 
-/// What to render and how.
-#[derive(Clone, Copy, Debug)]
-pub struct RenderOptions {
-    /// The core's settings.
-    pub settings: Settings,
-    /// When to stop.
-    pub target: Target,
-    /// Threads; 0 takes one per core. The picture does not depend on it.
-    pub threads: usize,
-}
-
-/// State of a running render.
-#[derive(Clone, Copy, Debug)]
-pub struct RenderProgress {
-    /// Share of the target reached, in [0, 1].
-    pub done: f64,
-    /// Seconds since the start.
-    pub seconds: f64,
-    /// Samples per pixel of the finished iterations.
-    pub spp: u32,
-    /// Error of the picture so far, after the first iteration.
-    pub error: Option<ErrorEstimate>,
-}
-
-/// Watches a render; called from worker threads.
-pub trait Observer: Sync {
-    /// Something has changed.
-    fn progress(&self, _: &RenderProgress) {}
-
-    /// Finish what is in flight and return the picture so far.
-    fn should_stop(&self) -> bool {
-        false
+impl Target {
+    /// Seconds left, from what has been done so far: work goes on at the same speed, and the squared error falls as 1 /
+    /// work. `None` while nothing is known.
+    pub fn seconds_left(&self, p: &Progress) -> Option<f64> {
+        let by_part = |part: f64| p.seconds * (1.0 / part - 1.0);
+        let left = match *self {
+            Self::Spp(n) => by_part(p.spp / f64::from(n)),
+            Self::Seconds(s) => s - p.seconds,
+            Self::Rays(n) => by_part(p.rays as f64 / n as f64),
+            Self::Error(e) => by_part(e / p.relmse_estimate?),
+        };
+        left.is_finite().then(|| left.max(0.0))
     }
 }
 
-/// Watches nothing.
-#[derive(Clone, Copy, Debug)]
-pub struct Unobserved;
+/// What to render, besides the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderOptions {
+    /// A roulette strategy as [`Strategy::parse`] reads it.
+    pub strategy: String,
+    /// When to stop.
+    pub target: Target,
+    /// Path segments from the camera; the scene's own if absent.
+    pub max_depth: Option<u32>,
+    /// Columns and rows; the camera's own if absent.
+    pub size: Option<[u32; 2]>,
+    /// Seed: another number gives another, independent image.
+    pub seed: u64,
+    /// Threads; 0 is one per processor. Does not change the image.
+    pub threads: usize,
+    /// Units of parallel work, >= 1. Part of what determines the image.
+    pub shards: u32,
+}
 
-impl Observer for Unobserved {}
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self {
+            strategy: "classic".into(),
+            target: Target::Spp(64),
+            max_depth: None,
+            size: None,
+            seed: 0,
+            threads: 0,
+            shards: 16,
+        }
+    }
+}
 
-/// A finished render.
-#[derive(Clone, Debug)]
-pub struct RenderResult {
-    /// Columns and rows.
-    pub size: [u32; 2],
-    /// Sums per pixel, row by row.
-    pub pixels: Vec<PixelStats>,
-    /// Auxiliary sums; empty if not asked for.
-    pub aovs: Vec<PixelAov>,
-    /// What happened.
-    pub counters: Counters,
-    /// Estimated error.
-    pub error: ErrorEstimate,
-    /// Camera samples per pixel of the finished iterations.
-    pub spp: u32,
-    /// Wall time of rendering alone.
+/// State of a render on its way.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Progress {
+    /// Mean samples per pixel so far.
+    pub spp: f64,
+    /// Rays so far.
+    pub rays: u64,
+    /// Wall-clock seconds so far.
     pub seconds: f64,
-    /// Name of the kernel profile.
-    pub profile: &'static str,
-    /// Bytes of the shared block and of all shards.
-    pub memory: [usize; 2],
-    /// The observer asked to stop before the target.
+    /// Estimated relMSE of the image so far, as soon as there are two iterations to compare.
+    pub relmse_estimate: Option<f64>,
+}
+
+/// Watches a render, and may end it. Called from the thread that renders and, [`Observer::stop`], from its workers.
+pub trait Observer: Sync {
+    /// Called a few times a second.
+    fn progress(&self, progress: &Progress);
+    /// True ends the render soon; what was rendered is still returned.
+    fn stop(&self) -> bool;
+}
+
+/// Figures of a finished render.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RenderStats {
+    /// Mean samples per pixel.
+    pub spp: f64,
+    /// Rays of all kinds.
+    pub rays: u64,
+    /// Wall-clock seconds of rendering.
+    pub seconds: f64,
+    /// 1e-6 rays / second.
+    pub mrays_per_s: f64,
+    /// Estimated relMSE of the whole image.
+    pub relmse_estimate: Option<f64>,
+    /// Its 95 % interval.
+    pub relmse_interval: Option<[f64; 2]>,
+    /// Part of the eight lanes that did work, by stage.
+    pub lane_utilisation: BTreeMap<&'static str, f64>,
+    /// Events that cost quality or were mended (full rings, bad samples, ...), by name.
+    pub counters: BTreeMap<&'static str, u64>,
+}
+
+/// A rendered picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderResult {
+    /// All layers.
+    pub picture: Picture,
+    /// Figures.
+    pub stats: RenderStats,
+    /// The observer ended it before its target.
     pub stopped_early: bool,
 }
 
-impl RenderResult {
-    /// Mean radiance, row by row, rgb.
-    pub fn image(&self) -> Vec<[f32; 3]> {
-        self.pixels.iter().map(|p| p.mean().map(|x| x as f32)).collect()
-    }
-
-    /// Standard error of the mean.
-    pub fn stderr(&self) -> Vec<[f32; 3]> {
-        self.pixels.iter().map(|p| p.variance_of_mean().map(|v| v.sqrt() as f32)).collect()
-    }
-
-    /// Rays per second, in millions.
-    pub fn mrays_per_s(&self) -> f64 {
-        self.counters.rays() as f64 / self.seconds.max(1e-9) * 1e-6
-    }
-
-    /// Order-sensitive hash of the picture's bits: equal for any number of threads and any instruction set.
-    pub fn hash(&self) -> u64 {
-        let image = self.image();
-        croupier::scene::blob::content_hash(bytemuck::cast_slice(&image))
-    }
+/// What a render of a scene takes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PlanSummary {
+    /// Name of the kernel profile that holds the scene's effects.
+    pub profile: String,
+    /// Bytes that all shards share.
+    pub shared_bytes: u64,
+    /// Bytes of each shard.
+    pub shard_bytes: u64,
+    /// Number of shards.
+    pub shards: u32,
 }
 
-/// Why nothing could be rendered.
-#[derive(Debug)]
-#[non_exhaustive]
-pub enum RenderError {
-    /// The bytes are not a scene.
-    Scene(SceneError),
-    /// A setting cannot be used.
-    Settings(SettingsError),
-    /// The session cannot start.
-    Session(SessionError),
-    /// A shard cannot be made.
-    Shard(ShardError),
-    /// The thread pool cannot start.
-    Threads(rayon::ThreadPoolBuildError),
-}
+pub use crate::drive::DriveError as RenderError;
 
-impl fmt::Display for RenderError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Scene(e) => e.fmt(f),
-            Self::Settings(e) => e.fmt(f),
-            Self::Session(e) => e.fmt(f),
-            Self::Shard(e) => e.fmt(f),
-            Self::Threads(e) => write!(f, "cannot start threads: {e}"),
-        }
-    }
-}
-
-impl std::error::Error for RenderError {}
-
-macro_rules! from {
-    ($($t:ty => $v:ident),*) => {$(
-        impl From<$t> for RenderError {
-            fn from(e: $t) -> Self {
-                Self::$v(e)
-            }
-        }
-    )*};
-}
-from!(SceneError => Scene, SettingsError => Settings, SessionError => Session, ShardError => Shard,
-      rayon::ThreadPoolBuildError => Threads);
-
-/// Renders a scene blob.
-pub fn render(scene: &[u8], options: &RenderOptions, observer: &dyn Observer) -> Result<RenderResult, RenderError> {
-    render_scene(Scene::from_bytes(scene)?, options, observer)
-}
-
-/// Renders a validated scene with the smallest profile that holds its effects.
-pub fn render_scene(
-    scene: Scene<'_>,
-    options: &RenderOptions,
-    observer: &dyn Observer,
-) -> Result<RenderResult, RenderError> {
-    match AnyProfile::smallest(scene.effects) {
-        AnyProfile::Matte => render_with::<Matte>(scene, options, observer),
-        AnyProfile::Full => render_with::<Full>(scene, options, observer),
-    }
-}
-
-/// Renders a validated scene with profile `P`.
-pub fn render_with<P: Profile + Send + Sync>(
-    scene: Scene<'_>,
-    options: &RenderOptions,
-    observer: &dyn Observer,
-) -> Result<RenderResult, RenderError> {
-    let plan = Plan::new(&options.settings)?;
-    let mut shared = AlignedBytes::zeroed(plan.session().size);
-    let count = options.settings.shards;
-    let mut blocks: Vec<_> = (0..count).map(|_| AlignedBytes::zeroed(plan.shard().size)).collect();
-    let mut session = Session::<P, _>::new(scene, WideBvh::new(&scene), &plan, &mut shared)?;
-    let mut shards = Vec::with_capacity(blocks.len());
-    for (i, b) in blocks.iter_mut().enumerate() {
-        shards.push(Shard::new(&plan, i as u32, b)?);
-    }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build()?;
-
-    let start = Instant::now();
-    let mut spp = 0u32;
-    let mut error = None;
-    let mut stopped_early = false;
-    loop {
-        let samples = next_iteration(options.target, spp, start.elapsed().as_secs_f64(), session.counters(), error);
-        if samples == 0 {
-            break;
-        }
-        session.begin_iteration(samples);
-        let run = Run { session: &session, observer, options, start, spp, samples, error, rays: AtomicU64::new(0) };
-        stopped_early = pool.install(|| run.all(&mut shards));
-        session.end_iteration(&shards)?;
-        if stopped_early {
-            break;
-        }
-        spp = spp.saturating_add(samples);
-        error = Some(session.film().error_estimate());
-    }
-    let film = session.film();
-    Ok(RenderResult {
-        size: film.size(),
-        pixels: film.pixels().to_vec(),
-        aovs: film.aovs().to_vec(),
-        counters: *session.counters(),
-        error: film.error_estimate(),
-        spp,
-        seconds: start.elapsed().as_secs_f64(),
-        profile: P::NAME,
-        memory: [plan.session().size, plan.shard().size * count as usize],
-        stopped_early,
+/// Settings of the core for a scene.
+fn settings(scene: &Scene<'_>, options: &RenderOptions) -> Result<Settings, RenderError> {
+    let base = Settings::for_scene(scene);
+    Ok(Settings {
+        size: options.size.unwrap_or(base.size),
+        seed: options.seed,
+        shards: options.shards,
+        max_depth: options.max_depth.unwrap_or(base.max_depth),
+        strategy: Strategy::parse(&options.strategy).map_err(RenderError::Strategy)?,
+        aovs: true,
+        ..base
     })
 }
 
-/// One iteration over all shards.
-struct Run<'a, 's, 'm, P: Profile, I: croupier::accel::Intersector> {
-    session: &'a Session<'s, 'm, P, I>,
-    observer: &'a dyn Observer,
-    options: &'a RenderOptions,
-    start: Instant,
-    spp: u32,
-    samples: u32,
-    error: Option<ErrorEstimate>,
-    rays: AtomicU64,
+/// Renders a scene blob.
+pub fn render(scene: &[u8], options: &RenderOptions, observer: &dyn Observer) -> Result<RenderResult, RenderError> {
+    let scene = Scene::from_bytes(scene)?;
+    let settings = settings(&scene, options)?;
+    let o = Options { settings, target: options.target, threads: options.threads };
+    let rendered = drive_scene(scene, &o, observer)?;
+    Ok(RenderResult { picture: picture(&rendered), stats: stats(&rendered), stopped_early: rendered.stopped_early })
 }
 
-impl<P: Profile + Sync, I: croupier::accel::Intersector + Sync> Run<'_, '_, '_, P, I> {
-    /// `true` if the observer stopped it.
-    fn all(&self, shards: &mut [Shard<'_>]) -> bool {
-        let stopped: Vec<bool> = shards.par_iter_mut().map(|s| self.one(s)).collect();
-        stopped.contains(&true)
-    }
+/// What [`render`] would take, without rendering.
+pub fn plan(scene: &[u8], options: &RenderOptions) -> Result<PlanSummary, RenderError> {
+    let scene = Scene::from_bytes(scene)?;
+    let plan = Plan::new(&settings(&scene, options)?)?;
+    Ok(PlanSummary {
+        profile: AnyProfile::smallest(scene.effects).name().into(),
+        shared_bytes: plan.session().size as u64,
+        shard_bytes: plan.shard().size as u64,
+        shards: options.shards,
+    })
+}
 
-    fn one(&self, shard: &mut Shard<'_>) -> bool {
-        let mut stopped = false;
-        loop {
-            let before = shard.counters().rays();
-            let progress = shard.step(self.session, Budget { rays: STEP_RAYS });
-            let worked = shard.counters().rays().saturating_sub(before);
-            let rays = self.rays.fetch_add(worked, Ordering::Relaxed) + worked;
-            self.observer.progress(&self.progress(rays));
-            if progress == Progress::Done {
-                return stopped;
-            }
-            if !stopped && self.observer.should_stop() {
-                shard.stop();
-                stopped = true;
-            }
+/// All layers that the film holds.
+fn picture(r: &Rendered) -> Picture {
+    const RGB: [&str; 3] = ["R", "G", "B"];
+    let mut picture = Picture::new(r.size[0] as usize, r.size[1] as usize);
+    picture.add3("", RGB, &r.image());
+    picture.add3("stderr", RGB, &r.stderr());
+    let per_sample = |p: &PixelStats| (p.rays as f64 / p.samples.max(1) as f64) as f32;
+    picture.add1("cost", "rays", &r.pixels.iter().map(per_sample).collect::<Vec<_>>());
+    picture.add1("samples", "N", &r.pixels.iter().map(|p| p.samples as f32).collect::<Vec<_>>());
+    if !r.aovs.is_empty() {
+        let per_hit = |a: &PixelAov, x: f64| (x / a.hits.max(1.0)) as f32;
+        let albedo: Vec<_> = r.aovs.iter().map(|a| a.albedo.map(|x| per_hit(a, x))).collect();
+        picture.add3("albedo", RGB, &albedo);
+        let normal: Vec<_> = r.aovs.iter().map(|a| a.normal.map(|x| per_hit(a, x))).collect();
+        picture.add3("normal", ["X", "Y", "Z"], &normal);
+        picture.add1("depth", "Z", &r.aovs.iter().map(|a| per_hit(a, a.depth)).collect::<Vec<_>>());
+        for (d, layer) in ["factor1", "factor2", "factor3", "factor4"].into_iter().enumerate() {
+            let mean = |a: &PixelAov| (a.factor[d] / a.vertices[d].max(1.0)) as f32;
+            picture.add1(layer, "s", &r.aovs.iter().map(mean).collect::<Vec<_>>());
         }
     }
-
-    fn progress(&self, rays: u64) -> RenderProgress {
-        let seconds = self.start.elapsed().as_secs_f64();
-        let finished = self.session.counters().rays();
-        // the share of this iteration, guessed from the rays that earlier ones took per sample
-        let expected = finished as f64 / f64::from(self.spp.max(1)) * f64::from(self.samples);
-        let share = if self.spp == 0 { 0.0 } else { (rays as f64 / expected.max(1.0)).min(1.0) };
-        let spp = f64::from(self.spp) + share * f64::from(self.samples);
-        let done = match self.options.target {
-            Target::Spp(n) => spp / f64::from(n.max(1)),
-            Target::Seconds(s) => seconds / s.max(1e-9),
-            Target::Rays(n) => (finished + rays) as f64 / n.max(1) as f64,
-            Target::Error(e) => self.error.map_or(0.0, |x| e / x.rel_mse.max(1e-30)),
-        };
-        RenderProgress { done: done.clamp(0.0, 1.0), seconds, spp: self.spp, error: self.error }
-    }
+    picture
 }
 
-/// Samples per pixel of the next iteration, 0 when the target is reached. With a target in samples it depends on nothing
-/// but the samples so far, so that the picture is a pure function of its inputs.
-fn next_iteration(target: Target, spp: u32, seconds: f64, counters: &Counters, error: Option<ErrorEstimate>) -> u32 {
-    let grow = spp.clamp(1, LARGEST_ITERATION);
-    let per_sample = |spent: f64| spent / f64::from(spp.max(1));
-    // at least one iteration, then only whole ones that fit
-    let fit = |left: f64, cost: f64| -> u32 {
-        if spp == 0 { 1 } else { ((left / cost.max(1e-12)).floor().max(0.0) as u32).min(grow) }
-    };
-    match target {
-        Target::Spp(n) => grow.min(n.saturating_sub(spp)),
-        Target::Seconds(s) => fit(s - seconds, per_sample(seconds)),
-        Target::Rays(n) => fit(n as f64 - counters.rays() as f64, per_sample(counters.rays() as f64)),
-        Target::Error(e) => match error {
-            None => 1,
-            // a few samples cannot judge their own error
-            Some(x) if x.rel_mse <= e && spp >= 4 => 0,
-            Some(x) => {
-                let needed = f64::from(spp) * (x.rel_mse / e.max(1e-30) - 1.0);
-                (needed.ceil().max(1.0) as u32).min(grow)
-            }
-        },
+fn stats(r: &Rendered) -> RenderStats {
+    let c = &r.counters;
+    let lanes = [("scatter", c.scatter), ("trace", c.trace), ("occlude", c.occlude), ("surface", c.surface)];
+    let counters = [
+        ("camera_rays", c.camera_rays),
+        ("scatter_rays", c.scatter_rays),
+        ("shadow_rays", c.shadow_rays),
+        ("vertex_samples", c.vertex_samples),
+        ("roulette_kills", c.roulette_kills),
+        ("splits", c.splits),
+        ("ring_capped", c.ring_capped),
+        ("budget_capped", c.budget_capped),
+        ("ring_peak", c.ring_peak),
+        ("non_finite", c.non_finite),
+    ];
+    RenderStats {
+        spp: c.camera_samples as f64 / (f64::from(r.size[0]) * f64::from(r.size[1])),
+        rays: c.rays(),
+        seconds: r.seconds,
+        mrays_per_s: r.mrays_per_s(),
+        relmse_estimate: (r.spp > 1).then_some(r.error.rel_mse),
+        relmse_interval: (r.spp > 1).then_some([r.error.low, r.error.high]),
+        lane_utilisation: lanes.iter().map(|(n, u)| (*n, u.share())).collect(),
+        counters: counters.into_iter().collect(),
     }
 }

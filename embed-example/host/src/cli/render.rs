@@ -3,7 +3,9 @@
 use super::progress::Rendering;
 use super::{Outcome, say, say_json, scene};
 use croupier_host::image::write_png;
-use croupier_host::render::{RenderOptions, RenderResult, RenderStats, Target, check_strategy, render};
+use croupier_host::render::{RenderOptions, RenderResult, RenderStats, Target, render};
+use croupier::Strategy;
+use croupier::rrs::ParseError;
 use croupier_host::tonemap::{Curve, tonemap};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -162,8 +164,8 @@ fn exr_path(text: &str) -> Result<PathBuf, String> {
     }
 }
 
-fn strategy(name: &str) -> Result<String, croupier_host::render::UnknownStrategy> {
-    check_strategy(name).map(|()| name.into())
+fn strategy(name: &str) -> Result<String, ParseError> {
+    Strategy::parse(name).map(|_| name.into())
 }
 
 fn size(text: &str) -> Result<[u32; 2], String> {
