@@ -159,7 +159,8 @@ fn points_are_uniform_on_the_triangle() {
     assert!(p > 1e-6, "p = {p}");
 }
 
-/// Killed by: light from the back, cos -> |cos|, `ng` ignored.
+/// Seen edge-on both the sampler and the density give up, at the same cosine. Killed by: light from the back, cos ->
+/// |cos|, `ng` ignored, MIN_COS dropped.
 #[test]
 fn the_back_is_dark() {
     let t = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
@@ -176,6 +177,18 @@ fn the_back_is_dark() {
         assert_eq!(area_radiance(&scene, zero, dir, ng, all).lane(3) == [1.0; 3], lit);
         let pdf = area_pdf(&scene, &PowerSelector(scene), at, UP, zero, dir, F32x8::ONE, all);
         assert_eq!(pdf.lane(3) > 0.0, lit);
+    }
+    // A squared distance that has lost bits is no density.
+    for (t, seen) in [(1e-20f32, false), (1.2e-19, true)] {
+        let down = Vec3x8::splat(0.0, 0.0, -1.0);
+        let pdf = area_pdf(&scene, &PowerSelector(scene), at, UP, zero, down, F32x8::splat(t), all);
+        assert_eq!(pdf.lane(3) > 0.0, seen, "t {t}");
+    }
+    for (cos, seen) in [(9e-7f32, false), (1.1e-6, true)] {
+        let pdf = area_pdf(&scene, &PowerSelector(scene), at, UP, zero, Vec3x8::splat(0.0, 1.0, -cos), F32x8::ONE, all);
+        assert_eq!(pdf.lane(3) > 0.0, seen, "cos {cos}");
+        let from = Vec3x8::splat(0.3, -1e6, 1e6 * cos);
+        assert_eq!(draw(&owner, from, &mut rng).valid.all(), seen, "cos {cos}");
     }
 }
 

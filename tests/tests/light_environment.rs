@@ -156,7 +156,7 @@ fn around(map: &Map, column: usize, row: usize) -> f64 {
 fn density_is_normalised_and_agrees_with_the_oracle() {
     let gauss = [0.5 - 0.5 / 3f64.sqrt(), 0.5 + 0.5 / 3f64.sqrt()];
     for case in cases().iter().filter(|c| c.name != "fine") {
-        let [w, h] = case.map.cells();
+        let [w, _] = case.map.cells();
         let probability = case.map.probabilities();
         let mut integral = 0.0;
         for (k, probability) in probability.iter().copied().enumerate() {

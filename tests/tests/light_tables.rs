@@ -111,7 +111,11 @@ fn map_tables_follow_the_integral_of_the_luminance() {
     let mut rng = Rng(12);
     for [w, h] in [[1usize, 2usize], [2, 2], [4, 3], [7, 6], [16, 9]] {
         let texels: Vec<[f32; 3]> = (0..w * h)
-            .map(|_| std::array::from_fn(|_| if rng.word() % 3 == 0 { 0.0 } else { rng.unit().powi(3) as f32 * 90.0 }))
+            .map(|_| {
+                std::array::from_fn(
+                    |_| if rng.word().is_multiple_of(3) { 0.0 } else { rng.unit().powi(3) as f32 * 90.0 },
+                )
+            })
             .collect();
         let map = Map::new(&texels, w, h);
         let tables = environment::map_tables(&texels, w as u32, h as u32);

@@ -48,8 +48,8 @@ fn look_up_agrees_with_the_oracle() {
         let u = F32x8::from_fn(|_| coordinate(&mut rng));
         let v = F32x8::from_fn(|_| coordinate(&mut rng));
         let got = lookup(&scene, U32x8::new(texture), [u, v], Mask8::all_lanes());
-        for i in 0..8 {
-            let k = texture[i] as usize;
+        for (i, k) in texture.into_iter().enumerate() {
+            let k = k as usize;
             let uv = [u.lane(i), v.lane(i)].map(f64::from);
             let [w, h] = SIZES[k].map(i64::from);
             let want = oracle::lookup(&plain[k], w, h, uv);
