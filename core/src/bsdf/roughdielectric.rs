@@ -55,11 +55,12 @@ impl RoughDielectric {
         Side { below, eta, inverse: below.select(self.eta, inverse), k: (eta - 1.0) * (eta + 1.0) }
     }
 
-    /// Density of the refracted direction given c, cos_t, D of its microfacet and wo.z + q(wo); without 1 - F.
+    /// Density of the refracted direction given c, cos_t, D of its microfacet and wo.z + q(wo).
     #[inline(always)]
     fn refraction_pdf(side: &Side, c: F32x8, cos_t: F32x8, d: F32x8, denominator: F32x8) -> F32x8 {
         let e = side.eta * cos_t;
-        c * d * 2.0 / denominator * (side.eta * e) * ((c + e) / side.k).sqr()
+        let visible = c * d * 2.0 / denominator;
+        fresnel::transmittance(c, cos_t, side.eta) * visible * (side.eta * e) * ((c + e) / side.k).sqr()
     }
 }
 
@@ -87,15 +88,17 @@ impl Bsdf<'_> for RoughDielectric {
         let h = Vec3x8::select(reflect, wo + wi, bent);
         let length = h.length();
         let c = reflect.select(length * 0.5, wo.dot(h) / length);
-        let i = fresnel::dielectric(c, side.eta);
+        // wi knows its own cosine; Snell's law applied to c would lose it near the critical angle
+        let cos_t = -(wi.dot(h) / length);
         let (d, denominator) = (self.ggx.d(h), self.ggx.denominator(wo));
 
         let pdf = reflect.select(
-            i.reflectance * d / (denominator * 2.0),
-            (1.0 - i.reflectance) * Self::refraction_pdf(&side, c, i.cos_t, d, denominator),
+            fresnel::dielectric(c, side.eta).reflectance * d / (denominator * 2.0),
+            Self::refraction_pdf(&side, c, cos_t, d, denominator),
         );
         let scale = reflect.select(F32x8::ONE, side.inverse * side.inverse);
-        let transmits = wi.z.lt(F32x8::ZERO) & h.z.gt(F32x8::ZERO) & i.reflectance.lt(F32x8::ONE);
+        // a facet that refracts is seen from its front by wo and from its back by wi
+        let transmits = wi.z.lt(F32x8::ZERO) & h.z.gt(F32x8::ZERO) & cos_t.gt(F32x8::ZERO);
         let valid = wo.z.gt(F32x8::ZERO) & c.gt(F32x8::splat(MIN_COS)) & (reflect | transmits.and_not(self.narrow));
         Eval8 { f: Vec3x8::grey(pdf * self.ggx.g1(wi) * scale), pdf }.zero_unless(valid)
     }
@@ -112,10 +115,8 @@ impl Bsdf<'_> for RoughDielectric {
         let wi = Vec3x8::select(reflect, mirrored_at(wo, m, c), through);
 
         let (d, denominator) = (self.ggx.d(m), self.ggx.denominator(wo));
-        let pdf = reflect.select(
-            i.reflectance * d / (denominator * 2.0),
-            (1.0 - i.reflectance) * Self::refraction_pdf(&side, c, i.cos_t, d, denominator),
-        );
+        let pdf = reflect
+            .select(i.reflectance * d / (denominator * 2.0), Self::refraction_pdf(&side, c, i.cos_t, d, denominator));
         let scale = reflect.select(F32x8::ONE, side.inverse * side.inverse);
         let delta = self.narrow.and_not(reflect);
         let leaves = reflect.select(wi.z, -wi.z).gt(F32x8::ZERO);

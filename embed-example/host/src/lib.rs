@@ -1,1 +1,3 @@
 //! Files, trees and threads around the croupier core.
+
+pub mod microfacet;
