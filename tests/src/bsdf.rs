@@ -165,7 +165,8 @@ impl Case {
 
     /// Index on the side of `w`.
     pub fn index(&self, w: V) -> f64 {
-        if w[2] > 0.0 || !self.two_sided() { 1.0 } else { self.eta() }
+        let interface = matches!(self.kind, MaterialKind::Dielectric | MaterialKind::RoughDielectric);
+        if w[2] < 0.0 && interface { self.eta() } else { 1.0 }
     }
 
     fn rho(&self) -> V {
@@ -326,15 +327,15 @@ impl Case {
         (wi[2] * wo[2] < 0.0).then_some((wi, jacobian))
     }
 
-    /// The normal of the half-vector coordinates (s, t) in the unit square, where GGX normals are uniform, and its
-    /// measure d m / (ds dt).
+    /// The normal of the half-vector coordinates (s, t) in the unit square, tan = alpha tan(pi s / 2), which spread GGX
+    /// normals evenly enough for quadrature at grazing angles, and its measure d m / (ds dt).
     pub fn facet(&self, s: f64, t: f64) -> (V, f64) {
-        let a2 = self.alpha() * self.alpha();
-        let tan2 = a2 * s / (1.0 - s);
-        let z = 1.0 / (1.0 + tan2).sqrt();
-        let r = (tan2).sqrt() * z;
-        let m = [r * (TAU * t).cos(), r * (TAU * t).sin(), z];
-        (m, 1.0 / (ggx_d(m, self.alpha()) * z))
+        let (alpha, stretched) = (self.alpha(), (s * PI / 2.0).tan());
+        let tan = alpha * stretched;
+        let z = 1.0 / (1.0 + tan * tan).sqrt();
+        let m = [tan * z * (TAU * t).cos(), tan * z * (TAU * t).sin(), z];
+        // d m = sin dtheta dphi, dtheta = z^2 dtan
+        (m, tan * z.powi(3) * alpha * (1.0 + stretched * stretched) * (PI / 2.0) * TAU)
     }
 
     /// The coordinates of [`Self::facet`] of the normal that takes `wo` to `wi`, and whether it reflects.
@@ -344,7 +345,7 @@ impl Case {
         let h = if h[2] < 0.0 { h.map(|x| -x) } else { h };
         let tan2 = (h[0] * h[0] + h[1] * h[1]) / (h[2] * h[2]);
         let t = h[1].atan2(h[0]) / TAU;
-        (tan2 / (tan2 + self.alpha().powi(2)), if t < 0.0 { t + 1.0 } else { t }, reflect)
+        ((tan2.sqrt() / self.alpha()).atan() * 2.0 / PI, if t < 0.0 { t + 1.0 } else { t }, reflect)
     }
 
     /// Integral over `wi` by quadrature: of f cos and of the density, delta lobes and the density of [`Self::narrow`]

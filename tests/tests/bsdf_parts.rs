@@ -1,6 +1,7 @@
 //! What the scattering models are made of: Fresnel terms, maps, bake-time tables; and the statistics that judge them.
 
-use croupier::bsdf::{fresnel, ggx::Ggx8, warp};
+use croupier::bsdf::fresnel::{self, Index8};
+use croupier::bsdf::{ggx::Ggx8, warp};
 use croupier::simd::{F32x8, Vec3x8};
 use croupier_host::microfacet;
 use croupier_tests::bsdf::*;
@@ -20,8 +21,8 @@ fn dielectric_fresnel() {
         let e = f64::from(eta);
         let critical = 1.0 - e * e;
         for j in 0..8192 {
-            let cos = F32x8::from_fn(|l| (j * 8 + l) as f32 / 65535.0);
-            let i = fresnel::dielectric(cos, F32x8::splat(eta));
+            let cos = F32x8::from_fn(|l| (j * 8 + l + 1) as f32 / 65536.0);
+            let i = fresnel::dielectric(cos, Index8::new(F32x8::splat(eta)));
             let t = fresnel::transmittance(cos, i.cos_t, F32x8::splat(eta));
             for l in 0..8 {
                 let (c, r) = (f64::from(cos.lane(l)), f64::from(i.reflectance.lane(l)));
@@ -33,10 +34,11 @@ fn dielectric_fresnel() {
                 assert!((f64::from(t.lane(l)) + r - 1.0).abs() < 1e-6, "eta {eta} cos {c}: R + T = 1 + {}", t.lane(l));
             }
         }
-        let grazing = fresnel::dielectric(F32x8::ZERO, F32x8::splat(eta));
+        let grazing = fresnel::dielectric(F32x8::ZERO, Index8::new(F32x8::splat(eta)));
         assert!((grazing.reflectance - 1.0).abs().lt(F32x8::splat(3e-7)).all(), "eta {eta}: F(0) = {grazing:?}");
     }
-    let matched = fresnel::dielectric(F32x8::new([0.0, 1e-45, 1e-30, 1e-6, 0.1, 0.5, 0.9, 1.0]), F32x8::ONE);
+    let matched =
+        fresnel::dielectric(F32x8::new([0.0, 1e-45, 1e-30, 1e-6, 0.1, 0.5, 0.9, 1.0]), Index8::new(F32x8::ONE));
     assert!(matched.reflectance.eq(F32x8::ZERO).all());
     println!(
         "Fresnel, absolute error: eta far from 1 {:.1e}, near {:.1e}, at critical angles {:.1e}",
@@ -60,7 +62,11 @@ fn conductor_fresnel() {
                 for l in 0..8 {
                     let c = f64::from(cos.lane(l));
                     let want = fresnel_conductor(c, f64::from(n), f64::from(k));
-                    worst = worst.max((f64::from(r.lane(l)) - want).abs());
+                    let error = (f64::from(r.lane(l)) - want).abs();
+                    if error > worst {
+                        println!("n {n} k {k} cos {c}: {} for {want}", r.lane(l));
+                    }
+                    worst = worst.max(error);
                     if k == 0.0 && n > 1.0 {
                         let same = fresnel_dielectric(c, 1.0, f64::from(n));
                         assert!((want - same).abs() < 1e-9, "the oracles disagree: n {n} cos {c}");
@@ -100,7 +106,7 @@ fn ggx_distribution() {
         }
         assert!(worst < 2e-6, "alpha {alpha}: D is off by {worst:.1e}");
         // tan = alpha t / (1 - t) flattens the lobe
-        let mass = tanh_sinh(0.0, 1.0, |t| {
+        let mass = midpoint(20_000, 0.0, 1.0, |t| {
             let tan = a * t / (1.0 - t);
             let c = 1.0 / (1.0 + tan * tan).sqrt();
             let h = Vec3x8::splat((tan * c) as f32, 0.0, c as f32);
@@ -252,7 +258,7 @@ fn statistics() {
     near(normal_tail(1.959_963_984_540_054), 0.025, 1e-12);
     near(normal_tail(-1.0), 0.841_344_746_068_542_9, 1e-12);
     near(normal_quantile_upper(1e-6), 4.753_424_308_822_899, 1e-9);
-    near(1.0 - (1.0 - sidak(1e-3, 50)).powi(50), 1e-3, 1e-15);
+    near(1.0 - (1.0 - sidak(1e-3, 50)).powi(50), 1e-3, 1e-12);
     assert!(equivalent(0.1, 0.01, 0.2, 1e-6) && !equivalent(0.1, 0.03, 0.2, 1e-6) && !equivalent(0.0, 1.0, 0.2, 0.05));
     near(midpoint(1000, 0.0, 1.0, |x| x * x), 1.0 / 3.0, 1e-6);
     near(tanh_sinh(0.0, 1.0, |x| 1.0 / x.sqrt()), 2.0, 1e-7);

@@ -60,7 +60,8 @@ impl Cells<'_> {
                 p[cell] += self.case.eval(wo, wi).pdf * (TAU / 2.0) / wi[2] / (ns * nt) as f64;
             }
         }
-        p[Self::COUNT - 1] = (1.0 - p.iter().sum::<f64>()).max(0.0);
+        // below 1e-5 quadrature cannot tell a loss from none
+        p[Self::COUNT - 1] = (1.0 - p.iter().sum::<f64>()).max(1e-5);
         p
     }
 }
@@ -233,15 +234,14 @@ fn switches_do_not_show() {
         let wo = [w[0], w[1], if below { -w[2] } else { w[2] }];
         let pairs = [
             (rough(1.000_099, 0.5), rough(1.000_101, 0.5)),
-            (rough(1.000_999, 0.01), rough(1.001_001, 0.01)),
+            (rough(1.001, 0.009_99), rough(1.001, 0.010_01)),
             (rough(1.5, 0.99e-4), rough(1.5, 1.01e-4)),
         ];
         for (a, b) in pairs {
-            assert!(!b.narrow() || a.alpha() == b.alpha(), "{}", b.name());
             let (x, y) = (mean_weight(&a, wo, 4096), mean_weight(&b, wo, 4096));
             assert!((x[0] - y[0]).abs() < 1e-4, "{} {wo:?}: {x:?}; {}: {y:?}", a.name(), b.name());
         }
     }
     assert!(rough(1.000_099, 0.5).narrow() && !rough(1.000_101, 0.5).narrow());
-    assert!(rough(1.000_999, 0.01).narrow() && !rough(1.001_001, 0.01).narrow());
+    assert!(rough(1.001, 0.009_99).narrow() && !rough(1.001, 0.010_01).narrow());
 }
