@@ -7,3 +7,6 @@ pub mod light_stats;
 pub mod texture_oracle;
 pub mod blob;
 pub mod walk;
+pub mod bsdf;
+pub mod quadrature;
+pub mod stats;

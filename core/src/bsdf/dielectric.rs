@@ -5,14 +5,15 @@
 //! |---|---|---|
 //! | `eta[0]` | int_ior / ext_ior; +z is the exterior | > 0 |
 
-use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, fresnel, mirrored};
+use super::fresnel::{self, Index8};
+use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, mirrored};
 use crate::scene::Scene;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
 /// Smooth dielectric interface.
 #[derive(Clone, Copy, Debug)]
 pub struct Dielectric {
-    eta: F32x8,
+    index: Index8,
 }
 
 impl Bsdf<'_> for Dielectric {
@@ -20,7 +21,7 @@ impl Bsdf<'_> for Dielectric {
 
     #[inline(always)]
     fn gather(scene: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
-        Self { eta: Materials8::new(scene, inputs, active).get(|m| m.eta[0]) }
+        Self { index: Index8::new(Materials8::new(scene, inputs, active).get(|m| m.eta[0])) }
     }
 
     #[inline(always)]
@@ -30,10 +31,9 @@ impl Bsdf<'_> for Dielectric {
 
     #[inline(always)]
     fn sample(&self, wo: Vec3x8, [_, _, u]: [F32x8; 3]) -> Sample8 {
-        let inverse = 1.0 / self.eta;
-        let outside = wo.z.gt(F32x8::ZERO);
-        let (eta, inverse) = (outside.select(self.eta, inverse), outside.select(inverse, self.eta));
-        let i = fresnel::dielectric(wo.z.abs(), eta);
+        let index = self.index.seen_from(wo.z.lt(F32x8::ZERO));
+        let inverse = index.inverse;
+        let i = fresnel::dielectric(wo.z.abs(), index);
         let reflect = u.lt(i.reflectance);
         let through = Vec3x8::new(-wo.x * inverse, -wo.y * inverse, -(i.cos_t.copysign(wo.z)));
         let wi = Vec3x8::select(reflect, mirrored(wo), through);

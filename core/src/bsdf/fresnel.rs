@@ -1,6 +1,36 @@
 //! Fresnel reflectance for unpolarised light, in forms that do not cancel.
 
-use croupier_simd::{F32x8, Vec3x8};
+use croupier_simd::{F32x8, Mask8, Vec3x8};
+
+/// Relative refractive index of an interface as seen from one side.
+#[derive(Clone, Copy, Debug)]
+pub struct Index8 {
+    /// Index behind over index before, > 0.
+    pub eta: F32x8,
+    /// 1 / eta.
+    pub inverse: F32x8,
+    /// eta^2 - 1.
+    pub k: F32x8,
+}
+
+impl Index8 {
+    /// From the side where it is `eta`.
+    #[inline(always)]
+    pub fn new(eta: F32x8) -> Self {
+        Self { eta, inverse: 1.0 / eta, k: (eta - 1.0) * (eta + 1.0) }
+    }
+
+    /// Turned around in the lanes of `behind`. k does not come from the rounded 1 / eta, whose distance from 1 may have
+    /// few bits left.
+    #[inline(always)]
+    pub fn seen_from(self, behind: Mask8) -> Self {
+        Self {
+            eta: behind.select(self.inverse, self.eta),
+            inverse: behind.select(self.eta, self.inverse),
+            k: behind.select(-(self.k * self.inverse * self.inverse), self.k),
+        }
+    }
+}
 
 /// Reflectance of a dielectric interface and where the transmitted ray goes.
 #[derive(Clone, Copy, Debug)]
@@ -11,16 +41,16 @@ pub struct Interface8 {
     pub cos_t: F32x8,
 }
 
-/// Interface seen at `cos` >= 0 from the normal; `eta` > 0 is the index behind over the index before it.
+/// Interface seen at `cos` >= 0 from the normal.
 ///
 /// With k = eta^2 - 1 and e = eta cos_t = sqrt(cos^2 + k): `r_s = -k / (cos + e)^2`,
 /// `r_p = k ((eta^2 + 1) cos^2 - 1) / (eta^2 cos + e)^2` (NUMERICS FRE-1: absolute error up to 1.3e-6 near eta = 1, where
 /// the textbook form is off by 0.2; up to 7e-5 within 1e-6 of the critical cos^2). Total internal reflection is
 /// `reflectance == 1`, decided here only: evaluation, density and sampling must all take it from this function (FRE-2).
 #[inline(always)]
-pub fn dielectric(cos: F32x8, eta: F32x8) -> Interface8 {
+pub fn dielectric(cos: F32x8, index: Index8) -> Interface8 {
+    let Index8 { eta, inverse, k } = index;
     let (c2, eta2) = (cos * cos, eta * eta);
-    let k = (eta - 1.0) * (eta + 1.0);
     let s = c2 + k;
     let e = s.safe_sqrt();
     let rs = k / (cos + e).sqr();
@@ -30,7 +60,16 @@ pub fn dielectric(cos: F32x8, eta: F32x8) -> Interface8 {
     let r = total.select(F32x8::ONE, r);
     // eta = 1 at cos = 0 is 0 / 0
     let r = k.eq(F32x8::ZERO).select(F32x8::ZERO, r);
-    Interface8 { reflectance: r, cos_t: e / eta }
+    Interface8 { reflectance: r, cos_t: e * inverse }
+}
+
+/// Transmitted fraction of the energy at an interface that meets the rays at `cos` and `cos_t`, both > 0: 1 - F as a sum
+/// of positive terms, `2 c e (1 / (c + e)^2 + eta^2 / (eta^2 c + e)^2)` with e = eta cos_t. It keeps its relative precision
+/// where almost nothing passes.
+#[inline(always)]
+pub fn transmittance(cos: F32x8, cos_t: F32x8, eta: F32x8) -> F32x8 {
+    let (eta2, e) = (eta * eta, eta * cos_t);
+    cos * e * 2.0 * (1.0 / (cos + e).sqr() + eta2 / (eta2 * cos + e).sqr())
 }
 
 /// Largest refractive index and extinction of a conductor that [`conductor`] tells apart: beyond it 4th powers overflow.

@@ -101,7 +101,7 @@ pub struct Inputs8 {
 
 /// One scattering model over eight lanes, `'s` the scene whose tables it may keep a reference to. Two-sidedness is the
 /// caller's: for two-sided materials the frame already faces `wo`.
-pub trait Bsdf<'s>: Copy {
+pub trait Bsdf<'s>: Copy + 's {
     /// Only delta lobes: no light sampling.
     const DELTA: bool;
 

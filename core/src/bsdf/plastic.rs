@@ -12,7 +12,8 @@
 //! from outside eta^2 (1 - Fdr). Let d be the mean of that over the channels: the coat is chosen with probability
 //! F / (F + d), and the albedo is known exactly.
 
-use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, fresnel, mirrored, warp};
+use super::fresnel::{self, Index8};
+use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, mirrored, warp};
 use crate::scene::Scene;
 use core::f32::consts::FRAC_1_PI;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
@@ -20,7 +21,7 @@ use croupier_simd::{F32x8, Mask8, Vec3x8};
 /// Smooth coat over a diffuse base.
 #[derive(Clone, Copy, Debug)]
 pub struct Plastic {
-    eta: F32x8,
+    index: Index8,
     base: Base8,
 }
 
@@ -55,7 +56,7 @@ impl Base8 {
 impl Plastic {
     #[inline(always)]
     fn fresnel(&self, cos: F32x8) -> F32x8 {
-        fresnel::dielectric(cos, self.eta).reflectance
+        fresnel::dielectric(cos, self.index).reflectance
     }
 }
 
@@ -65,7 +66,7 @@ impl Bsdf<'_> for Plastic {
     #[inline(always)]
     fn gather(scene: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
         let m = Materials8::new(scene, inputs, active);
-        Self { eta: m.get(|m| m.eta[0]), base: Base8::gather(&m, inputs, active) }
+        Self { index: Index8::new(m.get(|m| m.eta[0])), base: Base8::gather(&m, inputs, active) }
     }
 
     #[inline(always)]

@@ -18,8 +18,9 @@
 //! lobe is narrower than 1e-4 rad and is a *delta* lobe to the caller: still sampled through m, so nothing is lost or
 //! bent, but evaluation and density do not know it. The reflected lobe stays rough.
 
+use super::fresnel::{self, Index8};
 use super::ggx::{Ggx8, MIN_COS, mirrored_at};
-use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, flip, fresnel};
+use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, flip};
 use crate::scene::Scene;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
@@ -31,35 +32,19 @@ const MIN_WIDTH: f32 = 1e-5;
 /// GGX dielectric interface.
 #[derive(Clone, Copy, Debug)]
 pub struct RoughDielectric {
-    eta: F32x8,
+    index: Index8,
     ggx: Ggx8,
     /// Lanes whose transmitted lobe is a delta lobe.
     narrow: Mask8,
 }
 
-/// The interface as seen from one side.
-#[derive(Clone, Copy)]
-struct Side {
-    below: Mask8,
-    eta: F32x8,
-    inverse: F32x8,
-    k: F32x8,
-}
-
 impl RoughDielectric {
+    /// Density of the refracted direction given c, cos_t, D of its microfacet and wo.z + q(wo).
     #[inline(always)]
-    fn side(&self, wo: Vec3x8) -> Side {
-        let below = wo.z.lt(F32x8::ZERO);
-        let inverse = 1.0 / self.eta;
-        let eta = below.select(inverse, self.eta);
-        Side { below, eta, inverse: below.select(self.eta, inverse), k: (eta - 1.0) * (eta + 1.0) }
-    }
-
-    /// Density of the refracted direction given c, cos_t, D of its microfacet and wo.z + q(wo); without 1 - F.
-    #[inline(always)]
-    fn refraction_pdf(side: &Side, c: F32x8, cos_t: F32x8, d: F32x8, denominator: F32x8) -> F32x8 {
-        let e = side.eta * cos_t;
-        c * d * 2.0 / denominator * (side.eta * e) * ((c + e) / side.k).sqr()
+    fn refraction_pdf(index: &Index8, c: F32x8, cos_t: F32x8, d: F32x8, denominator: F32x8) -> F32x8 {
+        let e = index.eta * cos_t;
+        let visible = c * d * 2.0 / denominator;
+        fresnel::transmittance(c, cos_t, index.eta) * visible * (index.eta * e) * ((c + e) / index.k).sqr()
     }
 }
 
@@ -72,56 +57,58 @@ impl Bsdf<'_> for RoughDielectric {
         let (eta, ggx) = (m.get(|m| m.eta[0]), Ggx8::new(m.get(|m| m.alpha)));
         let contrast = (eta - 1.0).abs();
         let narrow = contrast.lt(F32x8::splat(MIN_CONTRAST)) | (ggx.alpha() * contrast).lt(F32x8::splat(MIN_WIDTH));
-        Self { eta, ggx, narrow }
+        Self { index: Index8::new(eta), ggx, narrow }
     }
 
     #[inline(always)]
     fn eval(&self, wo: Vec3x8, wi: Vec3x8) -> Eval8 {
-        let side = self.side(wo);
-        let (wo, wi) = (flip(wo, side.below), flip(wi, side.below));
+        let below = wo.z.lt(F32x8::ZERO);
+        let index = self.index.seen_from(below);
+        let (wo, wi) = (flip(wo, below), flip(wi, below));
         let reflect = wi.z.gt(F32x8::ZERO);
 
         // h of any length along the microfacet normal; on transmission it is wo + eta wi, turned to the side of wo
-        let bent = wo + wi * side.eta;
-        let bent = Vec3x8::select(side.k.gt(F32x8::ZERO), -bent, bent);
+        let bent = wo + wi * index.eta;
+        let bent = Vec3x8::select(index.k.gt(F32x8::ZERO), -bent, bent);
         let h = Vec3x8::select(reflect, wo + wi, bent);
         let length = h.length();
         let c = reflect.select(length * 0.5, wo.dot(h) / length);
-        let i = fresnel::dielectric(c, side.eta);
+        // wi knows its own cosine; Snell's law applied to c would lose it near the critical angle
+        let cos_t = -(wi.dot(h) / length);
         let (d, denominator) = (self.ggx.d(h), self.ggx.denominator(wo));
 
         let pdf = reflect.select(
-            i.reflectance * d / (denominator * 2.0),
-            (1.0 - i.reflectance) * Self::refraction_pdf(&side, c, i.cos_t, d, denominator),
+            fresnel::dielectric(c, index).reflectance * d / (denominator * 2.0),
+            Self::refraction_pdf(&index, c, cos_t, d, denominator),
         );
-        let scale = reflect.select(F32x8::ONE, side.inverse * side.inverse);
-        let transmits = wi.z.lt(F32x8::ZERO) & h.z.gt(F32x8::ZERO) & i.reflectance.lt(F32x8::ONE);
+        let scale = reflect.select(F32x8::ONE, index.inverse * index.inverse);
+        // a facet that refracts is seen from its front by wo and from its back by wi
+        let transmits = wi.z.lt(F32x8::ZERO) & h.z.gt(F32x8::ZERO) & cos_t.gt(F32x8::ZERO);
         let valid = wo.z.gt(F32x8::ZERO) & c.gt(F32x8::splat(MIN_COS)) & (reflect | transmits.and_not(self.narrow));
         Eval8 { f: Vec3x8::grey(pdf * self.ggx.g1(wi) * scale), pdf }.zero_unless(valid)
     }
 
     #[inline(always)]
     fn sample(&self, wo: Vec3x8, [u, v, lobe]: [F32x8; 3]) -> Sample8 {
-        let side = self.side(wo);
-        let wo = flip(wo, side.below);
+        let below = wo.z.lt(F32x8::ZERO);
+        let index = self.index.seen_from(below);
+        let wo = flip(wo, below);
         let m = self.ggx.sample_visible(wo, u, v);
         let c = wo.dot(m);
-        let i = fresnel::dielectric(c, side.eta);
+        let i = fresnel::dielectric(c, index);
         let reflect = lobe.lt(i.reflectance);
-        let through = -(wo * side.inverse) - m * (side.k * side.inverse / (c + side.eta * i.cos_t));
+        let through = -(wo * index.inverse) - m * (index.k * index.inverse / (c + index.eta * i.cos_t));
         let wi = Vec3x8::select(reflect, mirrored_at(wo, m, c), through);
 
         let (d, denominator) = (self.ggx.d(m), self.ggx.denominator(wo));
-        let pdf = reflect.select(
-            i.reflectance * d / (denominator * 2.0),
-            (1.0 - i.reflectance) * Self::refraction_pdf(&side, c, i.cos_t, d, denominator),
-        );
-        let scale = reflect.select(F32x8::ONE, side.inverse * side.inverse);
+        let pdf = reflect
+            .select(i.reflectance * d / (denominator * 2.0), Self::refraction_pdf(&index, c, i.cos_t, d, denominator));
+        let scale = reflect.select(F32x8::ONE, index.inverse * index.inverse);
         let delta = self.narrow.and_not(reflect);
         let leaves = reflect.select(wi.z, -wi.z).gt(F32x8::ZERO);
         let valid = wo.z.gt(F32x8::ZERO) & c.gt(F32x8::splat(MIN_COS)) & leaves;
         Sample8 {
-            wi: flip(wi, side.below),
+            wi: flip(wi, below),
             weight: Vec3x8::grey(self.ggx.g1(wi) * scale),
             pdf: delta.select(F32x8::ZERO, pdf),
             delta,

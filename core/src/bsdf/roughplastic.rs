@@ -13,9 +13,10 @@
 //! cosine with d / (s + d): s = 1 - T(wo), not below 2^-10 lest an odd table starve a narrow highlight, and d the mean
 //! over the channels of `T(wo) (1 - R) rho / (1 - rho R)`. Value and density are those of the mixture.
 
+use super::fresnel::{self, Index8};
 use super::ggx::{Ggx8, Reflection8, mirrored_at};
 use super::plastic::Base8;
-use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, fresnel, warp};
+use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, warp};
 use crate::scene::Scene;
 use core::f32::consts::FRAC_1_PI;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
@@ -29,7 +30,7 @@ const IDLE_TABLE: &[f32; TABLE_SIZE] = &[0.5; TABLE_SIZE];
 /// GGX coat over a diffuse base.
 #[derive(Clone, Copy, Debug)]
 pub struct RoughPlastic<'s> {
-    eta: F32x8,
+    index: Index8,
     base: Base8,
     ggx: Ggx8,
     table: [&'s [f32; TABLE_SIZE]; 8],
@@ -62,7 +63,7 @@ impl RoughPlastic<'_> {
     #[inline(always)]
     fn mixture(&self, wi: Vec3x8, coat: &Reflection8, (t, s, d): (F32x8, F32x8, F32x8)) -> Eval8 {
         let cosine = wi.z * FRAC_1_PI;
-        let specular = fresnel::dielectric(coat.cos, self.eta).reflectance * coat.g1 * coat.pdf;
+        let specular = fresnel::dielectric(coat.cos, self.index).reflectance * coat.g1 * coat.pdf;
         let f = self.base.r * (t * self.transmittance(wi.z) * self.base.inv_eta2 * cosine) + Vec3x8::grey(specular);
         Eval8 { f, pdf: (s * coat.pdf + d * cosine) / (s + d) }.zero_unless(coat.valid)
     }
@@ -79,7 +80,7 @@ impl<'s> Bsdf<'s> for RoughPlastic<'s> {
             rest.and_then(|t| t.first_chunk()).unwrap_or(IDLE_TABLE)
         });
         Self {
-            eta: m.get(|m| m.eta[0]),
+            index: Index8::new(m.get(|m| m.eta[0])),
             base: Base8::gather(&m, inputs, active),
             ggx: Ggx8::new(m.get(|m| m.alpha)),
             table,

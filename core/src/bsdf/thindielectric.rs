@@ -5,14 +5,15 @@
 //! |---|---|---|
 //! | `eta[0]` | int_ior / ext_ior | > 0 |
 
-use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, fresnel, mirrored};
+use super::fresnel::{self, Index8};
+use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, mirrored};
 use crate::scene::Scene;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
 /// Thin dielectric sheet.
 #[derive(Clone, Copy, Debug)]
 pub struct ThinDielectric {
-    eta: F32x8,
+    index: Index8,
 }
 
 impl Bsdf<'_> for ThinDielectric {
@@ -20,7 +21,7 @@ impl Bsdf<'_> for ThinDielectric {
 
     #[inline(always)]
     fn gather(scene: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
-        Self { eta: Materials8::new(scene, inputs, active).get(|m| m.eta[0]) }
+        Self { index: Index8::new(Materials8::new(scene, inputs, active).get(|m| m.eta[0])) }
     }
 
     #[inline(always)]
@@ -31,7 +32,7 @@ impl Bsdf<'_> for ThinDielectric {
     #[inline(always)]
     fn sample(&self, wo: Vec3x8, [_, _, u]: [F32x8; 3]) -> Sample8 {
         let cos = wo.z.abs();
-        let r = fresnel::dielectric(cos, self.eta).reflectance;
+        let r = fresnel::dielectric(cos, self.index).reflectance;
         let reflect = u.lt((r + r) / (1.0 + r));
         Sample8::delta(Vec3x8::select(reflect, mirrored(wo), -wo), Vec3x8::ONE, cos.gt(F32x8::ZERO))
     }

@@ -8,3 +8,4 @@ pub mod flip;
 pub mod image;
 pub mod render;
 pub mod tonemap;
+pub mod microfacet;
