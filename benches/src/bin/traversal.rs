@@ -30,6 +30,9 @@ struct Args {
     /// Primary rays across.
     #[arg(long, default_value_t = 640)]
     width: usize,
+    /// Only sets whose name contains this.
+    #[arg(long, default_value = "")]
+    only: String,
     /// One line of JSON instead of the table.
     #[arg(long)]
     json: bool,
@@ -333,6 +336,7 @@ fn main() {
         Set::new("shadow 2", true, &s2),
     ];
 
+    let sets: Vec<Set> = sets.into_iter().filter(|s| s.name.contains(&args.only)).collect();
     for set in &sets {
         let answers: Vec<(usize, f64)> = (0..3).map(|k| kernels.run(k, set)).collect();
         for (k, a) in answers.iter().enumerate().skip(1) {

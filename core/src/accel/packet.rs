@@ -13,7 +13,7 @@
 //! 2. A leaf costs one test per triangle (eight rays each) or one per ray (eight triangles each), whichever is fewer.
 //! 3. Entries are kept per ray on the stack, infinite in rays that miss: a popped entry knows its rays.
 
-use super::setup::{AXES, Setup};
+use super::setup::{AXES, Setup, each};
 use super::single::{Hit1, Keys, Ray1, STACK, test_leaf, walk};
 use super::triangle::{Line, intersect};
 use crate::scene::blob::{CHILD_INDEX, LEAF_BIT, Leaf, NONE, Node};
@@ -69,20 +69,21 @@ pub(super) fn walk_packet<const ANY: bool>(
 ) -> u32 {
     let lead = group.trailing_zeros() as usize & 7;
     let members = Mask8::from_bits(group);
-    let axes = AXES[s.axis(lead)].map(|k| k.min(2));
-    let get = |a: &[[f32; 8]; 3]| axes.map(|k| F32x8::new(a[k]));
+    let axes = AXES[s.axis(lead)];
+    let axes = each(|k| axes[k].min(2));
+    let get = |a: &[[f32; 8]; 3]| each(|k| F32x8::new(a[axes[k]]));
     // lanes outside the group may hold anything: give them the values of the first ray
-    let only = |a: &[[f32; 8]; 3]| axes.map(|k| members.select(F32x8::new(a[k]), F32x8::splat(a[k][lead])));
+    let only = |a: &[[f32; 8]; 3]| each(|k| members.select(F32x8::new(a[axes[k]]), F32x8::splat(a[axes[k]][lead])));
     let (near, far, ninv) = (only(&s.near), only(&s.far), only(&s.ninv));
-    let line = Line { o: get(&s.o), d: get(&s.d), shear: s.shear.map(F32x8::new), tmin: F32x8::new(s.tmin) };
-    let negative = axes.map(|k| s.negative[k] >> lead & 1 == 1);
-    let low = [0, 1, 2].map(|k| axes[k] + if negative[k] { 3 } else { 0 });
-    let high = [0, 1, 2].map(|k| axes[k] + if negative[k] { 0 } else { 3 });
+    let line = Line { o: get(&s.o), d: get(&s.d), shear: each(|k| F32x8::new(s.shear[k])), tmin: F32x8::new(s.tmin) };
+    let negative = each(|k| s.negative[axes[k]] >> lead & 1 == 1);
+    let low = each(|k| axes[k] + if negative[k] { 3 } else { 0 });
+    let high = each(|k| axes[k] + if negative[k] { 0 } else { 3 });
     // the earliest entry has the origin farthest along the direction, the latest exit the one farthest behind
     let bound = |v: F32x8, largest: bool| F32x8::splat(if largest { v.max_lane() } else { v.min_lane() });
-    let in_o = [0, 1, 2].map(|k| bound(near[k], !negative[k]));
-    let out_o = [0, 1, 2].map(|k| bound(far[k], negative[k]));
-    let (inv_lo, inv_hi) = (ninv.map(|v| bound(v, false)), ninv.map(|v| bound(v, true)));
+    let in_o = each(|k| bound(near[k], !negative[k]));
+    let out_o = each(|k| bound(far[k], negative[k]));
+    let (inv_lo, inv_hi) = (each(|k| bound(ninv[k], false)), each(|k| bound(ninv[k], true)));
     let earliest = F32x8::splat(members.select(line.tmin, F32x8::INFINITY).min_lane());
 
     let never = F32x8::splat(f32::NEG_INFINITY);
@@ -161,8 +162,8 @@ pub(super) fn walk_packet<const ANY: bool>(
                 }
             } else {
                 for i in 0..triangles as usize {
-                    let vertex = |v: usize| axes.map(|k| F32x8::splat(leaf.p[v + k][i]));
-                    let Some(c) = intersect(&[vertex(0), vertex(3), vertex(6)], &line, b.t) else { continue };
+                    let p = each(|v| each(|k| F32x8::splat(leaf.p[3 * v + axes[k]][i])));
+                    let Some(c) = intersect(&p, &line, b.t) else { continue };
                     // rays that miss the leaf's box miss its triangles, also when they go alone
                     let mask = c.mask & entry.le(b.t);
                     if ANY {

@@ -19,6 +19,12 @@ use croupier_simd::{F32x8, Mask8, Vec3x8};
 /// Axes after the major axis, cyclic, so that the shear keeps orientation.
 pub(super) const AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
 
+/// `[f(0), f(1), f(2)]`; `array::map` would go through memory.
+#[inline(always)]
+pub(super) fn each<T>(f: impl Fn(usize) -> T) -> [T; 3] {
+    [f(0), f(1), f(2)]
+}
+
 /// Constants of eight rays, `[axis][lane]`.
 pub(super) struct Setup {
     /// Origins.
@@ -104,9 +110,8 @@ impl Setup {
     #[inline(always)]
     pub fn alike(&self, i: usize, of: u32) -> u32 {
         let same = |bits: u32| bits ^ (bits >> i & 1).wrapping_sub(1);
-        let [x, y, z] = self.negative.map(same);
-        let [p, q] = self.major.map(same);
-        of & x & y & z & p & q
+        let octant = same(self.negative[0]) & same(self.negative[1]) & same(self.negative[2]);
+        of & octant & same(self.major[0]) & same(self.major[1])
     }
 }
 

@@ -14,7 +14,7 @@
 //! 4. A hit counts from `max(t, entry of its leaf)`: so a subtree entered after the closest hit holds nothing closer, not
 //!    even by rounding, and the result does not depend on the order of visits. Equal t: the lower triangle index.
 
-use super::setup::{AXES, Setup};
+use super::setup::{AXES, Setup, each};
 use super::triangle::{Line, intersect};
 use crate::scene::blob::{CHILD_INDEX, LEAF_BIT, Leaf, NONE, Node};
 use croupier_simd::F32x8;
@@ -44,19 +44,19 @@ impl Ray1 {
     pub fn new(s: &Setup, i: usize) -> Self {
         let i = i & 7;
         let axes = AXES[s.axis(i)];
-        let get = |a: &[[f32; 8]; 3]| axes.map(|k| F32x8::splat(a[k][i]));
+        let get = |a: &[[f32; 8]; 3]| each(|k| F32x8::splat(a[axes[k]][i]));
         Self {
             line: Line {
                 o: get(&s.o),
                 d: get(&s.d),
-                shear: [0, 1, 2].map(|k| F32x8::splat(s.shear[k][i])),
+                shear: each(|k| F32x8::splat(s.shear[k][i])),
                 tmin: F32x8::splat(s.tmin[i]),
             },
             near: get(&s.near),
             far: get(&s.far),
             ninv: get(&s.ninv),
             axes,
-            rows: axes.map(|k| k + 3 * (s.negative[k] >> i & 1) as usize),
+            rows: each(|k| axes[k] + 3 * (s.negative[axes[k]] >> i & 1) as usize),
         }
     }
 }
@@ -80,7 +80,7 @@ impl Hit1 {
 /// The triangles of a leaf as the rows of `axes`.
 #[inline(always)]
 fn rows(leaf: &Leaf, axes: [usize; 3]) -> [[F32x8; 3]; 3] {
-    [0, 3, 6].map(|v| axes.map(|k| F32x8::new(leaf.p[v + k.min(2)])))
+    each(|v| each(|k| F32x8::new(leaf.p[3 * v + axes[k].min(2)])))
 }
 
 /// Tests `r` against the triangles of `leaf`, which it enters at `entry`. Closest: improves `best`, returns whether it did.
@@ -113,8 +113,8 @@ pub(super) fn walk<const ANY: bool>(
     base: usize,
 ) -> bool {
     // the limits let the compiler drop bounds checks
-    let [n0, n1, n2] = r.rows.map(|k| k.min(5));
-    let [f0, f1, f2] = [0, 1, 2].map(|k| (2 * r.axes[k].min(2) + 3 - r.rows[k]).min(5));
+    let [n0, n1, n2] = each(|k| r.rows[k].min(5));
+    let [f0, f1, f2] = each(|k| (2 * r.axes[k].min(2) + 3 - r.rows[k]).min(5));
     let mut limit = F32x8::splat(best.t);
     let mut sp = base;
     let mut current = u64::from(entry.to_bits()) << 32 | u64::from(root);
@@ -130,7 +130,9 @@ pub(super) fn walk<const ANY: bool>(
                 let mut m = enter.le(leave).bits();
                 if m != 0 {
                     let enter = enter.to_array();
-                    let key = |i: usize| u64::from(enter[i].to_bits()) << 32 | u64::from(node.child[i]);
+                    // any hit reads no entries
+                    let bits = |i: usize| if ANY { 0 } else { u64::from(enter[i].to_bits()) << 32 };
+                    let key = |i: usize| bits(i) | u64::from(node.child[i]);
                     let mut next = || {
                         let i = m.trailing_zeros() as usize & 7;
                         m &= m - 1;
