@@ -1,1 +1,3 @@
 //! Scalar f64 oracles and statistics shared by the integration tests.
+
+pub mod math;
