@@ -10,3 +10,4 @@ pub mod walk;
 pub mod bsdf;
 pub mod quadrature;
 pub mod stats;
+pub mod math;
