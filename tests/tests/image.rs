@@ -188,9 +188,14 @@ fn errors_name_the_file() {
     named(sample(4, 4).write_exr(&dir.path().join("no/such/folder.exr")).unwrap_err(), "folder.exr");
     named(Picture::new(0, 0).write_exr(&dir.path().join("empty.exr")).unwrap_err(), "empty.exr");
     named(write_png(&dir.path().join("none.png"), 0, 0, &[]).unwrap_err(), "none.png");
-    named(write_png(&dir.path().join("short.png"), 2, 2, &[[0; 3]; 3]).unwrap_err(), "short.png");
+    // This one fails half-way through the file.
+    let short = dir.path().join("short.png");
+    write_png(&short, 2, 2, &[[9; 3]; 4]).unwrap();
+    let before = fs::read(&short).unwrap();
+    named(write_png(&short, 2, 2, &[[0; 3]; 3]).unwrap_err(), "short.png");
+    assert_eq!(fs::read(&short).unwrap(), before, "a failed write must leave the old file");
     let left: Vec<_> = fs::read_dir(dir.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
-    assert_eq!(left.len(), 4, "failed writes leave files behind: {left:?}");
+    assert_eq!(left.len(), 5, "failed writes leave files behind: {left:?}");
 }
 
 /// Damaged files give errors or other numbers, never a panic: dies with any unchecked size in the reader.

@@ -5,7 +5,7 @@
 //! | [`relmse`], [`mse`] | how large is the error, noise and bias together |
 //! | [`Bias`] | is there an error that noise does not explain, and where |
 //! | [`Ratio`] | is the whole image too bright or too dark |
-//! | [`flip`](crate::flip) | how large is the difference to the eye |
+//! | [`crate::flip`] | how large is the difference to the eye |
 //! | [`equivalence`] | is a difference shown to be *small* (not just: not shown to be large) |
 
 mod bias;
@@ -158,7 +158,7 @@ impl Estimate {
         let channels = [0, 1, 2];
         ImageMean {
             mean: channels.map(|c| sum(&self.mean, c) / n),
-            stderr: channels.map(|c| sum(&self.variance, c).sqrt() / n),
+            stderr: Some(channels.map(|c| sum(&self.variance, c).sqrt() / n)),
         }
     }
 }
@@ -168,8 +168,8 @@ impl Estimate {
 pub struct ImageMean {
     /// Per channel.
     pub mean: [f64; 3],
-    /// Standard error of each.
-    pub stderr: [f64; 3],
+    /// Standard error of each, if known.
+    pub stderr: Option<[f64; 3]>,
 }
 
 /// Brightness of an image relative to its reference.
@@ -177,17 +177,18 @@ pub struct ImageMean {
 pub struct Ratio {
     /// Sum of all pixels and channels over that of the reference.
     pub value: f64,
-    /// Its standard error to first order. The three channels of a pixel see the same paths: they are taken as wholly
-    /// correlated, which can only overstate it.
-    pub stderr: f64,
+    /// Its standard error to first order, if those of both are known. The three channels of a pixel see the same paths:
+    /// they are taken as wholly correlated, which can only overstate it.
+    pub stderr: Option<f64>,
 }
 
 /// The ratio of two image means.
 pub fn ratio(image: &ImageMean, reference: &ImageMean) -> Ratio {
     let [a, b] = [image, reference].map(|m| m.mean.iter().sum::<f64>());
-    let [sa, sb] = [image, reference].map(|m| m.stderr.iter().sum::<f64>());
+    let [sa, sb] = [image, reference].map(|m| m.stderr.map(|s| s.iter().sum::<f64>()));
     let value = a / b;
-    Ratio { value, stderr: ((sa / b).powi(2) + (value * sb / b).powi(2)).sqrt() }
+    let stderr = sa.zip(sb).map(|(sa, sb)| ((sa / b).powi(2) + (value * sb / b).powi(2)).sqrt());
+    Ratio { value, stderr }
 }
 
 /// What is compared.
@@ -267,7 +268,8 @@ pub fn compare(inputs: &Inputs<'_>, options: &CompareOptions) -> Result<Comparis
     let exact = Estimate::from_image(reference, reference_stderr)?;
     let test = |robust| bias(&estimate, &exact, &BiasOptions { robust, ..options.bias });
     let known = images.len() > 1 || stderr.is_some();
-    let (image_mean, reference_mean) = (estimate.image_mean(), exact.image_mean());
+    let (mut image_mean, reference_mean) = (estimate.image_mean(), exact.image_mean());
+    image_mean.stderr = image_mean.stderr.filter(|_| known);
     Ok(Comparison {
         width: reference.width,
         height: reference.height,

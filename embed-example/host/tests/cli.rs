@@ -117,7 +117,7 @@ fn runtime_errors_are_one_line_and_status_1() {
 
     fails(dir, &["info", "missing.crp"], &["cannot read missing.crp", "No such file"]);
     fails(dir, &["info", "folder.crp"], &["folder.crp", "not a file"]);
-    fails(dir, &["info", "empty.crp"], &["empty.crp", "empty"]);
+    fails(dir, &["info", "empty.crp"], &["empty.crp", "the file is empty"]);
     fails(dir, &["info", "garbage.crp"], &["garbage.crp", "CROUPIER"]);
     fails(dir, &["render", "garbage.crp"], &["garbage.crp", "CROUPIER"]);
     fails(dir, &["render", "cut.crp"], &["cut.crp", &good.len().to_string()]);

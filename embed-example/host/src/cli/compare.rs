@@ -1,7 +1,7 @@
 //! `croupier compare`
 
 use super::{Outcome, say, say_json};
-use croupier_host::compare::{Bias, CompareOptions, Comparison, Inputs, compare};
+use croupier_host::compare::{Bias, CompareOptions, Comparison, ImageMean, Inputs, compare};
 use croupier_host::image::{ImageError, Picture, Rgb};
 use std::path::{Path, PathBuf};
 
@@ -81,9 +81,10 @@ fn print(c: &Comparison, noisy_reference: bool) -> Outcome {
     line("relMSE", format!("{:.6e} ({} worst pixels left out{noise})", c.relmse, c.relmse_discarded_pixels))?;
     line("MSE", format!("{:.6e}", c.mse))?;
     line("FLIP", format!("{:.6}", c.flip))?;
-    line("mean", format!("{:?}, standard error {:?}", c.image_mean.mean, c.image_mean.stderr))?;
-    line("mean reference", format!("{:?}, standard error {:?}", c.reference_mean.mean, c.reference_mean.stderr))?;
-    line("ratio", format!("{:.6} +- {:.6}", c.ratio.value, c.ratio.stderr))?;
+    line("mean", mean(&c.image_mean))?;
+    line("mean reference", mean(&c.reference_mean))?;
+    let spread = c.ratio.stderr.map_or(String::new(), |s| format!(" +- {s:.6}"));
+    line("ratio", format!("{:.6}{spread}", c.ratio.value))?;
     if c.nonfinite_pixels > 0 {
         line("not finite", format!("{} pixels", c.nonfinite_pixels))?;
     }
@@ -104,6 +105,12 @@ fn print(c: &Comparison, noisy_reference: bool) -> Outcome {
         n if n > LISTED => line("", format!("... and {} more", n - LISTED)),
         _ => Ok(()),
     }
+}
+
+fn mean(m: &ImageMean) -> String {
+    let [r, g, b] = m.mean;
+    let spread = m.stderr.map_or(String::new(), |[r, g, b]| format!(" +- {r:.2e} {g:.2e} {b:.2e}"));
+    format!("{r:.6} {g:.6} {b:.6}{spread}")
 }
 
 fn scores(b: &Bias) -> String {
