@@ -1,0 +1,173 @@
+//! From a [`SceneDescription`] to a scene blob.
+//!
+//! | file | bakes |
+//! |---|---|
+//! | `geometry` | vertices, triangles, which of them are degenerate |
+//! | `materials` | materials, their tables, textures |
+//! | `lights` | lights, their choice, the environment |
+//! | `camera` | the camera |
+//!
+//! Degenerate triangles are dropped and counted; everything else that cannot be rendered is a [`BakeError`] that names
+//! it. What is written passes [`croupier::Scene::from_bytes`].
+
+mod camera;
+mod error;
+mod geometry;
+mod lights;
+mod materials;
+
+pub use error::BakeError;
+
+use crate::blob::{AlignedBytes, BlobWriter};
+use crate::bvh;
+use crate::description::SceneDescription;
+use croupier::scene::blob::{SceneInfo, SectionKind};
+
+/// Choices of baking.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BakeOptions {
+    /// How long to look for a good tree.
+    pub effort: bvh::Effort,
+}
+
+/// Parts of baking, in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Checks vertices and triangles.
+    Geometry,
+    /// Builds the tree.
+    Tree,
+    /// Tabulates materials, collects textures.
+    Materials,
+    /// Builds the tables of the lights and the environment.
+    Lights,
+    /// Writes the blob.
+    Write,
+}
+
+impl Stage {
+    /// Every stage, in order.
+    pub const ALL: &'static [Self] = &[Self::Geometry, Self::Tree, Self::Materials, Self::Lights, Self::Write];
+
+    /// What to show while it lasts.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Geometry => "checking geometry",
+            Self::Tree => "building the tree",
+            Self::Materials => "tabulating materials",
+            Self::Lights => "tabulating lights",
+            Self::Write => "writing the scene",
+        }
+    }
+}
+
+/// What baking found and made.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct BakeReport {
+    /// Triangles in the blob.
+    pub triangles: u32,
+    /// Triangles without area, left out.
+    pub dropped_degenerate: u32,
+    /// Those of them that would have been lights.
+    pub dropped_lights: u32,
+    /// Smooth triangles with vertex normals that are zero or opposite, shaded flat.
+    pub flattened: u32,
+    /// Lights, the environment included.
+    pub lights: u32,
+    /// Nodes of the tree.
+    pub nodes: u32,
+    /// Leaves of the tree.
+    pub leaves: u32,
+    /// Nodes on the tree's longest path.
+    pub depth: u32,
+    /// Bytes of the sections, in blob order.
+    pub sections: Vec<(SectionKind, u64)>,
+    /// Bytes of the blob.
+    pub bytes: u64,
+}
+
+/// A scene blob and how it came about.
+#[derive(Clone, Debug)]
+pub struct Baked {
+    /// The blob, at an address that suits [`croupier::Scene::from_bytes`] best.
+    pub bytes: AlignedBytes,
+    /// What baking found and made.
+    pub report: BakeReport,
+}
+
+/// Bakes a scene. `progress` hears of each stage at its start (0) and end (1).
+///
+/// The blob depends on the description and the options only: the same input gives the same bytes.
+pub fn bake(
+    scene: &SceneDescription,
+    options: &BakeOptions,
+    progress: impl Fn(Stage, f32),
+) -> Result<Baked, BakeError> {
+    let staged = |stage| {
+        progress(stage, 0.0);
+        stage
+    };
+    let done = |stage| progress(stage, 1.0);
+
+    let stage = staged(Stage::Geometry);
+    let camera = camera::bake(&scene.camera)?;
+    let emission = lights::emission_of_materials(scene)?;
+    let mut geometry = geometry::bake(scene, &emission)?;
+    done(stage);
+
+    let stage = staged(Stage::Tree);
+    let tree = bvh::build(&geometry.corners, options.effort);
+    done(stage);
+
+    let stage = staged(Stage::Materials);
+    let materials = materials::bake(scene, &emission)?;
+    done(stage);
+
+    let stage = staged(Stage::Lights);
+    let lights = lights::bake(scene, &emission, &mut geometry)?;
+    done(stage);
+
+    let stage = staged(Stage::Write);
+    let [bounds_min, bounds_max] = geometry.bounds;
+    let info = SceneInfo {
+        bounds_min,
+        bounds_max,
+        max_depth: scene.max_depth,
+        dropped_triangles: geometry.dropped_degenerate,
+    };
+    let mut report = BakeReport {
+        triangles: geometry.triangles.len() as u32,
+        dropped_degenerate: geometry.dropped_degenerate,
+        dropped_lights: geometry.dropped_lights,
+        flattened: geometry.flattened,
+        lights: lights.lights.len() as u32,
+        nodes: tree.nodes.len() as u32,
+        leaves: tree.leaves.len() as u32,
+        depth: tree.depth,
+        ..BakeReport::default()
+    };
+    let (info, camera) = ([info], [camera]);
+    let mut writer = BlobWriter::default();
+    writer
+        .section(SectionKind::Info, &info)
+        .section(SectionKind::Cameras, &camera)
+        .section(SectionKind::Nodes, &tree.nodes)
+        .section(SectionKind::Leaves, &tree.leaves)
+        .section(SectionKind::Triangles, &geometry.triangles)
+        .section(SectionKind::Vertices, &geometry.vertices)
+        .section(SectionKind::Materials, &materials.materials)
+        .section(SectionKind::Textures, &materials.textures)
+        .section(SectionKind::Texels, &materials.texels)
+        .section(SectionKind::Tables, &materials.tables)
+        .section(SectionKind::Names, &materials.names)
+        .section(SectionKind::Lights, &lights.lights)
+        .section(SectionKind::LightAlias, &lights.alias)
+        .section(SectionKind::Environment, &lights.environment)
+        .section(SectionKind::EnvTexels, &lights.env_texels)
+        .section(SectionKind::EnvAlias, &lights.env_alias);
+    report.sections = writer.sizes();
+    let bytes = writer.finish();
+    report.bytes = bytes.len() as u64;
+    done(stage);
+    Ok(Baked { bytes, report })
+}

@@ -1,0 +1,120 @@
+//! Vertices and triangles.
+
+use super::BakeError;
+use crate::description::{SceneDescription, Triangle, Vertex};
+use crate::limits::MAX_COORDINATE;
+use croupier::scene::blob::{self, NONE, TRIANGLE_SMOOTH};
+use glam::{DVec3, Vec3};
+
+/// Geometry of the blob, and what else baking needs of it.
+pub(super) struct Geometry {
+    pub vertices: Vec<blob::Vertex>,
+    pub triangles: Vec<blob::Triangle>,
+    /// Corner positions of `triangles`.
+    pub corners: Vec<[[f32; 3]; 3]>,
+    /// Smallest and largest coordinates of `corners`; zeros without triangles.
+    pub bounds: [[f32; 3]; 2],
+    pub dropped_degenerate: u32,
+    pub dropped_lights: u32,
+    pub flattened: u32,
+}
+
+/// Area of a triangle, the way lights state it: in `f64`, rounded once.
+pub(super) fn area(corners: &[[f32; 3]; 3]) -> f32 {
+    let [a, b, c] = corners.map(|p| Vec3::from_array(p).as_dvec3());
+    (0.5 * (b - a).cross(c - a).length()) as f32
+}
+
+/// Unit normal; zero if it has no direction.
+fn unit(n: [f32; 3]) -> [f32; 3] {
+    Vec3::from_array(n).as_dvec3().normalize_or_zero().as_vec3().to_array()
+}
+
+/// Interpolating these normals never meets a vertex or an edge where they vanish.
+fn interpolates(normals: [[f32; 3]; 3]) -> bool {
+    let [a, b, c] = normals.map(|n| Vec3::from_array(n).as_dvec3());
+    let apart = |a: DVec3, b: DVec3| a.dot(b) > -1.0 + 1e-6;
+    [a, b, c].iter().all(|n| *n != DVec3::ZERO) && apart(a, b) && apart(b, c) && apart(c, a)
+}
+
+/// `emission` tells which materials emit.
+pub(super) fn bake(scene: &SceneDescription, emission: &[[f32; 3]]) -> Result<Geometry, BakeError> {
+    for (what, count) in [("vertices", scene.vertices.len()), ("triangles", scene.triangles.len())] {
+        if count >= 1 << 27 {
+            return Err(BakeError::TooMany { what, count });
+        }
+    }
+    let mut g = Geometry {
+        vertices: scene.vertices.iter().map(|v| blob::Vertex { p: v.position, n: unit(v.normal), uv: v.uv }).collect(),
+        triangles: Vec::with_capacity(scene.triangles.len()),
+        corners: Vec::with_capacity(scene.triangles.len()),
+        bounds: [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]],
+        dropped_degenerate: 0,
+        dropped_lights: 0,
+        flattened: 0,
+    };
+    for (i, v) in (0..).zip(&scene.vertices) {
+        check(scene, i, v)?;
+    }
+    for (i, t) in (0..).zip(&scene.triangles) {
+        let index = |what, found, count| {
+            Err(BakeError::Index { object: scene.object_of(i).into(), triangle: i, what, found, count })
+        };
+        if let Some(v) = t.vertices.iter().find(|v| **v as usize >= scene.vertices.len()) {
+            return index("vertex", *v, scene.vertices.len());
+        }
+        let Some(emission) = emission.get(t.material as usize) else {
+            return index("material", t.material, scene.materials.len());
+        };
+        g.add(t, *emission != [0.0; 3]);
+    }
+    if g.triangles.is_empty() {
+        g.bounds = [[0.0; 3]; 2];
+    }
+    Ok(g)
+}
+
+/// Every number is finite and not too large.
+fn check(scene: &SceneDescription, index: u32, v: &Vertex) -> Result<(), BakeError> {
+    let fine = |x: &f32| x.abs() <= MAX_COORDINATE;
+    let kinds: [(&'static str, &[f32]); 3] =
+        [("position", &v.position), ("normal", &v.normal), ("texture coordinate", &v.uv)];
+    for (what, numbers) in kinds {
+        if let Some(found) = numbers.iter().find(|x| !fine(x)) {
+            let user = scene.triangles.iter().position(|t| t.vertices.contains(&index));
+            let object = user.map_or("unused", |t| scene.object_of(t as u32)).into();
+            return Err(BakeError::Vertex { object, vertex: index, what, found: *found });
+        }
+    }
+    Ok(())
+}
+
+impl Geometry {
+    /// Takes a triangle over unless it has no area that `f32` can hold: no ray hits it, and it has no normal.
+    fn add(&mut self, t: &Triangle, emits: bool) {
+        let corner = t.vertices.map(|v| self.vertices[v as usize]);
+        let corners = corner.map(|v| v.p);
+        if area(&corners) < f32::MIN_POSITIVE {
+            self.dropped_degenerate += 1;
+            self.dropped_lights += u32::from(emits);
+            return;
+        }
+        let smooth = t.smooth && interpolates(corner.map(|v| v.n));
+        self.flattened += u32::from(t.smooth && !smooth);
+        for p in corners {
+            for (i, x) in p.into_iter().enumerate() {
+                self.bounds[0][i] = self.bounds[0][i].min(x);
+                self.bounds[1][i] = self.bounds[1][i].max(x);
+            }
+        }
+        let flags = if smooth { TRIANGLE_SMOOTH } else { 0 };
+        self.triangles.push(blob::Triangle { vertex: t.vertices, material: t.material, light: NONE, flags });
+        self.corners.push(corners);
+    }
+
+    /// Half the diagonal of the bounds.
+    pub fn radius(&self) -> f64 {
+        let [lo, hi] = self.bounds.map(|p| Vec3::from_array(p).as_dvec3());
+        (hi - lo).length() / 2.0
+    }
+}

@@ -1,0 +1,163 @@
+//! Lights, the table that chooses among them, the environment.
+
+use super::BakeError;
+use super::geometry::{Geometry, area};
+use crate::description::{Emitter, Environment, SceneDescription};
+use crate::limits::{MAX_COORDINATE, MAX_EMISSION, MAX_SIDE};
+use crate::{alias, environment};
+use bytemuck::Zeroable;
+use croupier::scene::blob::{self, Alias, EnvironmentKind, Light, LightKind};
+use glam::Vec3;
+
+/// Sections of the blob.
+#[derive(Default)]
+pub(super) struct Lights {
+    pub lights: Vec<Light>,
+    pub alias: Vec<Alias>,
+    /// None or one.
+    pub environment: Vec<blob::Environment>,
+    pub env_texels: Vec<[f32; 3]>,
+    pub env_alias: Vec<Alias>,
+}
+
+/// Emission is from 0 to what the blob allows.
+fn check_emission(emitter: &str, what: &'static str, rgb: [f32; 3]) -> Result<(), BakeError> {
+    let bad = rgb.into_iter().find(|x| !(0.0..=MAX_EMISSION).contains(x));
+    bad.map_or(Ok(()), |found| Err(BakeError::Emitter { emitter: emitter.into(), what, found }))
+}
+
+/// Radiance per material; black ones do not emit.
+pub(super) fn emission_of_materials(scene: &SceneDescription) -> Result<Vec<[f32; 3]>, BakeError> {
+    let mut emission: Vec<Option<[f32; 3]>> = vec![None; scene.materials.len()];
+    for (i, e) in scene.emitters.iter().enumerate() {
+        let Emitter::Area { material: found, radiance } = *e else { continue };
+        let emitter = format!("emitter {i} (area)");
+        match emission.get_mut(found as usize) {
+            None => return Err(BakeError::EmitterMaterial { emitter, found, repeated: false }),
+            Some(Some(_)) => return Err(BakeError::EmitterMaterial { emitter, found, repeated: true }),
+            Some(slot) => *slot = Some(radiance),
+        }
+        check_emission(&emitter, "radiance", radiance)?;
+    }
+    Ok(emission.into_iter().map(Option::unwrap_or_default).collect())
+}
+
+/// Makes the lights and tells the triangles theirs.
+pub(super) fn bake(
+    scene: &SceneDescription,
+    emission: &[[f32; 3]],
+    geometry: &mut Geometry,
+) -> Result<Lights, BakeError> {
+    let mut out = Lights::default();
+    for (i, (t, corners)) in (0..).zip(geometry.triangles.iter_mut().zip(&geometry.corners)) {
+        let emission = emission[t.material as usize];
+        if emission != [0.0; 3] {
+            t.light = out.lights.len() as u32;
+            let kind = LightKind::Area as u32;
+            out.lights.push(Light { kind, triangle: i, area: area(corners), emission, ..Zeroable::zeroed() });
+        }
+    }
+    for (i, e) in scene.emitters.iter().enumerate() {
+        out.lights.extend(delta_light(i, e)?);
+    }
+    if let Some(e) = &scene.environment {
+        out.surround(e)?;
+    }
+    let weights = environment::light_weights(&out.lights, out.environment.first(), &out.env_texels, geometry.radius());
+    out.alias = alias::build(&weights);
+    for (light, entry) in out.lights.iter_mut().zip(&out.alias) {
+        light.probability = entry.probability;
+    }
+    Ok(out)
+}
+
+/// A point or directional light; black ones are left out.
+fn delta_light(index: usize, e: &Emitter) -> Result<Option<Light>, BakeError> {
+    let (kind, vector, emission) = match *e {
+        Emitter::Area { .. } => return Ok(None),
+        Emitter::Point { position, intensity } => {
+            let emitter = format!("emitter {index} (point)");
+            check_emission(&emitter, "intensity", intensity)?;
+            if let Some(found) = position.into_iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE) {
+                return Err(BakeError::Emitter { emitter, what: "position", found });
+            }
+            (LightKind::Point, position, intensity)
+        }
+        Emitter::Directional { direction, irradiance } => {
+            let emitter = format!("emitter {index} (directional)");
+            check_emission(&emitter, "irradiance", irradiance)?;
+            let travels = Vec3::from_array(direction).as_dvec3();
+            let Some(travels) = travels.try_normalize() else {
+                let found = travels.length() as f32;
+                return Err(BakeError::Emitter { emitter, what: "length of the direction", found });
+            };
+            (LightKind::Directional, (-travels).as_vec3().to_array(), irradiance)
+        }
+    };
+    let light = Light { kind: kind as u32, vector, emission, ..Zeroable::zeroed() };
+    Ok((emission != [0.0; 3]).then_some(light))
+}
+
+impl Lights {
+    /// Adds the environment and its light; a black one is as good as none.
+    fn surround(&mut self, e: &Environment) -> Result<(), BakeError> {
+        let light = self.lights.len() as u32;
+        let baked = match e {
+            Environment::Constant { radiance } => {
+                check_emission("environment", "radiance", *radiance)?;
+                let kind = EnvironmentKind::Constant as u32;
+                let to_local = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+                blob::Environment { kind, light, radiance: *radiance, to_local, ..Zeroable::zeroed() }
+            }
+            Environment::Map { width, height, texels, scale, to_world } => {
+                let size = [*width, *height];
+                let fits = (1..=MAX_SIDE).contains(width) && (2..=MAX_SIDE).contains(height);
+                if !fits || u64::from(*width) * u64::from(*height) != texels.len() as u64 {
+                    return Err(BakeError::Image { image: "environment map".into(), size, texels: texels.len() });
+                }
+                check_emission("environment", "scale", *scale)?;
+                for t in texels {
+                    let scaled = std::array::from_fn(|c| t[c] * scale[c]);
+                    check_emission("environment map", "texel", *t)?;
+                    check_emission("environment map", "texel times scale", scaled)?;
+                }
+                if texels.iter().all(|t| *t == [0.0; 3]) {
+                    return Ok(());
+                }
+                self.env_alias = environment::map_tables(texels, *width, *height);
+                self.env_texels.clone_from(texels);
+                blob::Environment {
+                    kind: EnvironmentKind::Map as u32,
+                    light,
+                    width: *width,
+                    height: *height,
+                    to_local: inverse(to_world)?,
+                    radiance: *scale,
+                }
+            }
+        };
+        if baked.radiance == [0.0; 3] {
+            (self.env_alias, self.env_texels) = Default::default();
+            return Ok(());
+        }
+        self.environment.push(baked);
+        self.lights.push(Light { kind: LightKind::Environment as u32, ..Zeroable::zeroed() });
+        Ok(())
+    }
+}
+
+/// Inverse of a rotation (a reflection will do): its transpose.
+fn inverse(m: &[[f32; 3]; 3]) -> Result<[[f32; 3]; 3], BakeError> {
+    let column = |j: usize| [m[0][j], m[1][j], m[2][j]];
+    let columns = [column(0), column(1), column(2)];
+    for (i, a) in columns.iter().enumerate() {
+        for (j, b) in columns.iter().enumerate() {
+            let dot: f32 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+            let wanted = if i == j { 1.0 } else { 0.0 };
+            if (dot - wanted).abs() > 1e-3 || dot.is_nan() {
+                return Err(BakeError::Rotation);
+            }
+        }
+    }
+    Ok(columns)
+}

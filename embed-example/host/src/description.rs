@@ -1,0 +1,298 @@
+//! A scene as plain values, before baking: what files are read into, and what a host program can fill in by hand.
+//!
+//! World space is right-handed; lengths have one unit throughout. Colours are linear Rec. 709. A triangle's front is
+//! the side from which its vertices run counter-clockwise.
+//!
+//! ```
+//! use croupier_host::bake::{BakeOptions, bake};
+//! use croupier_host::description::*;
+//!
+//! let mut scene = SceneDescription::default();
+//! let grey = scene.add_material("grey", Model::Diffuse { reflectance: Reflectance::Constant([0.5; 3]) });
+//! let floor = [[-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0], [-1.0, 0.0, -1.0]];
+//! let floor = floor.map(|position| Vertex { position, ..Vertex::default() });
+//! scene.add_mesh("floor", grey, &floor, &[[0, 1, 2], [0, 2, 3]], false);
+//! scene.emitters.push(Emitter::Point { position: [0.0, 2.0, 0.0], intensity: [1.0; 3] });
+//! scene.camera = Camera { origin: [0.0, 1.0, 4.0], target: [0.0, 0.0, 0.0], ..Camera::default() };
+//!
+//! let baked = bake(&scene, &BakeOptions::default(), |_stage, _fraction| {})?;
+//! assert_eq!(baked.report.triangles, 2);
+//! assert!(croupier::Scene::from_bytes(&baked.bytes).is_ok());
+//! # Ok::<(), croupier_host::bake::BakeError>(())
+//! ```
+
+/// A whole scene. Indices are positions in the `Vec`s here.
+#[derive(Clone, Debug)]
+pub struct SceneDescription {
+    /// Vertices of all objects.
+    pub vertices: Vec<Vertex>,
+    /// Triangles of all objects.
+    pub triangles: Vec<Triangle>,
+    /// Names of runs of triangles, by ascending `first_triangle`; only error messages read them.
+    pub objects: Vec<Object>,
+    /// Materials.
+    pub materials: Vec<Material>,
+    /// Decoded textures.
+    pub textures: Vec<Texture>,
+    /// Lights, except the one at infinity all around.
+    pub emitters: Vec<Emitter>,
+    /// What surrounds the scene; `None` is black.
+    pub environment: Option<Environment>,
+    /// Camera.
+    pub camera: Camera,
+    /// Path segments from the camera: 1 sees emitters only, 2 adds direct light.
+    pub max_depth: u32,
+}
+
+/// One corner.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Vertex {
+    /// World space.
+    pub position: [f32; 3],
+    /// World space, of any length; read where the triangle is smooth.
+    pub normal: [f32; 3],
+    /// Texture coordinates, v upwards.
+    pub uv: [f32; 2],
+}
+
+/// One triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Triangle {
+    /// Vertex indices, counter-clockwise seen from the front.
+    pub vertices: [u32; 3],
+    /// Material index.
+    pub material: u32,
+    /// Shade with the interpolated vertex normals.
+    pub smooth: bool,
+}
+
+/// A named run of triangles, up to the next object's first.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Object {
+    /// Name.
+    pub name: String,
+    /// First triangle.
+    pub first_triangle: u32,
+}
+
+/// A named material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Name; messages and scene files know it by this.
+    pub name: String,
+    /// Both sides behave like the front; else the back of an opaque surface is black. Ignored by dielectrics and `Null`.
+    pub two_sided: bool,
+    /// How it scatters.
+    pub model: Model,
+}
+
+/// Diffuse albedo, or scale of a specular reflection; 0 to 1 per channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reflectance {
+    /// The same everywhere.
+    Constant([f32; 3]),
+    /// Index of a texture.
+    Texture(u32),
+}
+
+/// Scattering models; `alpha` is the GGX width, 1e-4 to 1, `int_ior` the refractive index behind the front side,
+/// `ext_ior` the one before it. See the core's `bsdf` for the formulas.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(missing_docs, reason = "the fields are described above, their formulas in the core")]
+pub enum Model {
+    /// Lambertian.
+    Diffuse { reflectance: Reflectance },
+    /// Perfect mirror without Fresnel.
+    Mirror { reflectance: Reflectance },
+    /// Smooth conductor; `eta` and `k` are the complex refractive index per channel.
+    Conductor { eta: [f32; 3], k: [f32; 3], reflectance: Reflectance },
+    /// GGX conductor.
+    RoughConductor { eta: [f32; 3], k: [f32; 3], reflectance: Reflectance, alpha: f32 },
+    /// Smooth interface.
+    Dielectric { int_ior: f32, ext_ior: f32 },
+    /// GGX interface.
+    RoughDielectric { int_ior: f32, ext_ior: f32, alpha: f32 },
+    /// Thin sheet.
+    ThinDielectric { int_ior: f32, ext_ior: f32 },
+    /// Smooth coat over a diffuse base.
+    Plastic { reflectance: Reflectance, int_ior: f32, ext_ior: f32 },
+    /// GGX coat over a diffuse base.
+    RoughPlastic { reflectance: Reflectance, int_ior: f32, ext_ior: f32, alpha: f32 },
+    /// Index-matched boundary: light passes unchanged.
+    Null,
+}
+
+/// An 8-bit image, sRGB-encoded; bilinear, repeated.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Texture {
+    /// Where it came from, for messages.
+    pub name: String,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width * height` texels r, g, b, a; row 0 is the top (v = 1). Alpha is not used.
+    pub texels: Vec<[u8; 4]>,
+}
+
+/// A light of the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Emitter {
+    /// Every triangle of the material emits from its front; it also keeps its scattering.
+    Area {
+        /// Material index; at most one emitter for each.
+        material: u32,
+        /// Radiance.
+        radiance: [f32; 3],
+    },
+    /// Isotropic point.
+    Point {
+        /// World space.
+        position: [f32; 3],
+        /// Radiant intensity, power per steradian.
+        intensity: [f32; 3],
+    },
+    /// Parallel light from infinity.
+    Directional {
+        /// Direction in which the light travels, of any length but 0.
+        direction: [f32; 3],
+        /// Irradiance of a surface that faces the light.
+        irradiance: [f32; 3],
+    },
+}
+
+/// Light from infinity, all around.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Environment {
+    /// The same radiance from all directions.
+    Constant {
+        /// Radiance.
+        radiance: [f32; 3],
+    },
+    /// Latitude-longitude map. For a direction d in map space, u = atan2(d.x, -d.z) / 2 pi wrapped to [0, 1),
+    /// v = acos(d.y) / pi; column position u * width - 0.5 (wraps), row position v * (height - 1).
+    Map {
+        /// Columns.
+        width: u32,
+        /// Rows, at least 2; row 0 is exactly +Y, the last exactly -Y.
+        height: u32,
+        /// Radiance, row 0 first.
+        texels: Vec<[f32; 3]>,
+        /// Factor on every texel.
+        scale: [f32; 3],
+        /// Rows of the rotation map space -> world.
+        to_world: [[f32; 3]; 3],
+    },
+}
+
+/// Pinhole or thin-lens camera; image right is cross(target - origin, up).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// World space. `f64` here and in `target`, so that their difference is precise far from the origin.
+    pub origin: [f64; 3],
+    /// A point on the viewing axis.
+    pub target: [f64; 3],
+    /// Upwards, not parallel to the axis.
+    pub up: [f64; 3],
+    /// Full vertical field of view, degrees, between 0 and 180.
+    pub vfov_deg: f64,
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// `None` is a pinhole.
+    pub lens: Option<ThinLens>,
+}
+
+/// A lens that blurs what is out of focus.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ThinLens {
+    /// Radius.
+    pub radius: f32,
+    /// Distance of the plane in focus along the viewing axis.
+    pub focus_distance: f32,
+}
+
+impl Default for Camera {
+    /// At (0, 0, 5), looking at the origin, 45 degrees, 512 x 512 pixels.
+    fn default() -> Self {
+        Self {
+            origin: [0.0, 0.0, 5.0],
+            target: [0.0; 3],
+            up: [0.0, 1.0, 0.0],
+            vfov_deg: 45.0,
+            size: [512, 512],
+            lens: None,
+        }
+    }
+}
+
+impl Model {
+    /// Its reflectance, if it has one.
+    pub fn reflectance(&self) -> Option<Reflectance> {
+        match *self {
+            Self::Diffuse { reflectance }
+            | Self::Mirror { reflectance }
+            | Self::Conductor { reflectance, .. }
+            | Self::RoughConductor { reflectance, .. }
+            | Self::Plastic { reflectance, .. }
+            | Self::RoughPlastic { reflectance, .. } => Some(reflectance),
+            Self::Dielectric { .. } | Self::RoughDielectric { .. } | Self::ThinDielectric { .. } | Self::Null => None,
+        }
+    }
+
+    /// Does light pass it?
+    pub fn is_transmissive(&self) -> bool {
+        matches!(
+            self,
+            Self::Dielectric { .. } | Self::RoughDielectric { .. } | Self::ThinDielectric { .. } | Self::Null
+        )
+    }
+}
+
+impl Default for SceneDescription {
+    /// Nothing, in black, seen by the default camera; at most 40 path segments.
+    fn default() -> Self {
+        Self {
+            vertices: Vec::new(),
+            triangles: Vec::new(),
+            objects: Vec::new(),
+            materials: Vec::new(),
+            textures: Vec::new(),
+            emitters: Vec::new(),
+            environment: None,
+            camera: Camera::default(),
+            max_depth: 40,
+        }
+    }
+}
+
+impl SceneDescription {
+    /// Adds a material, two-sided unless light passes it; returns its index.
+    pub fn add_material(&mut self, name: &str, model: Model) -> u32 {
+        self.materials.push(Material { name: name.into(), two_sided: !model.is_transmissive(), model });
+        (self.materials.len() - 1) as u32
+    }
+
+    /// Adds an object: `triangles` index `vertices`, both of this object alone.
+    pub fn add_mesh(&mut self, name: &str, material: u32, vertices: &[Vertex], triangles: &[[u32; 3]], smooth: bool) {
+        let base = self.vertices.len() as u32;
+        self.objects.push(Object { name: name.into(), first_triangle: self.triangles.len() as u32 });
+        self.vertices.extend_from_slice(vertices);
+        let shifted = triangles.iter().map(|t| t.map(|v| v.saturating_add(base)));
+        self.triangles.extend(shifted.map(|vertices| Triangle { vertices, material, smooth }));
+    }
+
+    /// Name of the object that a triangle belongs to.
+    pub fn object_of(&self, triangle: u32) -> &str {
+        let next = self.objects.partition_point(|o| o.first_triangle <= triangle);
+        next.checked_sub(1).map_or("unnamed object", |i| &self.objects[i].name)
+    }
+
+    /// Smallest and largest coordinates of the vertices that triangles use; `None` without triangles.
+    pub fn bounds(&self) -> Option<[[f32; 3]; 2]> {
+        let corners = self.triangles.iter().flat_map(|t| t.vertices);
+        let points = corners.filter_map(|v| self.vertices.get(v as usize)).map(|v| v.position);
+        points.map(|p| [p, p]).reduce(|[lo, hi], [p, _]| {
+            [std::array::from_fn(|i| lo[i].min(p[i])), std::array::from_fn(|i| hi[i].max(p[i]))]
+        })
+    }
+}

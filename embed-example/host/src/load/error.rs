@@ -1,0 +1,103 @@
+//! Why a scene cannot be loaded.
+
+use std::path::{Path, PathBuf};
+use std::{error, fmt, io};
+
+/// What is wrong with a scene's files; every text names the file, and where in it.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum LoadError {
+    /// A file cannot be read.
+    Read {
+        /// File.
+        path: PathBuf,
+        /// File that names it.
+        referrer: Option<PathBuf>,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// Neither a folder nor a file that scenes come in.
+    Unknown {
+        /// File.
+        path: PathBuf,
+    },
+    /// A line of a text file.
+    Line {
+        /// File.
+        path: PathBuf,
+        /// Line, from 1.
+        line: u32,
+        /// Why.
+        what: String,
+    },
+    /// A value of a JSON file, or its syntax.
+    Json {
+        /// File.
+        path: PathBuf,
+        /// Path of the value, such as `materials.Glass.int_ior`; of a syntax error line and column.
+        at: String,
+        /// Why.
+        what: String,
+    },
+    /// An image that cannot be decoded.
+    Image {
+        /// File.
+        path: PathBuf,
+        /// File that names it.
+        referrer: PathBuf,
+        /// Why.
+        what: String,
+    },
+    /// The scene needs participating media.
+    Medium {
+        /// File.
+        path: PathBuf,
+        /// Position in `media`.
+        index: usize,
+        /// Its name.
+        name: String,
+    },
+}
+
+impl LoadError {
+    pub(super) fn line(path: &Path, line: u32, what: impl Into<String>) -> Self {
+        Self::Line { path: path.into(), line, what: what.into() }
+    }
+
+    pub(super) fn image(path: &Path, referrer: &Path, what: String) -> Self {
+        Self::Image { path: path.into(), referrer: referrer.into(), what }
+    }
+}
+
+impl fmt::Display for LoadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Read { path, referrer: None, source } => write!(f, "cannot read {}: {source}", path.display()),
+            Self::Read { path, referrer: Some(by), source } => {
+                write!(f, "cannot read {}, which {} names: {source}", path.display(), by.display())
+            }
+            Self::Unknown { path } => {
+                write!(f, "{} is neither a folder with a scene.json nor an .obj file", path.display())
+            }
+            Self::Line { path, line, what } => write!(f, "{}:{line}: {what}", path.display()),
+            Self::Json { path, at, what } => write!(f, "{}: {at}: {what}", path.display()),
+            Self::Image { path, referrer, what } => {
+                write!(f, "cannot use the image {}, which {} names: {what}", path.display(), referrer.display())
+            }
+            Self::Medium { path, index, name } => write!(
+                f,
+                "{}: media[{index}]: medium `{name}`: participating media are not supported yet",
+                path.display()
+            ),
+        }
+    }
+}
+
+impl error::Error for LoadError {
+    fn source(&self) -> Option<&(dyn error::Error + 'static)> {
+        match self {
+            Self::Read { source, .. } => Some(source),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! Files into a [`SceneDescription`].
+//!
+//! | file | reads |
+//! |---|---|
+//! | `scene_json` | a folder with `scene.json` (the format of `scenes/FORMAT.md`) |
+//! | `obj` | geometry: Wavefront OBJ |
+//! | `mtl` | materials of a bare OBJ |
+//! | `images` | PNG textures, EXR environment maps |
+//! | `json` | values of a JSON document that know their place |
+
+mod error;
+mod images;
+mod json;
+mod mtl;
+mod obj;
+mod scene_json;
+
+pub use error::LoadError;
+
+use crate::description::{Environment, SceneDescription, Texture};
+use std::collections::HashMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What loading found, beside the scene.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LoadReport {
+    /// Files read.
+    pub files: Vec<PathBuf>,
+    /// Faces of more than three corners, split into fans.
+    pub polygons: u32,
+    /// Points and lines, left out.
+    pub skipped_elements: u32,
+    /// What was assumed or ignored, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Loads a folder with a `scene.json`, that `scene.json` itself, or a bare `.obj` file.
+pub fn load(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
+    let mut loader = Loader::default();
+    let extension = path.extension().map(|e| e.to_ascii_lowercase());
+    let scene = if path.is_dir() {
+        scene_json::load(&mut loader, &path.join("scene.json"))?
+    } else {
+        match extension.as_ref().and_then(|e| e.to_str()) {
+            Some("json") => scene_json::load(&mut loader, path)?,
+            Some("obj") => obj::load_bare(&mut loader, path)?,
+            // Whether it is there is the better message.
+            _ if !path.exists() => scene_json::load(&mut loader, path)?,
+            _ => return Err(LoadError::Unknown { path: path.into() }),
+        }
+    };
+    Ok((scene, loader.report))
+}
+
+/// What is common to all files of one scene.
+#[derive(Default)]
+struct Loader {
+    report: LoadReport,
+    /// Textures by path: a file that several materials use is decoded once.
+    textures: HashMap<PathBuf, u32>,
+}
+
+impl Loader {
+    /// Reads a whole file; `referrer` is the file that names it.
+    fn read(&mut self, path: &Path, referrer: Option<&Path>) -> Result<Vec<u8>, LoadError> {
+        let bytes = fs::read(path).map_err(|source| LoadError::Read {
+            path: path.into(),
+            referrer: referrer.map(Into::into),
+            source,
+        })?;
+        self.report.files.push(path.into());
+        Ok(bytes)
+    }
+
+    /// As [`Loader::read`]; bytes that are not UTF-8 (old exporters' comments) become replacement characters.
+    fn read_text(&mut self, path: &Path, referrer: Option<&Path>) -> Result<String, LoadError> {
+        let bytes = self.read(path, referrer)?;
+        Ok(String::from_utf8(bytes).unwrap_or_else(|e| String::from_utf8_lossy(e.as_bytes()).into_owned()))
+    }
+
+    /// Index of the texture in `path`, decoded at its first use.
+    fn texture(&mut self, scene: &mut SceneDescription, path: &Path, referrer: &Path) -> Result<u32, LoadError> {
+        if let Some(index) = self.textures.get(path) {
+            return Ok(*index);
+        }
+        let bytes = self.read(path, Some(referrer))?;
+        let image = images::png(&bytes).map_err(|what| LoadError::image(path, referrer, what))?;
+        let index = scene.textures.len() as u32;
+        scene.textures.push(Texture { name: path.display().to_string(), ..image });
+        self.textures.insert(path.into(), index);
+        Ok(index)
+    }
+
+    /// The environment map in `path`, unscaled and unrotated.
+    fn environment(&mut self, path: &Path, referrer: &Path) -> Result<Environment, LoadError> {
+        let bytes = self.read(path, Some(referrer))?;
+        let (map, clamped) = images::exr(bytes).map_err(|what| LoadError::image(path, referrer, what))?;
+        if clamped > 0 {
+            self.note(format!("{}: {clamped} negative or NaN numbers were taken as 0", path.display()));
+        }
+        Ok(map)
+    }
+
+    fn note(&mut self, text: String) {
+        self.report.notes.push(text);
+    }
+}

@@ -1,0 +1,179 @@
+//! `scene.json`, in the format of `scenes/FORMAT.md`, without media.
+//!
+//! Beside the emitters that FORMAT.md spells out, these are read:
+//!
+//! | `type` | fields |
+//! |---|---|
+//! | `point` | `position`; `intensity` (RGB, power per steradian) |
+//! | `directional` | `direction` in which the light travels; `irradiance` (RGB) of a surface facing it |
+
+use super::json::{self, Place};
+use super::{LoadError, Loader, obj};
+use crate::description::{Camera, Emitter, Environment, Material, Model, Reflectance, SceneDescription, ThinLens};
+use std::path::Path;
+
+pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription, LoadError> {
+    let text = loader.read_text(path, None)?;
+    let document = json::parse(path, &text)?;
+    let document = Place::document(path, &document);
+    let folder = path.parent().unwrap_or(Path::new(""));
+    if let Some(media) = document.find("media")?
+        && let Some((index, medium)) = media.elements()?.into_iter().enumerate().next()
+    {
+        let name = medium.find("name")?.map_or(Ok("unnamed"), |n| n.text())?.into();
+        return Err(LoadError::Medium { path: path.into(), index, name });
+    }
+    let mut scene = SceneDescription { camera: camera(&document.get("camera")?)?, ..SceneDescription::default() };
+    if let Some(transport) = document.find("transport")?
+        && let Some(depth) = transport.find("max_depth")?
+    {
+        scene.max_depth = depth.count(1)?;
+    }
+    for (name, place) in document.get("materials")?.entries()? {
+        let material = material(loader, &mut scene, folder, name, &place)?;
+        scene.materials.push(material);
+    }
+    if let Some(emitters) = document.find("emitters")? {
+        for place in emitters.elements()? {
+            emitter(loader, &mut scene, folder, &place)?;
+        }
+    }
+    let file = document.get("geometry")?.get("file")?;
+    obj::load_geometry(loader, &mut scene, &folder.join(file.text()?), path)?;
+    Ok(scene)
+}
+
+fn camera(c: &Place<'_>) -> Result<Camera, LoadError> {
+    if let Some(kind) = c.find("type")?
+        && !matches!(kind.text()?, "perspective" | "thinlens")
+    {
+        return Err(kind.error(format!("unknown camera `{}`", kind.text()?)));
+    }
+    let lens = c.find("thin_lens")?.map(|l| -> Result<_, LoadError> {
+        Ok(ThinLens { radius: l.get("radius")?.float()?, focus_distance: l.get("focus_distance")?.float()? })
+    });
+    Ok(Camera {
+        origin: c.get("origin")?.numbers()?,
+        target: c.get("target")?.numbers()?,
+        up: c.get("up")?.numbers()?,
+        vfov_deg: c.get("vfov_deg")?.number()?,
+        size: [c.get("width")?.count(1)?, c.get("height")?.count(1)?],
+        lens: lens.transpose()?,
+    })
+}
+
+fn material(
+    loader: &mut Loader,
+    scene: &mut SceneDescription,
+    folder: &Path,
+    name: &str,
+    m: &Place<'_>,
+) -> Result<Material, LoadError> {
+    let mut reflectance = || reflectance(loader, scene, folder, &m.get("reflectance")?);
+    let float = |key| m.get(key)?.float();
+    let rgb = |key| m.get(key)?.rgb();
+    let kind = m.get("type")?;
+    let model = match kind.text()? {
+        "diffuse" => Model::Diffuse { reflectance: reflectance()? },
+        "mirror" => Model::Mirror { reflectance: reflectance()? },
+        "conductor" => Model::Conductor { eta: rgb("eta")?, k: rgb("k")?, reflectance: reflectance()? },
+        "roughconductor" => Model::RoughConductor {
+            eta: rgb("eta")?,
+            k: rgb("k")?,
+            reflectance: reflectance()?,
+            alpha: float("alpha")?,
+        },
+        "dielectric" => Model::Dielectric { int_ior: float("int_ior")?, ext_ior: float("ext_ior")? },
+        "roughdielectric" => {
+            Model::RoughDielectric { int_ior: float("int_ior")?, ext_ior: float("ext_ior")?, alpha: float("alpha")? }
+        }
+        "thindielectric" => Model::ThinDielectric { int_ior: float("int_ior")?, ext_ior: float("ext_ior")? },
+        "plastic" => {
+            Model::Plastic { reflectance: reflectance()?, int_ior: float("int_ior")?, ext_ior: float("ext_ior")? }
+        }
+        "roughplastic" => Model::RoughPlastic {
+            reflectance: reflectance()?,
+            int_ior: float("int_ior")?,
+            ext_ior: float("ext_ior")?,
+            alpha: float("alpha")?,
+        },
+        "null" => Model::Null,
+        other => return Err(kind.error(format!("unknown material type `{other}`"))),
+    };
+    let two_sided = m.find("twosided")?.map_or(Ok(false), |t| t.flag())?;
+    Ok(Material { name: name.into(), two_sided, model })
+}
+
+fn reflectance(
+    loader: &mut Loader,
+    scene: &mut SceneDescription,
+    folder: &Path,
+    r: &Place<'_>,
+) -> Result<Reflectance, LoadError> {
+    if !r.is_object() {
+        return Ok(Reflectance::Constant(r.rgb()?));
+    }
+    for (key, only) in [("filter", "bilinear"), ("wrap", "repeat")] {
+        if let Some(place) = r.find(key)?
+            && place.text()? != only
+        {
+            return Err(place.error(format!("`{}` is not supported, only `{only}`", place.text()?)));
+        }
+    }
+    let path = folder.join(r.get("file")?.text()?);
+    Ok(Reflectance::Texture(loader.texture(scene, &path, r.file)?))
+}
+
+fn emitter(loader: &mut Loader, scene: &mut SceneDescription, folder: &Path, e: &Place<'_>) -> Result<(), LoadError> {
+    let kind = e.get("type")?;
+    let environment = match kind.text()? {
+        "area" => {
+            let place = e.get("material")?;
+            let name = place.text()?;
+            let index = scene.materials.iter().position(|m| m.name == name);
+            let index = index.ok_or_else(|| place.error(format!("there is no material `{name}`")))?;
+            scene.emitters.push(Emitter::Area { material: index as u32, radiance: e.get("radiance")?.rgb()? });
+            return Ok(());
+        }
+        "point" => {
+            let (position, intensity) = (e.get("position")?.rgb()?, e.get("intensity")?.rgb()?);
+            scene.emitters.push(Emitter::Point { position, intensity });
+            return Ok(());
+        }
+        "directional" => {
+            let (direction, irradiance) = (e.get("direction")?.rgb()?, e.get("irradiance")?.rgb()?);
+            scene.emitters.push(Emitter::Directional { direction, irradiance });
+            return Ok(());
+        }
+        "constant" => Environment::Constant { radiance: e.get("radiance")?.rgb()? },
+        "envmap" => envmap(loader, folder, e)?,
+        other => return Err(kind.error(format!("unknown emitter type `{other}`"))),
+    };
+    if scene.environment.replace(environment).is_some() {
+        return Err(e.error("there is already an environment"));
+    }
+    Ok(())
+}
+
+fn envmap(loader: &mut Loader, folder: &Path, e: &Place<'_>) -> Result<Environment, LoadError> {
+    let mut map = loader.environment(&folder.join(e.get("file")?.text()?), e.file)?;
+    if let Environment::Map { scale, to_world, .. } = &mut map {
+        if let Some(s) = e.find("scale")? {
+            *scale = if s.is_number() { [s.float()?; 3] } else { s.rgb()? };
+        }
+        if let Some(m) = e.find("to_world")? {
+            // Rows of a 4 x 4 (or 3 x 3) matrix; light from infinity has no use for the translation.
+            let rows = m.elements()?;
+            if !matches!(rows.len(), 3 | 4) {
+                return Err(m.error("expected 4 rows"));
+            }
+            for (row, place) in to_world.iter_mut().zip(&rows) {
+                *row = match rows.len() {
+                    3 => place.rgb()?,
+                    _ => place.numbers::<4>().map(|[x, y, z, _]| [x, y, z].map(|x| x as f32))?,
+                };
+            }
+        }
+    }
+    Ok(map)
+}
