@@ -1,13 +1,13 @@
 //! Scalar f64 oracles and statistics shared by the integration tests.
 
+pub mod blob;
+pub mod bsdf;
 pub mod geometry;
 pub mod light_oracle;
 pub mod light_scene;
 pub mod light_stats;
-pub mod texture_oracle;
-pub mod blob;
-pub mod walk;
-pub mod bsdf;
+pub mod math;
 pub mod quadrature;
 pub mod stats;
-pub mod math;
+pub mod texture_oracle;
+pub mod walk;

@@ -116,9 +116,20 @@ fn factors_stay_in_their_bounds() {
 fn unknown_strategies_and_options_are_named() {
     let message = |t: &str| Strategy::parse(t).unwrap_err().to_string();
     assert!(message("roulette").contains("known: none threshold"));
-    for bad in ["fixed", "fixed:0.01", "fixed:21", "fixed:x", "throughput:foo", "throughput:max:0.5:0.1", "classic:0",
-        "none:1", "throughput:max:0.1:0.5:3:4", "threshold:-1", "threshold:NaN", "albedo:x"]
-    {
+    for bad in [
+        "fixed",
+        "fixed:0.01",
+        "fixed:21",
+        "fixed:x",
+        "throughput:foo",
+        "throughput:max:0.5:0.1",
+        "classic:0",
+        "none:1",
+        "throughput:max:0.1:0.5:3:4",
+        "threshold:-1",
+        "threshold:NaN",
+        "albedo:x",
+    ] {
         let name = bad.split(':').next().unwrap();
         assert!(message(bad).contains(&format!("`{name}`")), "{bad}: {}", message(bad));
     }

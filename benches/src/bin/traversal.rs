@@ -311,11 +311,8 @@ fn main() {
     let cwbvh = build_cwbvh_from_tris(&given, BvhBuildParams::medium_build(), &mut Duration::default());
     let order = |ids: &[u32]| ids.iter().map(|&i| given[i as usize]).collect::<Vec<_>>();
     let (two, compressed) = (order(&bvh2.primitive_indices), order(&cwbvh.primitive_indices));
-    let kernels = Kernels {
-        wide: WideBvh::from_parts(&tree.nodes, &tree.leaves),
-        bvh2: (bvh2, two),
-        cwbvh: (cwbvh, compressed),
-    };
+    let kernels =
+        Kernels { wide: WideBvh::from_parts(&tree.nodes, &tree.leaves), bvh2: (bvh2, two), cwbvh: (cwbvh, compressed) };
 
     let mut r = Random(3);
     let (lo, hi) = bounds(&triangles);
@@ -343,7 +340,8 @@ fn main() {
             let (hits, sum) = answers[0];
             // CwBvh drops some hits of its quantised boxes
             let few = [0.0, 1e-3, 1e-2][k];
-            let close = hits.abs_diff(a.0) as f64 <= few * hits.max(1000) as f64 && (sum - a.1).abs() <= 2.0 * few * sum;
+            let close =
+                hits.abs_diff(a.0) as f64 <= few * hits.max(1000) as f64 && (sum - a.1).abs() <= 2.0 * few * sum;
             assert!(close, "{}: {} says {a:?}, {} says {:?}", set.name, NAMES[k], NAMES[0], answers[0]);
         }
     }

@@ -304,7 +304,8 @@ mod tests {
                     started += 8;
                     8
                 } else {
-                    let batch = (0..=CLASSES).find_map(|c| pool.take(if c == 0 { pool.fullest().0 } else { c - 1 }, |_, _, _| ()));
+                    let batch = (0..=CLASSES)
+                        .find_map(|c| pool.take(if c == 0 { pool.fullest().0 } else { c - 1 }, |_, _, _| ()));
                     let batch = batch.expect("some class must always have a sample that fits");
                     assert!(pool.free() >= batch.lanes, "a lane has no slot to go on to");
                     taken += batch.lanes as u64;
@@ -312,7 +313,13 @@ mod tests {
                 };
                 let may_split = pool.free() >= lanes + RESERVE;
                 for _ in 0..lanes {
-                    let n = if next(100) < 91 { 0 } else if may_split { 1 + next(20) } else { 1 };
+                    let n = if next(100) < 91 {
+                        0
+                    } else if may_split {
+                        1 + next(20)
+                    } else {
+                        1
+                    };
                     if n > 0 {
                         pool.push(next(CLASSES as u32) as usize, vertex(n));
                         pushed += u64::from(n);

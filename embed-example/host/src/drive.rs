@@ -7,8 +7,8 @@ use croupier::accel::WideBvh;
 use croupier::film::{PixelAov, PixelStats};
 use croupier::profile::{AnyProfile, Full, Matte, Profile};
 use croupier::{
-    Budget, Counters, ErrorEstimate, Plan, Progress as Step, Scene, SceneError, Session, SessionError, Settings, SettingsError,
-    Shard, ShardError,
+    Budget, Counters, ErrorEstimate, Plan, Progress as Step, Scene, SceneError, Session, SessionError, Settings,
+    SettingsError, Shard, ShardError,
 };
 use rayon::prelude::*;
 use std::fmt;
@@ -143,11 +143,7 @@ pub fn drive(scene: &[u8], options: &Options, observer: &dyn Observer) -> Result
 }
 
 /// Renders a validated scene with the smallest profile that holds its effects.
-pub fn drive_scene(
-    scene: Scene<'_>,
-    options: &Options,
-    observer: &dyn Observer,
-) -> Result<Rendered, DriveError> {
+pub fn drive_scene(scene: Scene<'_>, options: &Options, observer: &dyn Observer) -> Result<Rendered, DriveError> {
     match AnyProfile::smallest(scene.effects) {
         AnyProfile::Matte => drive_with::<Matte>(scene, options, observer),
         AnyProfile::Full => drive_with::<Full>(scene, options, observer),
@@ -181,7 +177,7 @@ pub fn drive_with<P: Profile + Send + Sync>(
             break;
         }
         session.begin_iteration(samples);
-        let run = Run { session: &session, observer, options, start, spp, samples, error, rays: AtomicU64::new(0) };
+        let run = Run { session: &session, observer, start, spp, samples, error, rays: AtomicU64::new(0) };
         stopped_early = pool.install(|| run.all(&mut shards));
         session.end_iteration(&shards)?;
         if stopped_early {
@@ -209,7 +205,6 @@ pub fn drive_with<P: Profile + Send + Sync>(
 struct Run<'a, 's, 'm, P: Profile, I: croupier::accel::Intersector> {
     session: &'a Session<'s, 'm, P, I>,
     observer: &'a dyn Observer,
-    options: &'a Options,
     start: Instant,
     spp: u32,
     samples: u32,

@@ -1,29 +1,29 @@
 //! Files, trees and threads around the croupier core.
-
-pub mod alias;
-pub mod environment;
-pub mod bvh;
-pub mod compare;
-pub mod flip;
-pub mod image;
-pub mod render;
-pub mod tonemap;
-pub mod microfacet;
 //!
 //! | module | does | must not know |
 //! |---|---|---|
 //! | [`description`] | a scene as plain values | files, blobs |
 //! | [`load`] | files -> description | blobs |
 //! | [`builtin`] | a description without files | blobs |
-//! | [`bake`] | description -> scene blob | files |
+//! | [`bake`] | description -> scene blob, with [`bvh`], [`alias`], [`environment`], [`microfacet`] | files |
 //! | [`blob`] | the blob's layout on disk and in memory | what sections mean |
+//! | [`drive`] | memory, threads, iterations around the core | files |
+//! | [`render`] | names in, pictures out | how light is transported |
+//! | [`image`], [`tonemap`] | EXR and PNG | scenes |
+//! | [`compare`], [`flip`] | how far two pictures differ | scenes |
 
+pub mod alias;
 pub mod bake;
 pub mod blob;
 pub mod builtin;
+pub mod bvh;
+pub mod compare;
 pub mod description;
+pub mod drive;
+pub mod environment;
+pub mod flip;
+pub mod image;
 pub mod load;
-
-// Until the modules of these names are merged.
-mod standin;
-use standin::{alias, bvh, environment, limits, microfacet};
+pub mod microfacet;
+pub mod render;
+pub mod tonemap;

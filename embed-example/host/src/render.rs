@@ -1,7 +1,7 @@
 //! Rendering a scene blob to a picture: what the program asks for and gets.
 
-use crate::image::Picture;
 use crate::drive::{Options, Rendered, drive_scene};
+use crate::image::Picture;
 use croupier::film::{PixelAov, PixelStats};
 use croupier::profile::AnyProfile;
 use croupier::{Plan, Scene, Settings, Strategy};

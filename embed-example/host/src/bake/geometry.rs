@@ -2,7 +2,7 @@
 
 use super::BakeError;
 use crate::description::{SceneDescription, Triangle, Vertex};
-use crate::limits::MAX_COORDINATE;
+use croupier::scene::blob::MAX_COORDINATE;
 use croupier::scene::blob::{self, NONE, TRIANGLE_SMOOTH};
 use glam::{DVec3, Vec3};
 

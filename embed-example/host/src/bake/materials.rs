@@ -2,10 +2,10 @@
 
 use super::BakeError;
 use crate::description::{Model, Reflectance, SceneDescription};
-use crate::limits::{ALPHA_RANGE, ETA_RANGE, MAX_CONDUCTOR, MAX_SIDE};
 use crate::microfacet;
 use bytemuck::Zeroable;
 use croupier::scene::blob::{self, MATERIAL_TWO_SIDED, MaterialKind, NONE};
+use croupier::scene::blob::{ALPHA_RANGE, ETA_RANGE, MAX_CONDUCTOR, MAX_SIDE};
 use std::collections::HashMap;
 
 /// Sections of the blob.

@@ -9,7 +9,6 @@ mod info;
 mod progress;
 mod render;
 mod scene;
-mod standin;
 
 use clap::{Parser, Subcommand};
 use std::error::Error;

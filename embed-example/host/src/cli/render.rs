@@ -2,10 +2,10 @@
 
 use super::progress::Rendering;
 use super::{Outcome, say, say_json, scene};
-use croupier_host::image::write_png;
-use croupier_host::render::{RenderOptions, RenderResult, RenderStats, Target, render};
 use croupier::Strategy;
 use croupier::rrs::ParseError;
+use croupier_host::image::write_png;
+use croupier_host::render::{RenderOptions, RenderResult, RenderStats, Target, render};
 use croupier_host::tonemap::{Curve, tonemap};
 use serde::Serialize;
 use std::path::{Path, PathBuf};

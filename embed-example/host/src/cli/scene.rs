@@ -1,7 +1,7 @@
 //! From a path to scene bytes.
 
 use super::progress;
-use super::standin::{bake, builtin, load};
+use croupier_host::{bake, builtin, load};
 use memmap2::Mmap;
 use std::error::Error;
 use std::fs::File;
@@ -40,7 +40,7 @@ pub fn open(path: Option<&Path>) -> Result<SceneBytes, Box<dyn Error>> {
     }
 }
 
-fn bake(description: &super::standin::SceneDescription) -> Result<bake::Baked, Box<dyn Error>> {
+fn bake(description: &croupier_host::description::SceneDescription) -> Result<bake::Baked, Box<dyn Error>> {
     let bar = progress::Baking::start();
     Ok(bake::bake(description, &bake::BakeOptions::default(), |stage, part| bar.show(&format!("{stage:?}"), part))?)
 }
