@@ -1,7 +1,7 @@
 //! Scalar f64 oracle of every scattering model, from the textbook formulas (Walter et al. 2007, Heitz 2014, Fresnel's
 //! equations over complex indices), written without looking at the vector code, and the table of cases under test.
 
-use crate::quadrature::midpoint;
+use crate::quadrature::{jittered, midpoint};
 use croupier::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
 use croupier::scene::blob::{Camera, Material, MaterialKind, NONE, SceneInfo};
 use croupier::scene::{Effects, Scene};
@@ -353,16 +353,14 @@ impl Case {
     pub fn integral(&self, wo: V, n: usize) -> Value {
         let mut sum = Value::default();
         let n = if self.alpha() > 0.0 { n } else { 0 };
-        for i in 0..n {
-            for j in 0..n {
-                let (m, dm) = self.facet((i as f64 + 0.5) / n as f64, (j as f64 + 0.5) / n as f64);
-                for reflect in [true, false] {
-                    let Some((wi, d)) = self.through_facet(wo, m, reflect) else { continue };
-                    let v = self.microfacets(wo, wi);
-                    let weight = d * dm / (n * n) as f64;
-                    sum.pdf += v.pdf * weight;
-                    sum.f = combine(sum.f, 1.0, v.f, weight);
-                }
+        for (_, [s, t]) in jittered(n, n) {
+            let (m, dm) = self.facet(s, t);
+            for reflect in [true, false] {
+                let Some((wi, d)) = self.through_facet(wo, m, reflect) else { continue };
+                let v = self.microfacets(wo, wi);
+                let weight = d * dm / (n * n) as f64;
+                sum.pdf += v.pdf * weight;
+                sum.f = combine(sum.f, 1.0, v.f, weight);
             }
         }
         let diffuse = midpoint(4096, 0.0, 1.0, |z| self.diffuse(wo, [(1.0 - z * z).sqrt(), 0.0, z]).f[0] * TAU);

@@ -1,5 +1,7 @@
 //! Quadrature for oracles.
 
+use crate::stats::SplitMix;
+
 /// Midpoint rule with `n` points.
 pub fn midpoint(n: usize, a: f64, b: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
     let h = (b - a) / n as f64;
@@ -22,4 +24,14 @@ pub fn tanh_sinh(a: f64, b: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
         }
     }
     sum * h * half
+}
+
+/// One random point (fixed seed) in each cell of an `n` x `m` grid over the unit square, with the cell's numbers: for
+/// integrands with creases and jumps, along which a regular grid would alias. The weight of each point is 1 / (n m).
+pub fn jittered(n: usize, m: usize) -> impl Iterator<Item = ([usize; 2], [f64; 2])> {
+    let mut rng = SplitMix(n as u64 * 0x1_0000_0001 + m as u64);
+    (0..n * m).map(move |c| {
+        let cell = [c / m, c % m];
+        (cell, [(cell[0] as f64 + rng.f64()) / n as f64, (cell[1] as f64 + rng.f64()) / m as f64])
+    })
 }

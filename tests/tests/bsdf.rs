@@ -14,7 +14,7 @@ const BACKWARD: f64 = 4.0 * U;
 const FORWARD: f64 = 1e-5;
 
 /// `f` at the unit vectors nearest to `wo`, `wi`, and how far f32 may be off: [`FORWARD`], plus the change of `f` when
-/// each component moves by [`BACKWARD`] either way.
+/// each component moves by [`BACKWARD`] either way (lengths too: rounded directions are not unit).
 fn expected(wo: V, wi: V, f: impl Fn(V, V) -> f64) -> (f64, f64) {
     let value = f(unit(wo), unit(wi));
     let mut change = 0.0;
@@ -22,7 +22,7 @@ fn expected(wo: V, wi: V, f: impl Fn(V, V) -> f64) -> (f64, f64) {
         let moved = |d: f64| {
             let (mut o, mut i) = (wo, wi);
             *if k < 3 { &mut o[k] } else { &mut i[k - 3] } += d;
-            (f(unit(o), unit(i)) - value).abs()
+            (f(o, i) - value).abs()
         };
         change += moved(BACKWARD).max(moved(-BACKWARD));
     }

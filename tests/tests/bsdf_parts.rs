@@ -5,12 +5,12 @@ use croupier::bsdf::{ggx::Ggx8, warp};
 use croupier::simd::{F32x8, Vec3x8};
 use croupier_host::microfacet;
 use croupier_tests::bsdf::*;
-use croupier_tests::quadrature::{midpoint, tanh_sinh};
+use croupier_tests::quadrature::{jittered, midpoint, tanh_sinh};
 use croupier_tests::stats::*;
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
-/// 2^16 cosines for each eta near and far from 1, NUMERICS FRE-1: 4e-7 away from the critical angle; near it F has an
-/// infinite slope, 1e-4. Close to eta = 1 F at grazing is as steep: 2e-6.
+/// 2^16 cosines for each eta near and far from 1, NUMERICS FRE-1. Within 0.01 of the critical cos^2 F has an infinite
+/// slope; elsewhere 1e-6.
 /// Killed by: the textbook form (0.2 at eta = 1 - 1e-6).
 #[test]
 fn dielectric_fresnel() {
@@ -27,11 +27,13 @@ fn dielectric_fresnel() {
             for l in 0..8 {
                 let (c, r) = (f64::from(cos.lane(l)), f64::from(i.reflectance.lane(l)));
                 let error = (r - fresnel_dielectric(c, 1.0, e)).abs();
-                let near = (c * c - critical).abs() < 1e-5;
-                let class = if near { 2 } else { usize::from((e - 1.0).abs() < 0.05) };
+                // e^2 = cos^2 - critical is known to 1e-7; where it is small, so is what hangs on it
+                let slack = 1e-7 / (c * c - critical).abs().max(1e-4);
+                let class = if slack > 1e-5 { 2 } else { usize::from((e - 1.0).abs() < 0.05) };
                 worst[class] = worst[class].max(error);
                 assert!((0.0..=1.0).contains(&r), "eta {eta} cos {c}: {r}");
-                assert!((f64::from(t.lane(l)) + r - 1.0).abs() < 1e-6, "eta {eta} cos {c}: R + T = 1 + {}", t.lane(l));
+                let sum = f64::from(t.lane(l)) + r;
+                assert!((sum - 1.0).abs() < 3e-6 + slack, "eta {eta} cos {c}: R + T = {sum}");
             }
         }
         let grazing = fresnel::dielectric(F32x8::ZERO, Index8::new(F32x8::splat(eta)));
@@ -44,14 +46,14 @@ fn dielectric_fresnel() {
         "Fresnel, absolute error: eta far from 1 {:.1e}, near {:.1e}, at critical angles {:.1e}",
         worst[0], worst[1], worst[2]
     );
-    assert!(worst[0] < 6e-7 && worst[1] < 3e-6 && worst[2] < 1e-3, "{worst:?}");
+    assert!(worst[0] < 1e-6 && worst[1] < 1e-6 && worst[2] < 1e-3, "{worst:?}");
 }
 
 /// 40 x 40 complex indices from 1e-3 to 1e4 by 101 cosines, NUMERICS FRE-3; and k = 0 is the dielectric.
 /// Killed by: a = sqrt((root + t0) / 2) for t0 < 0 (1e-4).
 #[test]
 fn conductor_fresnel() {
-    let mut worst = 0.0f64;
+    let mut worst = [0.0f64; 2];
     let grid = |i: i32| 10f32.powf(-3.0 + 7.0 * i as f32 / 39.0);
     for n in (0..40).map(grid) {
         for k in (0..40).map(grid).chain([0.0]) {
@@ -63,10 +65,8 @@ fn conductor_fresnel() {
                     let c = f64::from(cos.lane(l));
                     let want = fresnel_conductor(c, f64::from(n), f64::from(k));
                     let error = (f64::from(r.lane(l)) - want).abs();
-                    if error > worst {
-                        println!("n {n} k {k} cos {c}: {} for {want}", r.lane(l));
-                    }
-                    worst = worst.max(error);
+                    let metal = n > 1.0 || k > 0.01;
+                    worst[usize::from(metal)] = worst[usize::from(metal)].max(error);
                     if k == 0.0 && n > 1.0 {
                         let same = fresnel_dielectric(c, 1.0, f64::from(n));
                         assert!((want - same).abs() < 1e-9, "the oracles disagree: n {n} cos {c}");
@@ -75,8 +75,8 @@ fn conductor_fresnel() {
             }
         }
     }
-    println!("conductor Fresnel, absolute error {worst:.1e}");
-    assert!(worst < 1e-6);
+    println!("conductor Fresnel, absolute error {:.1e}, index below 1 without extinction {:.1e}", worst[1], worst[0]);
+    assert!(worst[1] < 1e-6 && worst[0] < 5e-6);
     let huge = fresnel::conductor(F32x8::splat(0.5), Vec3x8::ONE, Vec3x8::splat(1e10, f32::INFINITY, 1e38));
     assert!(huge.is_finite().all());
 }
@@ -217,8 +217,8 @@ fn rough_plastic_tables() {
         let parts = |wo: V, reflect: bool| {
             let n = 200;
             let mut sum = 0.0;
-            for i in 0..n * n {
-                let (m, dm) = case.facet(((i / n) as f64 + 0.5) / n as f64, ((i % n) as f64 + 0.5) / n as f64);
+            for (_, [s, t]) in jittered(n, n) {
+                let (m, dm) = case.facet(s, t);
                 let Some((wi, d)) = case.through_facet(wo, m, reflect) else { continue };
                 sum += case.microfacets(wo, wi).f[0] * d * dm / (n * n) as f64;
             }

@@ -4,13 +4,14 @@
 use croupier::scene::blob::MaterialKind;
 use croupier::simd::{F32x8, Mask8};
 use croupier_tests::bsdf::*;
+use croupier_tests::quadrature::jittered;
 use croupier_tests::stats::*;
 use std::f64::consts::TAU;
 
 /// Cells in the two coordinates.
 const CELLS: [usize; 2] = [12, 16];
 /// Quadrature points per cell and coordinate.
-const POINTS: usize = 20;
+const POINTS: usize = 32;
 /// Samples per configuration.
 const SAMPLES: usize = 1 << 20;
 
@@ -44,9 +45,8 @@ impl Cells<'_> {
     fn probabilities(&self, wo: V) -> Vec<f64> {
         let mut p = vec![0.0; Self::COUNT];
         let (ns, nt) = (CELLS[0] * POINTS, CELLS[1] * POINTS);
-        for i in 0..ns * nt {
-            let (s, t) = (((i / nt) as f64 + 0.5) / ns as f64, ((i % nt) as f64 + 0.5) / nt as f64);
-            let cell = (i / nt / POINTS) * CELLS[1] + i % nt / POINTS;
+        for ([i, j], [s, t]) in jittered(ns, nt) {
+            let cell = i / POINTS * CELLS[1] + j / POINTS;
             if self.by_facet {
                 let (m, dm) = self.case.facet(s, t);
                 for reflect in [true, false] {
@@ -60,7 +60,9 @@ impl Cells<'_> {
                 p[cell] += self.case.eval(wo, wi).pdf * (TAU / 2.0) / wi[2] / (ns * nt) as f64;
             }
         }
-        // below 1e-5 quadrature cannot tell a loss from none
+        // quadrature misses slivers of cells at the horizon
+        p.iter_mut().for_each(|p| *p = p.max(1e-8));
+        // and cannot tell a loss below 1e-5 from none
         p[Self::COUNT - 1] = (1.0 - p.iter().sum::<f64>()).max(1e-5);
         p
     }
@@ -102,7 +104,7 @@ fn samples_follow_the_density() {
     let level = sidak(FAMILY_ALPHA, configurations.len());
     let mut smallest = 1.0f64;
     for (seed, (case, wo)) in configurations.iter().enumerate() {
-        let by_facet = matches!(case.kind, MaterialKind::RoughConductor | MaterialKind::RoughDielectric);
+        let by_facet = case.alpha() > 0.0;
         let cells = Cells { case, by_facet };
         let model = case.model(Mask8::all_lanes());
         let mut rng = SplitMix(1000 + seed as u64);
@@ -135,8 +137,8 @@ fn oracle_densities_are_normalised() {
         }
         let n = 256;
         let mut sum = 0.0;
-        for i in 0..n * n {
-            let (m, dm) = case.facet(((i / n) as f64 + 0.5) / n as f64, ((i % n) as f64 + 0.5) / n as f64);
+        for (_, [s, t]) in jittered(n, n) {
+            let (m, dm) = case.facet(s, t);
             sum += ggx_g1(wo, m, case.alpha()) * (dot(wo, m) / wo[2]).max(0.0) * ggx_d(m, case.alpha()) * dm;
         }
         let visible = sum / (n * n) as f64;
@@ -146,11 +148,17 @@ fn oracle_densities_are_normalised() {
     }
 }
 
-/// Points that fill the cube evenly (Roberts' R3 sequence): the mean of a smooth function converges almost like 1 / n.
-fn even(n: usize, l: usize) -> [f32; 3] {
-    let g = 1.220_744_084_605_759_5f64;
-    let at = |k: i32| ((0.5 + (n * 8 + l) as f64 / g.powi(k)).fract() * 16_777_216.0) as u32 as f32 / 16_777_216.0;
-    [at(1), at(2), at(3)]
+/// Points that fill the cube evenly (Halton 1960): radical inverses of the number in the bases 2, 3, 5.
+fn even(n: usize) -> [f32; 3] {
+    [2, 3, 5].map(|base| {
+        let (mut n, mut scale, mut x) = (n + 1, 1.0, 0.0);
+        while n > 0 {
+            scale /= base as f64;
+            x += scale * (n % base) as f64;
+            n /= base;
+        }
+        (x as f32).min(1.0 - 1.0 / 16_777_216.0)
+    })
 }
 
 /// Mean weight over evenly spread numbers, energy factor eta^2 included on transmission.
@@ -158,7 +166,8 @@ fn mean_weight(case: &Case, wo: V, packets: usize) -> V {
     let model = case.model(Mask8::all_lanes());
     let mut sum = [0.0; 3];
     for n in 0..packets {
-        let s = model.sample(splat(wo), std::array::from_fn(|k| F32x8::from_fn(|l| even(n, l)[k])));
+        let u: [[f32; 3]; 8] = std::array::from_fn(|l| even(n * 8 + l));
+        let s = model.sample(splat(wo), std::array::from_fn(|k| F32x8::from_fn(|l| u[l][k])));
         for l in 0..8 {
             let wi = lane(s.wi, l);
             let scale = if s.valid.lane(l) && wi[2] * wo[2] < 0.0 && case.kind != MaterialKind::ThinDielectric {
@@ -182,7 +191,8 @@ fn furnace() {
     for case in cases() {
         for wo in views(case) {
             let o = unit(lane(splat(wo), 0));
-            let got = mean_weight(case, o, 4096);
+            let grazing = o[2].abs() < 0.1;
+            let got = mean_weight(case, o, if grazing { 16384 } else { 4096 });
             assert!(got.iter().all(|&x| x <= 1.0 + 1e-4), "{} {wo:?}: {got:?}", case.name());
             if matches!(case.kind, Dielectric | ThinDielectric | Null) {
                 assert!((got[0] - 1.0).abs() < 1e-6, "{} {wo:?}: {got:?}", case.name());
@@ -192,16 +202,18 @@ fn furnace() {
                 continue;
             }
             let mut want = case.lobes(o).iter().fold([0.0; 3], |a, l| combine(a, 1.0, l.weight, 1.0));
+            // at grazing angles the half of the normals that is visible ends in a crease
+            let points = if grazing { 500 } else { 160 };
             // radiance back to energy: transmission and reflection apart
             if case.kind == RoughDielectric {
-                want = [energy(case, o); 3];
+                want = [energy(case, o, points); 3];
             } else {
-                want = combine(want, 1.0, case.integral(o, 160).f, 1.0);
+                want = combine(want, 1.0, case.integral(o, points).f, 1.0);
             }
             for c in 0..3 {
                 let error = (got[c] - want[c]).abs();
                 worst = worst.max(error);
-                assert!(error < 2e-3, "{} {wo:?}: {got:?} {want:?}", case.name());
+                assert!(error < 1.5e-3, "{} {wo:?}: {got:?} {want:?}", case.name());
             }
         }
     }
@@ -209,11 +221,10 @@ fn furnace() {
 }
 
 /// Reflected and transmitted energy of a rough interface by quadrature.
-fn energy(case: &Case, wo: V) -> f64 {
-    let n = 160;
+fn energy(case: &Case, wo: V, n: usize) -> f64 {
     let mut sum = 0.0;
-    for i in 0..n * n {
-        let (m, dm) = case.facet(((i / n) as f64 + 0.5) / n as f64, ((i % n) as f64 + 0.5) / n as f64);
+    for (_, [s, t]) in jittered(n, n) {
+        let (m, dm) = case.facet(s, t);
         for reflect in [true, false] {
             let Some((wi, d)) = case.through_facet(wo, m, reflect) else { continue };
             let scale = (case.index(wi) / case.index(wo)).powi(2);
@@ -233,15 +244,15 @@ fn switches_do_not_show() {
         let w = at_angle(angle, 1.0);
         let wo = [w[0], w[1], if below { -w[2] } else { w[2] }];
         let pairs = [
-            (rough(1.000_099, 0.5), rough(1.000_101, 0.5)),
-            (rough(1.001, 0.009_99), rough(1.001, 0.010_01)),
-            (rough(1.5, 0.99e-4), rough(1.5, 1.01e-4)),
+            (rough(1.000_099_8, 0.5), rough(1.000_100_4, 0.5)),
+            (rough(1.001, 0.009_999_5), rough(1.001, 0.009_999_6)),
+            (rough(1.5, 0.5e-4), rough(1.5, 1.0001e-4)),
         ];
         for (a, b) in pairs {
             let (x, y) = (mean_weight(&a, wo, 4096), mean_weight(&b, wo, 4096));
             assert!((x[0] - y[0]).abs() < 1e-4, "{} {wo:?}: {x:?}; {}: {y:?}", a.name(), b.name());
         }
     }
-    assert!(rough(1.000_099, 0.5).narrow() && !rough(1.000_101, 0.5).narrow());
-    assert!(rough(1.001, 0.009_99).narrow() && !rough(1.001, 0.010_01).narrow());
+    assert!(rough(1.000_099_8, 0.5).narrow() && !rough(1.000_100_4, 0.5).narrow());
+    assert!(rough(1.001, 0.009_999_5).narrow() && !rough(1.001, 0.009_999_6).narrow());
 }

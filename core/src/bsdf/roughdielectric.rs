@@ -68,7 +68,8 @@ impl Bsdf<'_> for RoughDielectric {
         let reflect = wi.z.gt(F32x8::ZERO);
 
         // h of any length along the microfacet normal; on transmission it is wo + eta wi, turned to the side of wo
-        let bent = wo + wi * index.eta;
+        // (eta - 1 = k / (eta + 1), so that what cancels is the directions only)
+        let bent = (wo + wi) + wi * (index.k / (index.eta + 1.0));
         let bent = Vec3x8::select(index.k.gt(F32x8::ZERO), -bent, bent);
         let h = Vec3x8::select(reflect, wo + wi, bent);
         let length = h.length();
