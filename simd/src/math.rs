@@ -116,7 +116,8 @@ impl F32x8 {
     /// e^x. Subnormal results are rounded, not flushed; 0 below -103.98, +infinity above 88.72.
     #[inline(always)]
     pub fn exp(self) -> Self {
-        exp_sum(self, Self::ZERO)
+        // -0, not 0: adding it is no operation, and the compiler knows
+        exp_sum(self, Self::splat(-0.0))
     }
 
     /// Natural logarithm, subnormals included; -infinity at +-0, NaN below.
