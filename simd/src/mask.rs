@@ -17,7 +17,7 @@ impl Mask8 {
     /// All lanes equal to `b`.
     #[inline(always)]
     pub fn splat(b: bool) -> Self {
-        Self::from_bits(if b { 0xff } else { 0 })
+        Self(bytemuck::cast(wide::u32x8::splat(u32::from(b).wrapping_neg())))
     }
 
     /// All lanes.
