@@ -70,7 +70,7 @@ pub struct BakeReport {
     pub dropped_degenerate: u32,
     /// Those of them that would have been lights.
     pub dropped_lights: u32,
-    /// Smooth triangles with vertex normals that are zero or opposite, shaded flat.
+    /// Smooth triangles with a vertex normal of length 0, shaded flat.
     pub flattened: u32,
     /// Lights, the environment included.
     pub lights: u32,

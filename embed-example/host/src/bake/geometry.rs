@@ -4,7 +4,7 @@ use super::BakeError;
 use crate::description::{SceneDescription, Triangle, Vertex};
 use croupier::scene::blob::MAX_COORDINATE;
 use croupier::scene::blob::{self, NONE, TRIANGLE_SMOOTH};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 /// Geometry of the blob, and what else baking needs of it.
 pub(super) struct Geometry {
@@ -28,13 +28,6 @@ pub(super) fn area(corners: &[[f32; 3]; 3]) -> f32 {
 /// Unit normal; zero if it has no direction.
 fn unit(n: [f32; 3]) -> [f32; 3] {
     Vec3::from_array(n).as_dvec3().normalize_or_zero().as_vec3().to_array()
-}
-
-/// Interpolating these normals never meets a vertex or an edge where they vanish.
-fn interpolates(normals: [[f32; 3]; 3]) -> bool {
-    let [a, b, c] = normals.map(|n| Vec3::from_array(n).as_dvec3());
-    let apart = |a: DVec3, b: DVec3| a.dot(b) > -1.0 + 1e-6;
-    [a, b, c].iter().all(|n| *n != DVec3::ZERO) && apart(a, b) && apart(b, c) && apart(c, a)
 }
 
 /// `emission` tells which materials emit.
@@ -99,7 +92,9 @@ impl Geometry {
             self.dropped_lights += u32::from(emits);
             return;
         }
-        let smooth = t.smooth && interpolates(corner.map(|v| v.n));
+        // Opposite normals cancel at single points only, which is for whoever interpolates them; a corner without a
+        // normal has no shading normal all around it.
+        let smooth = t.smooth && corner.iter().all(|v| v.n != [0.0; 3]);
         self.flattened += u32::from(t.smooth && !smooth);
         for p in corners {
             for (i, x) in p.into_iter().enumerate() {

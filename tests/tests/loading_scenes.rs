@@ -1,0 +1,165 @@
+//! The scenes beside the repository load and bake whole. A clone without them skips these tests, and says so.
+
+use croupier::Scene;
+use croupier::scene::blob::MaterialKind;
+use croupier_host::bake::{BakeOptions, bake};
+use croupier_host::load::{LoadError, load};
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Folders with a `scene.json`, in order.
+fn scenes() -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/scenes");
+    let Ok(entries) = fs::read_dir(&root) else {
+        println!("skipped: there is no folder {}", root.display());
+        return Vec::new();
+    };
+    let mut folders: Vec<_> = entries.flatten().map(|e| e.path()).filter(|p| p.join("scene.json").exists()).collect();
+    folders.sort();
+    folders
+}
+
+fn json(folder: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(folder.join("scene.json")).unwrap()).unwrap()
+}
+
+fn floats(v: &Value) -> Vec<f32> {
+    v.as_array().unwrap().iter().map(|x| x.as_f64().unwrap() as f32).collect()
+}
+
+/// Killed by: counting a dropped triangle twice; a missing material kind in `scene_json::material`; light indices
+/// off by one; a section at a wrong offset.
+#[test]
+fn every_scene_bakes_whole() {
+    for folder in scenes() {
+        let json = json(&folder);
+        let name = json["name"].as_str().unwrap();
+        let media = json["media"].as_array().unwrap();
+        if let Some(medium) = media.first() {
+            let error = load(&folder).unwrap_err();
+            assert!(matches!(error, LoadError::Medium { .. }), "{error}");
+            let text = error.to_string();
+            for part in [medium["name"].as_str().unwrap(), "scene.json", "not supported"] {
+                assert!(text.contains(part), "{name}: {text}");
+            }
+            continue;
+        }
+        let (scene, report) = load(&folder).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let g = &json["geometry"];
+        assert_eq!(scene.triangles.len() as u64, g["triangles"].as_u64().unwrap(), "{name}");
+        assert_eq!(scene.vertices.len() as u64, g["vertices"].as_u64().unwrap(), "{name}");
+        assert_eq!(scene.objects.len() as u64, g["groups"].as_u64().unwrap(), "{name}");
+        assert!(report.notes.is_empty() && report.skipped_elements == 0, "{name}: {report:?}");
+        let [lo, hi] = scene.bounds().unwrap();
+        for (found, key) in [(lo, "bbox_min"), (hi, "bbox_max")] {
+            for (a, b) in found.iter().zip(floats(&g[key])) {
+                assert!((a - b).abs() <= 1e-5 * b.abs().max(1.0), "{name}: {found:?}, {key} {}", g[key]);
+            }
+        }
+        let baked = bake(&scene, &BakeOptions::default(), |_, _| {}).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let r = &baked.report;
+        assert_eq!(u64::from(r.triangles + r.dropped_degenerate), g["triangles"].as_u64().unwrap(), "{name}");
+        println!("{name}: {r:?}");
+
+        let view = Scene::from_bytes(&baked.bytes).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!(view.triangles.len() as u32, r.triangles, "{name}");
+        assert_eq!(view.info.dropped_triangles, r.dropped_degenerate, "{name}");
+        assert_eq!(u64::from(view.info.max_depth), json["transport"]["max_depth"].as_u64().unwrap());
+        let names: Vec<&str> = std::str::from_utf8(view.names).unwrap().lines().collect();
+        assert_eq!(names.len(), view.materials.len());
+        for (m, name) in view.materials.iter().zip(names) {
+            let kind = MaterialKind::from_u32(m.kind).unwrap().name();
+            assert_eq!(json["materials"][name]["type"], kind, "{name}");
+            let two_sided = json["materials"][name].get("twosided").is_some_and(|t| *t == true);
+            assert_eq!(m.flags == 1, two_sided, "{name}");
+        }
+        let emitting: Vec<&str> =
+            json["emitters"].as_array().unwrap().iter().filter_map(|e| e["material"].as_str()).collect();
+        let should_emit = |t: &&croupier_host::description::Triangle| {
+            emitting.contains(&scene.materials[t.material as usize].name.as_str())
+        };
+        let area_lights = scene.triangles.iter().filter(should_emit).count() as u32 - r.dropped_lights;
+        let environment = u32::from(view.environment.is_some());
+        assert_eq!(view.lights.len() as u32, area_lights + environment, "{name}");
+        let lit: Vec<u32> = view.triangles.iter().map(|t| t.light).filter(|l| *l != u32::MAX).collect();
+        assert_eq!(lit, (0..area_lights).collect::<Vec<_>>(), "{name}");
+        let sum: f64 = view.lights.iter().map(|l| f64::from(l.probability)).sum();
+        assert!((sum - 1.0).abs() < 1e-5, "{name}: light probabilities sum to {sum}");
+    }
+}
+
+/// Positions, normals and texture coordinates of each corner, parsed the plain way.
+type Corner = ([f32; 3], Option<[f32; 3]>, Option<[f32; 2]>);
+
+fn plain_obj(text: &str) -> Vec<(String, [Corner; 3])> {
+    let (mut v, mut vt, mut vn, mut material) = (vec![], vec![], vec![], String::new());
+    let mut triangles = vec![];
+    for line in text.lines() {
+        let words: Vec<&str> = line.split(' ').collect();
+        let numbers = || words[1..].iter().map(|w| w.parse().unwrap()).collect::<Vec<f32>>();
+        match words[0] {
+            "v" => v.push(<[f32; 3]>::try_from(numbers()).unwrap()),
+            "vt" => vt.push(<[f32; 2]>::try_from(numbers()).unwrap()),
+            "vn" => vn.push(<[f32; 3]>::try_from(numbers()).unwrap()),
+            "usemtl" => material = words[1].into(),
+            "f" => {
+                let corner = |w: &&str| {
+                    let mut i = w.split('/').map(|x| x.parse::<usize>().ok().map(|i| i - 1));
+                    let p = i.next().flatten().map(|i| v[i]).unwrap();
+                    let t = i.next().flatten().map(|i| vt[i]);
+                    (p, i.next().flatten().map(|i| vn[i]), t)
+                };
+                let corners: Vec<Corner> = words[1..].iter().map(corner).collect();
+                triangles.push((material.clone(), corners.try_into().unwrap()));
+            }
+            _ => {}
+        }
+    }
+    triangles
+}
+
+/// Killed by: `tobj` without the groups that `enter` inserts; smooth = "the file has normals"; any reordering; v
+/// flipped.
+#[test]
+fn loading_keeps_every_corner_in_order() {
+    for folder in scenes() {
+        let path = folder.join("scene.obj");
+        let small = fs::metadata(&path).unwrap().len() < 12_000_000;
+        let media = !json(&folder)["media"].as_array().unwrap().is_empty();
+        if media || !small {
+            continue;
+        }
+        let (scene, _) = load(&folder).unwrap();
+        let oracle = plain_obj(&fs::read_to_string(&path).unwrap());
+        assert_eq!(oracle.len(), scene.triangles.len());
+        for (i, (t, (material, corners))) in scene.triangles.iter().zip(&oracle).enumerate() {
+            assert_eq!(&scene.materials[t.material as usize].name, material, "{} triangle {i}", path.display());
+            for (v, (p, n, uv)) in t.vertices.iter().zip(corners) {
+                let v = scene.vertices[*v as usize];
+                assert_eq!((v.position, t.smooth), (*p, n.is_some()), "{} triangle {i}", path.display());
+                assert!(n.is_none_or(|n| n == v.normal) && uv.is_none_or(|uv| uv == v.uv), "triangle {i}");
+            }
+        }
+    }
+}
+
+/// A bare OBJ of every scene, with its preview materials. Killed by: no sky; a camera inside the bounds.
+#[test]
+fn every_bare_obj_bakes() {
+    for folder in scenes() {
+        let path = folder.join("scene.obj");
+        if fs::metadata(&path).unwrap().len() > 8_000_000 {
+            continue;
+        }
+        let (scene, report) = load(&path).unwrap_or_else(|e| panic!("{e}"));
+        assert!(report.notes.iter().any(|n| n.contains("camera")));
+        assert_eq!(scene.environment.is_some(), scene.emitters.is_empty(), "{}", path.display());
+        let [lo, hi] = scene.bounds().unwrap();
+        let outside =
+            (0..3).any(|i| scene.camera.origin[i] > f64::from(hi[i]) || scene.camera.origin[i] < f64::from(lo[i]));
+        assert!(outside, "{}: {:?}", path.display(), scene.camera);
+        let baked = bake(&scene, &BakeOptions::default(), |_, _| {}).unwrap_or_else(|e| panic!("{e}"));
+        assert!(Scene::from_bytes(&baked.bytes).is_ok());
+    }
+}
