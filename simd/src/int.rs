@@ -32,8 +32,9 @@ macro_rules! common {
 
             /// Lane `i` = `f(i)`.
             #[inline(always)]
-            pub fn from_fn(f: impl FnMut(usize) -> $s) -> Self {
-                Self::new(core::array::from_fn(f))
+            pub fn from_fn(mut f: impl FnMut(usize) -> $s) -> Self {
+                // written out: `core::array::from_fn` is not always inlined, and a gather is in every hot loop
+        Self::new([f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7)])
             }
 
             /// The lanes as an array.

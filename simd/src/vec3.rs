@@ -40,8 +40,8 @@ impl Vec3x8 {
 
     /// Lane `i` = `f(i)`.
     #[inline(always)]
-    pub fn from_fn(f: impl FnMut(usize) -> [f32; 3]) -> Self {
-        let a: [[f32; 3]; 8] = core::array::from_fn(f);
+    pub fn from_fn(mut f: impl FnMut(usize) -> [f32; 3]) -> Self {
+        let a = [f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7)];
         Self::new(F32x8::from_fn(|i| a[i][0]), F32x8::from_fn(|i| a[i][1]), F32x8::from_fn(|i| a[i][2]))
     }
 

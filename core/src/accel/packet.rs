@@ -4,14 +4,15 @@
 //! packet(node):
 //!     few rays left in it: each goes on alone
 //!     for each child that the interval of all rays meets, nearest first:
-//!         the rays that enter it before their closest hits: packet(child)
+//!         the rays that enter it before their closest hits, if any: packet(child)
 //! ```
 //!
 //! 1. The eight children are tested at once against intervals of the packet's origins and inverse directions, then eight
 //!    rays at once against each survivor. Every step is monotone (see `setup`): the intervals never reject a child that
 //!    one of the rays enters.
 //! 2. A leaf costs one test per triangle (eight rays each) or one per ray (eight triangles each), whichever is fewer.
-//! 3. Entries are kept per ray on the stack, infinite in rays that miss: a popped entry knows its rays.
+//! 3. The stack holds the interval's entry and where the child's box is, eight bytes. The rays are tested against the box
+//!    when it is popped: fewer tests, as some are behind a hit by then, and a fifth of the memory of keeping their entries.
 
 use super::setup::{AXES, Setup, each};
 use super::single::{Hit1, Keys, Ray1, STACK, test_leaf, walk};
@@ -54,9 +55,6 @@ impl Best {
     }
 }
 
-/// Stack entries beside the keys, which hold the packet's entry and the child.
-type Entries = [F32x8; STACK];
-
 /// Walks the rays `group` of `s` (one octant, one major axis) from the root. Closest: improves `best`. Any: returns the
 /// lanes with a hit.
 #[inline(never)]
@@ -88,12 +86,11 @@ pub(super) fn walk_packet<const ANY: bool>(
 
     let never = F32x8::splat(f32::NEG_INFINITY);
     let mut b = Best { t: members.select(best.t, never), ..*best };
-    let mut entries: Entries = [F32x8::ZERO; STACK];
-    let mut latest = F32x8::splat(b.t.max_lane());
-    let (mut sp, mut child, mut entry) = (0usize, 0u32, members.select(line.tmin, F32x8::INFINITY));
+    let mut latest = b.t.max_lane();
+    let (mut sp, mut child, mut entry, mut inside) = (0usize, 0u32, line.tmin, members);
     let mut occluded = 0u32;
     'walk: loop {
-        let rays = entry.le(b.t).bits();
+        let rays = inside.bits();
         let n = rays.count_ones();
         let mut changed = false;
         if child & LEAF_BIT == 0 {
@@ -113,7 +110,7 @@ pub(super) fn walk_packet<const ANY: bool>(
                 }
             } else if let Some(node) = tree.0.get(child as usize) {
                 let rows = &node.bounds;
-                let (mut enter, mut leave) = (earliest, latest);
+                let (mut enter, mut leave) = (earliest, F32x8::splat(latest));
                 for k in 0..3 {
                     let x = in_o[k] - F32x8::new(rows[low[k].min(5)]);
                     let y = out_o[k] - F32x8::new(rows[high[k].min(5)]);
@@ -124,24 +121,13 @@ pub(super) fn walk_packet<const ANY: bool>(
                 let enter = enter.to_array();
                 let start = sp;
                 for i in met.lanes() {
-                    let (mut t, mut e) = (line.tmin, b.t);
-                    for k in 0..3 {
-                        t = t.max((near[k] - F32x8::splat(rows[low[k].min(5)][i])) * ninv[k]);
-                        e = e.min((far[k] - F32x8::splat(rows[high[k].min(5)][i])) * ninv[k]);
-                    }
-                    let inside = t.le(e);
-                    if inside.none() {
-                        continue;
-                    }
-                    let key = u64::from(enter[i].to_bits()) << 32 | u64::from(node.child[i]);
+                    let key = u64::from(enter[i].to_bits()) << 32 | u64::from(child << 3 | i as u32);
                     let mut p = sp;
                     while !ANY && p > start && keys[(p - 1) & (STACK - 1)] < key {
                         keys[p & (STACK - 1)] = keys[(p - 1) & (STACK - 1)];
-                        entries[p & (STACK - 1)] = entries[(p - 1) & (STACK - 1)];
                         p -= 1;
                     }
                     keys[p & (STACK - 1)] = key;
-                    entries[p & (STACK - 1)] = inside.select(t, F32x8::INFINITY);
                     sp += 1;
                 }
             }
@@ -165,7 +151,7 @@ pub(super) fn walk_packet<const ANY: bool>(
                     let p = each(|v| each(|k| F32x8::splat(leaf.p[3 * v + axes[k]][i])));
                     let Some(c) = intersect(&p, &line, b.t) else { continue };
                     // rays that miss the leaf's box miss its triangles, also when they go alone
-                    let mask = c.mask & entry.le(b.t);
+                    let mask = c.mask & inside;
                     if ANY {
                         occluded |= mask.bits();
                         b.t = mask.select(never, b.t);
@@ -183,7 +169,7 @@ pub(super) fn walk_packet<const ANY: bool>(
             }
         }
         if changed {
-            latest = F32x8::splat(b.t.max_lane());
+            latest = b.t.max_lane();
             if ANY && occluded == group {
                 break 'walk;
             }
@@ -193,9 +179,20 @@ pub(super) fn walk_packet<const ANY: bool>(
                 break 'walk;
             }
             sp -= 1;
-            entry = entries[sp & (STACK - 1)];
-            if entry.le(b.t).any() {
-                child = keys[sp & (STACK - 1)] as u32;
+            let key = keys[sp & (STACK - 1)];
+            let (parent, slot) = ((key as u32 >> 3) as usize, key as usize & 7);
+            let Some(node) = tree.0.get(parent).filter(|_| f32::from_bits((key >> 32) as u32) <= latest) else {
+                continue;
+            };
+            let mut leave = b.t;
+            entry = line.tmin;
+            for k in 0..3 {
+                entry = entry.max((near[k] - F32x8::splat(node.bounds[low[k].min(5)][slot])) * ninv[k]);
+                leave = leave.min((far[k] - F32x8::splat(node.bounds[high[k].min(5)][slot])) * ninv[k]);
+            }
+            inside = entry.le(leave);
+            if inside.any() {
+                child = node.child[slot];
                 break;
             }
         }

@@ -73,7 +73,9 @@ pub(super) fn intersect(p: &Vertices, r: &Line, limit: F32x8) -> Option<Candidat
     if (mask & behind).any() {
         let doubt = mask & behind & t.le(error(&a, &b, &c, [u, v, w], scale, r.shear[2]));
         if doubt.any() {
-            mask = mask.and_not(not_ahead(p, r, doubt));
+            // copies: a reference to the originals would keep them in memory on the hot path
+            let (p, o, d) = (*p, r.o, r.d);
+            mask = mask.and_not(not_ahead(&p, &o, &d, doubt));
             if mask.none() {
                 return None;
             }
@@ -98,7 +100,7 @@ fn error(a: &[F32x8; 3], b: &[F32x8; 3], c: &[F32x8; 3], e: [F32x8; 3], scale: F
 /// products of those with 2^-53 relative error, against heights that are at least some 2^-24 of the coordinates.
 #[cold]
 #[inline(never)]
-fn not_ahead(p: &Vertices, r: &Line, doubt: Mask8) -> Mask8 {
+fn not_ahead(p: &Vertices, o: &[F32x8; 3], d: &[F32x8; 3], doubt: Mask8) -> Mask8 {
     let mut bits = 0;
     for i in doubt.lanes() {
         let at = |v: &[F32x8; 3]| v.map(|x| f64::from(x.lane(i)));
@@ -107,7 +109,7 @@ fn not_ahead(p: &Vertices, r: &Line, doubt: Mask8) -> Mask8 {
         let (a, b, c) = (at(&p[0]), at(&p[1]), at(&p[2]));
         let (e, f) = (sub(b, a), sub(c, a));
         let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
-        let (height, slope) = (dot(sub(a, at(&r.o)), n), dot(at(&r.d), n));
+        let (height, slope) = (dot(sub(a, at(o)), n), dot(at(d), n));
         let ahead = (height > 0.0 && slope > 0.0) || (height < 0.0 && slope < 0.0);
         bits |= u32::from(!ahead) << i;
     }
