@@ -249,7 +249,7 @@ impl F32x8 {
     /// Transposes an 8x8 block: `out[r]` lane `c` = `rows[c]` lane `r`.
     #[inline(always)]
     pub fn transpose(rows: [Self; 8]) -> [Self; 8] {
-        f32x8::transpose(rows.map(|r| r.0)).map(Self)
+        bytemuck::cast(f32x8::transpose(bytemuck::cast(rows)))
     }
 }
 

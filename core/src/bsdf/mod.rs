@@ -185,10 +185,11 @@ impl<'s> Materials8<'s> {
     #[inline(always)]
     fn new(scene: &Scene<'s>, inputs: &Inputs8, active: Mask8) -> Self {
         let (index, bits) = (inputs.material.to_array(), active.bits());
-        Self(core::array::from_fn(|i| {
+        let of = |i: usize| {
             let m = if bits >> i & 1 == 1 { scene.materials.get(index[i] as usize) } else { None };
             m.unwrap_or(IDLE)
-        }))
+        };
+        Self([of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)])
     }
 
     /// One number per lane.

@@ -115,13 +115,26 @@ impl Vertex8 {
 
     /// The eight lanes as records.
     pub(crate) fn to_records(self) -> [Vertex; 8] {
-        let rows = self.to_columns().map(|c| F32x8::transpose(c).map(F32x8::to_array));
-        core::array::from_fn(|i| Vertex { rows: [rows[0][i], rows[1][i], rows[2][i], rows[3][i]] })
+        let mut out: [Vertex; 8] = Zeroable::zeroed();
+        for (r, columns) in self.to_columns().into_iter().enumerate() {
+            for (v, row) in out.iter_mut().zip(F32x8::transpose(columns)) {
+                v.rows[r] = row.to_array();
+            }
+        }
+        out
     }
 
     /// Loads one record per lane.
     pub(crate) fn from_records(v: [&Vertex; 8]) -> Self {
-        Self::from_columns(core::array::from_fn(|r| F32x8::transpose(v.map(|v| F32x8::new(v.rows[r])))))
+        let mut columns = [[F32x8::ZERO; 8]; 4];
+        for (r, c) in columns.iter_mut().enumerate() {
+            let mut rows = [F32x8::ZERO; 8];
+            for (row, v) in rows.iter_mut().zip(v) {
+                *row = F32x8::new(v.rows[r]);
+            }
+            *c = F32x8::transpose(rows);
+        }
+        Self::from_columns(columns)
     }
 }
 
