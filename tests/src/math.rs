@@ -313,8 +313,9 @@ pub fn sweep_pairs(f: &Binary, packets: u64, seed: u64) -> PairSweep {
                 s.max = (e, a, b);
             }
             // a NaN ratio is an argument without a promise: count it as broken
-            if !(ratio <= s.ratio.0) {
-                s.ratio = (if ratio.is_nan() { f64::INFINITY } else { ratio }, a, b);
+            let ratio = if ratio.is_nan() { f64::INFINITY } else { ratio };
+            if ratio > s.ratio.0 {
+                s.ratio = (ratio, a, b);
             }
             s.mean += e / (8 * packets) as f64;
         }

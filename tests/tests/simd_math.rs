@@ -106,7 +106,7 @@ fn thresholds_and_special_values() {
             0.75,
             0.875,
             1.0,
-            1.414_213_5,
+            std::f32::consts::SQRT_2,
             2.0,
             0.346_573_6,
             87.336_54,
