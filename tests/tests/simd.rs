@@ -229,13 +229,13 @@ fn normalize_over_all_exponents() {
                 v
             });
             let got = Vec3x8::from_fn(|i| v[i]).normalize();
-            for i in 0..8 {
-                let (exact, got) = (v[i].map(f64::from), got.lane(i).map(f64::from));
+            for (i, v) in v.iter().enumerate() {
+                let (exact, got) = (v.map(f64::from), got.lane(i).map(f64::from));
                 let l = dot(exact, exact).sqrt();
                 let off = (0..3).map(|k| (got[k] - exact[k] / l).abs()).fold(0.0, f64::max);
                 let length = (dot(got, got).sqrt() - 1.0).abs();
                 worst = [worst[0].max(off), worst[1].max(length)];
-                assert!(off <= 2.4e-7 && length <= 2.4e-7, "{:?}: {got:?}, off {off:e}, length {length:e}", v[i]);
+                assert!(off <= 2.4e-7 && length <= 2.4e-7, "{v:?}: {got:?}, off {off:e}, length {length:e}");
             }
         }
     }
