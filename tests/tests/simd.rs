@@ -181,7 +181,7 @@ fn direction(r: &mut Random) -> [f32; 3] {
     v.map(|c| (c / l) as f32)
 }
 
-// Killed by: Frisvad's frame (no sign: 0.6 near n.z = -1); `sign` from a comparison with n.z = -0; s and t exchanged.
+// Killed by: Frisvad's frame (no sign: 0.6 near n.z = -1); s and t exchanged; one sign lost in `t`.
 #[test]
 fn frames_are_orthonormal_everywhere() {
     let mut r = Random(11);
@@ -196,7 +196,7 @@ fn frames_are_orthonormal_everywhere() {
         let v: [[f32; 3]; 8] = std::array::from_fn(|_| direction(&mut r));
         let frame = Frame8::from_normal(Vec3x8::from_fn(|i| n[i]));
         let round_trip = frame.to_world(frame.to_local(Vec3x8::from_fn(|i| v[i])));
-        for i in 0..8 {
+        for (i, v) in v.iter().enumerate() {
             let [s, t, n] = [frame.s, frame.t, frame.n].map(|v| v.lane(i).map(f64::from));
             let off = [dot(s, t), dot(s, n), dot(t, n), dot(s, s).sqrt() - 1.0, dot(t, t).sqrt() - 1.0];
             let e = off.iter().fold(0f64, |m, x| m.max(x.abs()));
@@ -205,8 +205,8 @@ fn frames_are_orthonormal_everywhere() {
             let cross = [s[1] * t[2] - s[2] * t[1], s[2] * t[0] - s[0] * t[2], s[0] * t[1] - s[1] * t[0]];
             assert!(dot(cross, n) > 0.999_999, "left-handed for the normal {n:?}");
             let back = round_trip.lane(i);
-            let e = (0..3).map(|k| (back[k] - v[i][k]).abs()).fold(0.0, f32::max);
-            assert!(e <= 1e-6, "{:?} came back as {back:?}", v[i]);
+            let e = (0..3).map(|k| (back[k] - v[k]).abs()).fold(0.0, f32::max);
+            assert!(e <= 1e-6, "{v:?} came back as {back:?}");
         }
     }
     println!("frames: worst deviation {worst:e}");
@@ -229,13 +229,13 @@ fn normalize_over_all_exponents() {
                 v
             });
             let got = Vec3x8::from_fn(|i| v[i]).normalize();
-            for i in 0..8 {
-                let (exact, got) = (v[i].map(f64::from), got.lane(i).map(f64::from));
+            for (i, v) in v.iter().enumerate() {
+                let (exact, got) = (v.map(f64::from), got.lane(i).map(f64::from));
                 let l = dot(exact, exact).sqrt();
                 let off = (0..3).map(|k| (got[k] - exact[k] / l).abs()).fold(0.0, f64::max);
                 let length = (dot(got, got).sqrt() - 1.0).abs();
                 worst = [worst[0].max(off), worst[1].max(length)];
-                assert!(off <= 2.4e-7 && length <= 2.4e-7, "{:?}: {got:?}, off {off:e}, length {length:e}", v[i]);
+                assert!(off <= 2.4e-7 && length <= 2.4e-7, "{v:?}: {got:?}, off {off:e}, length {length:e}");
             }
         }
     }
