@@ -3,6 +3,7 @@
 pub mod blob;
 pub mod bsdf;
 pub mod geometry;
+pub mod jacobian;
 pub mod light_oracle;
 pub mod light_scene;
 pub mod light_stats;
