@@ -90,8 +90,10 @@ fn depth_is_bounded_for_hostile_geometry() {
     // each box half as large as the one around it
     let nested: Vec<Tri> = (0..250).map(|i| triangle(0.0, 2f32.powi(120 - i))).collect();
     let row: Vec<Tri> = (0..250).map(|i| triangle(2f32.powi(i - 125), 2f32.powi(i - 128))).collect();
+    // unequal but all of one size, as a stack of sheets of paper
+    let stack: Vec<Tri> = (0..20_000).map(|i| triangle(0.0, 1.0).map(|p| [p[0], p[1], 1e-4 * i as f32])).collect();
     let both: Vec<Tri> = nested.iter().flat_map(|t| [*t; 40]).chain(row.iter().copied()).collect();
-    for triangles in [&coincident, &nested, &row, &both] {
+    for triangles in [&coincident, &nested, &row, &stack, &both] {
         for effort in [Effort::Fast, Effort::Medium] {
             assert!(check(&build(triangles, effort), triangles).iter().all(|n| *n == 1));
         }
