@@ -83,6 +83,18 @@ pub fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [0, 1, 2].map(|k| a[k] - b[k])
 }
 
+/// `n` random triangles of about `extent` times `size` in a cube of half-width `size` around `offset`.
+pub fn soup(n: usize, offset: [f32; 3], size: f32, extent: f32, r: &mut Rng) -> Vec<Tri> {
+    let triangle = |_| {
+        let c = r.cube();
+        [0, 1, 2].map(|_| {
+            let e = r.cube();
+            [0, 1, 2].map(|k| offset[k] + size * (c[k] + extent * e[k]))
+        })
+    };
+    (0..n).map(triangle).collect()
+}
+
 /// Closed, star-shaped mesh around `offset`: a sphere of `n` x `n` vertices with radii in [1, 6] `scale`.
 pub fn star(n: usize, offset: [f32; 3], scale: f32, seed: u64) -> Vec<Tri> {
     let mut r = Rng(seed);

@@ -34,7 +34,7 @@ pub fn surface_point(scene: &Scene<'_>, triangle: U32x8, u: F32x8, v: F32x8, mas
     let (a, b, c) = (at(0), at(1), at(2));
     let w = F32x8::ONE - u - v;
     let (pa, pb, pc) = (a * w, b * u, c * v);
-    let n = (b - a).cross(c - a);
+    let n = normal(a, b, c);
     let size = n.abs().max_component();
     // scaled before the length: edges of 1e-12 square to nothing; `max` also turns a NaN into the tiny value
     let tiny = F32x8::splat(1e-37);
@@ -43,6 +43,17 @@ pub fn surface_point(scene: &Scene<'_>, triangle: U32x8, u: F32x8, v: F32x8, mas
     let ng = Vec3x8::select(size.gt(tiny) & size.is_finite(), n / n.length(), up);
     let sum = pa.abs() + pb.abs() + pc.abs();
     SurfacePoint8 { p: pa + pb + pc, ng, error: sum.dot(ng.abs()) * (32.0 / 16_777_216.0) }
+}
+
+/// Normal of twice the area's length from the two shorter edges: of a needle the two long ones are nearly parallel, and the
+/// roundings of their cross product would tilt it.
+fn normal(a: Vec3x8, b: Vec3x8, c: Vec3x8) -> Vec3x8 {
+    let (ab, bc, ca) = (b - a, c - b, a - c);
+    let (x, y, z) = (ab.length_sqr(), bc.length_sqr(), ca.length_sqr());
+    let skip_ab = x.ge(y) & x.ge(z);
+    let skip_bc = y.ge(z);
+    let rest = Vec3x8::select(skip_bc, ca.cross(ab), ab.cross(bc));
+    Vec3x8::select(skip_ab, bc.cross(ca), rest)
 }
 
 /// `p` moved along `ng` by `error` to the side that `d` points to. Rounding the sum moves it by at most `error / 32`.

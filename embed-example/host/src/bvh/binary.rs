@@ -4,6 +4,7 @@ use super::Effort;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::PlocBuilder;
 
@@ -56,22 +57,14 @@ pub(super) struct Binary {
 
 /// Binary tree over the finite triangles, root first, children after their parents; empty without triangles.
 pub(super) fn build(triangles: &[[[f32; 3]; 3]], effort: Effort) -> Vec<Binary> {
-    let finite = |t: &&u32| triangles[**t as usize].as_flattened().iter().all(|x| x.is_finite());
-    let all: Vec<u32> = (0..triangles.len() as u32).collect();
-    let ids: Vec<u32> = all.iter().filter(finite).copied().collect();
-    if ids.is_empty() {
-        return Vec::new();
+    let groups = coincident(triangles);
+    let Some((first, _)) = groups.first() else { return Vec::new() };
+    if groups.len() == 1 {
+        let mut out = vec![Binary { bounds: *first, index: 0, leaf: true }];
+        expand(&mut out, 0, &groups[0].1);
+        return out;
     }
-    if let [id] = ids[..] {
-        return vec![Binary { bounds: Bounds::of(&triangles[id as usize]), index: id, leaf: true }];
-    }
-    let boxes: Vec<Aabb> = ids
-        .iter()
-        .map(|&id| {
-            let b = Bounds::of(&triangles[id as usize]);
-            Aabb { min: b.min.into(), max: b.max.into() }
-        })
-        .collect();
+    let boxes: Vec<Aabb> = groups.iter().map(|(b, _)| Aabb { min: b.min.into(), max: b.max.into() }).collect();
     let p = match effort {
         Effort::Fast => BvhBuildParams::very_fast_build(),
         Effort::Medium => BvhBuildParams::medium_build(),
@@ -85,19 +78,51 @@ pub(super) fn build(triangles: &[[[f32; 3]; 3]], effort: Effort) -> Vec<Binary> 
         p.sort_precision,
         p.search_depth_threshold,
     );
-    ReinsertionOptimizer::default().run(&mut bvh, p.reinsertion_batch_ratio, None);
-    copy(&bvh, &ids, triangles)
+    let ratio = p.reinsertion_batch_ratio.min(affordable(&bvh));
+    if ratio * boxes.len() as f32 >= 1.0 {
+        ReinsertionOptimizer::default().run(&mut bvh, ratio, None);
+    }
+    copy(&bvh, &groups)
 }
 
-/// Own copy in an order with children after parents, boxes computed anew from the triangles.
-fn copy(bvh: &Bvh2, ids: &[u32], triangles: &[[[f32; 3]; 3]]) -> Vec<Binary> {
+/// Share of the nodes that may look for a better place. Each looks at about as many nodes as a random ray would visit,
+/// which is some hundred in real scenes, but all of them where boxes coincide: unlimited, the search is quadratic there.
+fn affordable(bvh: &Bvh2) -> f32 {
+    const STEPS: f64 = 3e8;
+    let area = |n: &Bvh2Node| f64::from(n.aabb().half_area());
+    let root = area(&bvh.nodes[0]);
+    let visited = bvh.nodes.iter().map(|n| (area(n) / root).min(1.0)).sum::<f64>();
+    (STEPS / (bvh.nodes.len() as f64 * visited.max(1.0))) as f32
+}
+
+/// The finite triangles grouped by equal boxes. PLOC merges nearest neighbours: among equal boxes hardly any two choose
+/// each other, and it would need as many passes as there are boxes.
+fn coincident(triangles: &[[[f32; 3]; 3]]) -> Vec<(Bounds, Vec<u32>)> {
+    let mut sorted: Vec<([u32; 6], u32)> = Vec::with_capacity(triangles.len());
+    for (id, t) in triangles.iter().enumerate() {
+        if t.as_flattened().iter().all(|x| x.is_finite()) {
+            let b = Bounds::of(t);
+            let bits = std::array::from_fn(|k| if k < 3 { b.min[k] } else { b.max[k - 3] }.to_bits());
+            sorted.push((bits, id as u32));
+        }
+    }
+    sorted.sort_unstable();
+    let group = |g: &[([u32; 6], u32)]| (Bounds::of(&triangles[g[0].1 as usize]), g.iter().map(|x| x.1).collect());
+    let mut groups: Vec<(Bounds, Vec<u32>)> = sorted.chunk_by(|x, y| x.0 == y.0).map(group).collect();
+    groups.sort_unstable_by_key(|g| g.1[0]);
+    groups
+}
+
+/// Own copy in an order with children after parents.
+fn copy(bvh: &Bvh2, groups: &[(Bounds, Vec<u32>)]) -> Vec<Binary> {
     let mut out = vec![Binary { bounds: Bounds::EMPTY, index: 0, leaf: false }];
     let mut todo = vec![(0usize, 0usize)];
     while let Some((from, to)) = todo.pop() {
         let n = &bvh.nodes[from];
         if n.is_leaf() {
-            let id = ids[bvh.primitive_indices[n.first_index as usize] as usize];
-            out[to] = Binary { bounds: Bounds::of(&triangles[id as usize]), index: id, leaf: true };
+            let (bounds, ids) = &groups[bvh.primitive_indices[n.first_index as usize] as usize];
+            out[to].bounds = *bounds;
+            expand(&mut out, to, ids);
             continue;
         }
         let first = out.len();
@@ -113,4 +138,21 @@ fn copy(bvh: &Bvh2, ids: &[u32], triangles: &[[[f32; 3]; 3]]) -> Vec<Binary> {
         }
     }
     out
+}
+
+/// Makes node `at` a balanced tree over `ids`, all with its box.
+fn expand(out: &mut Vec<Binary>, at: usize, ids: &[u32]) {
+    let mut todo = vec![(at, ids)];
+    while let Some((at, ids)) = todo.pop() {
+        if let [id] = ids {
+            (out[at].index, out[at].leaf) = (*id, true);
+            continue;
+        }
+        let first = out.len();
+        (out[at].index, out[at].leaf) = (first as u32, false);
+        out.extend([Binary { bounds: out[at].bounds, index: 0, leaf: true }; 2]);
+        let (left, right) = ids.split_at(ids.len() / 2);
+        todo.push((first, left));
+        todo.push((first + 1, right));
+    }
 }
