@@ -12,3 +12,8 @@ pub mod quadrature;
 pub mod stats;
 pub mod texture_oracle;
 pub mod walk;
+
+/// The README's Rust code, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;

@@ -8,12 +8,19 @@ use std::collections::HashMap;
 ///
 /// ```
 /// let scene = croupier_host::builtin::cornell_box();
-/// assert_eq!(scene.camera.size, [512, 512]);
+/// assert_eq!(scene.camera.size, [400, 400]);
 /// assert!(scene.triangles.len() > 10_000);
 /// ```
 pub fn cornell_box() -> SceneDescription {
     let mut scene = SceneDescription {
-        camera: Camera { origin: [0.0, 1.0, 6.8], target: [0.0, 1.0, 0.0], vfov_deg: 20.2, ..Camera::default() },
+        // So many pixels that the program's default number of samples takes seconds on two cores.
+        camera: Camera {
+            origin: [0.0, 1.0, 6.8],
+            target: [0.0, 1.0, 0.0],
+            vfov_deg: 20.2,
+            size: [400, 400],
+            ..Camera::default()
+        },
         ..SceneDescription::default()
     };
     let diffuse = |rgb| Model::Diffuse { reflectance: Reflectance::Constant(rgb) };

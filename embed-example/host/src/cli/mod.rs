@@ -15,7 +15,7 @@ use std::error::Error;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-/// Renders with efficiency-aware Russian roulette and splitting. Without a command it renders the built-in scene.
+/// Path tracer with Russian roulette and splitting. Without a command it renders the built-in scene.
 #[derive(Parser)]
 #[command(name = "croupier", version, args_conflicts_with_subcommands = true)]
 struct Cli {

@@ -47,9 +47,9 @@ pub struct Flags {
     /// Units of parallel work; the image depends on their number
     #[arg(long, value_name = "N", default_value_t = RenderOptions::default().shards, value_parser = clap::value_parser!(u32).range(1..=65536))]
     shards: u32,
-    /// Stops of exposure for the PNG
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = stops, allow_negative_numbers = true)]
-    exposure: f32,
+    /// Stops of exposure for the PNG; 0 if absent, 1 for the built-in scene
+    #[arg(long, value_name = "STOPS", value_parser = stops, allow_negative_numbers = true)]
+    exposure: Option<f32>,
     /// Print the figures as one line of JSON
     #[arg(long)]
     json: bool,
@@ -126,7 +126,9 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     picture.write_exr(&flags.output)?;
     let (width, height) = (picture.width, picture.height);
     let image = picture.rgb("").ok_or_else(|| format!("{}: the picture has no colours", flags.output.display()))?;
-    write_png(&png, width, height, &tonemap(&image, flags.exposure, Curve::Shoulder))?;
+    // Its lamp lights the walls to about a fifth of white.
+    let exposure = flags.exposure.unwrap_or(if path.is_none() { 1.0 } else { 0.0 });
+    write_png(&png, width, height, &tonemap(&image, exposure, Curve::Shoulder))?;
     if flags.json {
         return say_json(&Report {
             stats,
