@@ -115,7 +115,7 @@ fn factors_stay_in_their_bounds() {
 #[test]
 fn unknown_strategies_and_options_are_named() {
     let message = |t: &str| Strategy::parse(t).unwrap_err().to_string();
-    assert!(message("roulette").contains("known: none threshold"));
+    assert!(message("roulette").contains("known are none, threshold"));
     for bad in [
         "fixed",
         "fixed:0.01",

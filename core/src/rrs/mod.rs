@@ -138,8 +138,9 @@ impl fmt::Display for ParseError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Name => {
-                f.write_str("unknown roulette strategy; known:")?;
-                Strategy::TABLE.iter().try_for_each(|(n, _)| write!(f, " {n}"))
+                f.write_str("unknown roulette strategy; known are ")?;
+                let mut names = Strategy::TABLE.iter().enumerate();
+                names.try_for_each(|(i, (n, _))| write!(f, "{}{n}", if i == 0 { "" } else { ", " }))
             }
             Self::Options(name) => {
                 let help = Strategy::TABLE.iter().find(|t| t.0 == *name).map_or("", |t| t.1);
