@@ -152,11 +152,12 @@ impl<'m> Shard<'m> {
         } else {
             return false;
         };
-        let waiting = self.plan.settings().ring as usize - self.pool.free();
-        self.counters.ring_peak = self.counters.ring_peak.max(waiting as u64);
         if let Some(f) = flight {
             self.advance(session, &f);
         }
+        // after what arrived was stored, before the next packet is taken
+        let waiting = self.plan.settings().ring as usize - self.pool.free();
+        self.counters.ring_peak = self.counters.ring_peak.max(waiting as u64);
         true
     }
 
