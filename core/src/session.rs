@@ -32,6 +32,11 @@ pub enum SessionError {
         /// Its index.
         shard: u32,
     },
+    /// This shard was made for other settings.
+    Plan {
+        /// Its index.
+        shard: u32,
+    },
     /// No iteration has begun.
     NoIteration,
 }
@@ -49,6 +54,7 @@ impl fmt::Display for SessionError {
                 write!(f, "end_iteration needs every shard in order; shard {expected} is missing")
             }
             Self::Unfinished { shard } => write!(f, "shard {shard} has not finished the iteration"),
+            Self::Plan { shard } => write!(f, "shard {shard} was made for another plan"),
             Self::NoIteration => f.write_str("no iteration has begun"),
         }
     }
@@ -130,6 +136,10 @@ impl<'s, 'm, P: Profile, I: Intersector> Session<'s, 'm, P, I> {
         for s in shards.clone() {
             if s.index != expected {
                 return Err(SessionError::Shards { expected });
+            }
+            // its sums would go to the wrong pixels
+            if s.settings() != self.plan.settings() {
+                return Err(SessionError::Plan { shard: s.index });
             }
             if !s.is_done(self.iteration.number) {
                 return Err(SessionError::Unfinished { shard: s.index });

@@ -9,6 +9,8 @@ pub mod light_scene;
 pub mod light_stats;
 pub mod math;
 pub mod quadrature;
+pub mod runner;
+pub mod scenes;
 pub mod stats;
 pub mod texture_oracle;
 pub mod walk;

@@ -10,7 +10,7 @@ use crate::film::{PixelAov, PixelStats};
 use crate::memory::{Carver, MemoryError};
 use crate::profile::Profile;
 use crate::session::Session;
-use crate::settings::Plan;
+use crate::settings::{Plan, Settings};
 use crate::tiles::TILE_PIXELS;
 use core::fmt;
 use rand_core::{Rng, SeedableRng};
@@ -108,8 +108,9 @@ impl<'m> Shard<'m> {
         &self.counters
     }
 
-    /// Starts no further camera samples; stepping on to [`Progress::Done`] finishes those in flight, so that what was
-    /// rendered stays unbiased.
+    /// Starts no further camera samples in the iteration of its last step; stepping on to [`Progress::Done`] finishes
+    /// those in flight, so that what was rendered stays unbiased. A shard that has not stepped in this iteration yet
+    /// joins it with a step of 0 rays first.
     pub fn stop(&mut self) {
         self.cursor = Cursor::finished();
     }
@@ -151,11 +152,12 @@ impl<'m> Shard<'m> {
         } else {
             return false;
         };
-        let waiting = self.plan.settings().ring as usize - self.pool.free();
-        self.counters.ring_peak = self.counters.ring_peak.max(waiting as u64);
         if let Some(f) = flight {
             self.advance(session, &f);
         }
+        // after what arrived was stored, before the next packet is taken
+        let waiting = self.plan.settings().ring as usize - self.pool.free();
+        self.counters.ring_peak = self.counters.ring_peak.max(waiting as u64);
         true
     }
 
@@ -171,6 +173,11 @@ impl<'m> Shard<'m> {
             tile = self.plan.tiles.next_of(self.index, tile + 1)?;
         }
         self.plan.tiles.pixel(tile, slot % TILE_PIXELS).map(|p| self.plan.tiles.film_index(p))
+    }
+
+    /// What it was made for.
+    pub(crate) fn settings(&self) -> &Settings {
+        self.plan.settings()
     }
 
     /// Has it finished the iteration of this number?

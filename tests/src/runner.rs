@@ -1,0 +1,159 @@
+//! Drives the core by hand, in any order of shards and steps; compiled once for all tests.
+
+use croupier::accel::{Intersector, WideBvh};
+use croupier::film::{PixelAov, PixelStats};
+use croupier::profile::{Full, Matte, Profile};
+use croupier::{Budget, Counters, ErrorEstimate, Plan, Progress, Scene, Session, Settings, Shard, Strategy};
+use croupier_host::blob::AlignedBytes;
+
+use crate::stats::SplitMix;
+
+/// How the steps of an iteration are dealt out.
+#[derive(Clone, Copy, Debug)]
+pub enum Schedule {
+    /// One shard after the other, steps of that many rays.
+    InOrder(u64),
+    /// The last shard first.
+    Reversed(u64),
+    /// A step for each in turn.
+    InTurn(u64),
+    /// A random shard makes a step of a random number of rays up to this; the number seeds.
+    Shuffled(u64, u64),
+    /// That many threads, shards dealt out among them, steps of that many rays.
+    Threads(usize, u64),
+}
+
+/// What a render leaves behind.
+#[derive(Clone, Debug)]
+pub struct Image {
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// Sums per pixel.
+    pub pixels: Vec<PixelStats>,
+    /// Auxiliary sums.
+    pub aovs: Vec<PixelAov>,
+    /// What happened.
+    pub counters: Counters,
+    /// The film's own estimate.
+    pub error: ErrorEstimate,
+}
+
+impl Image {
+    /// Mean over pixels and channels.
+    pub fn mean(&self) -> f64 {
+        self.pixels.iter().flat_map(|p| p.mean()).sum::<f64>() / (3 * self.pixels.len()) as f64
+    }
+
+    /// Standard error of [`Self::mean`] from the film's variances; channels of a pixel count as fully correlated.
+    pub fn error_of_mean(&self) -> f64 {
+        let pixel = |p: &PixelStats| (p.variance_of_mean().iter().map(|v| v.sqrt()).sum::<f64>() / 3.0).powi(2);
+        self.pixels.iter().map(pixel).sum::<f64>().sqrt() / self.pixels.len() as f64
+    }
+
+    /// Mean over pixels of one channel.
+    pub fn channel(&self, c: usize) -> f64 {
+        self.pixels.iter().map(|p| p.mean()[c]).sum::<f64>() / self.pixels.len() as f64
+    }
+
+    /// Its standard error.
+    pub fn error_of_channel(&self, c: usize) -> f64 {
+        self.pixels.iter().map(|p| p.variance_of_mean()[c]).sum::<f64>().sqrt() / self.pixels.len() as f64
+    }
+
+    /// Every bit of the film.
+    pub fn bits(&self) -> Vec<u8> {
+        let pixels: &[u8] = bytemuck::cast_slice(&self.pixels);
+        [pixels, bytemuck::cast_slice(&self.aovs)].concat()
+    }
+}
+
+/// Settings for a scene's own camera, `strategy` in the words of the program.
+pub fn settings(scene: &[u8], strategy: &str) -> Settings {
+    let scene = Scene::from_bytes(scene).expect("a valid scene");
+    Settings { strategy: Strategy::parse(strategy).expect("a known strategy"), ..Settings::for_scene(&scene) }
+}
+
+/// Renders one iteration of `spp` samples, shard by shard.
+pub fn render(scene: &[u8], settings: &Settings, spp: u32) -> Image {
+    scheduled(scene, settings, &[spp], Schedule::InOrder(1 << 20))
+}
+
+/// Renders iterations of the given numbers of samples with the smallest profile.
+pub fn scheduled(scene: &[u8], settings: &Settings, iterations: &[u32], schedule: Schedule) -> Image {
+    let scene = Scene::from_bytes(scene).expect("a valid scene");
+    let bvh = WideBvh::new(&scene);
+    if Matte::EFFECTS.contains(scene.effects) {
+        render_with::<Matte, _>(scene, bvh, settings, iterations, schedule)
+    } else {
+        render_with::<Full, _>(scene, bvh, settings, iterations, schedule)
+    }
+}
+
+/// Renders with an intersector and a profile.
+pub fn render_with<P: Profile + Sync, I: Intersector + Sync>(
+    scene: Scene<'_>,
+    intersector: I,
+    settings: &Settings,
+    iterations: &[u32],
+    schedule: Schedule,
+) -> Image {
+    let plan = Plan::new(settings).expect("settings that can be used");
+    let mut shared = AlignedBytes::zeroed(plan.session().size);
+    let mut blocks: Vec<_> = (0..settings.shards).map(|_| AlignedBytes::zeroed(plan.shard().size)).collect();
+    let mut session = Session::<P, _>::new(scene, intersector, &plan, shared.as_mut()).expect("a session");
+    let shards = blocks.iter_mut().enumerate().map(|(i, b)| Shard::new(&plan, i as u32, b.as_mut()));
+    let mut shards: Vec<_> = shards.collect::<Result<_, _>>().expect("shards");
+    for spp in iterations {
+        session.begin_iteration(*spp);
+        run(&session, &mut shards, schedule);
+        session.end_iteration(&shards).expect("all shards are done");
+    }
+    let film = session.film();
+    Image {
+        size: film.size(),
+        pixels: film.pixels().to_vec(),
+        aovs: film.aovs().to_vec(),
+        counters: *session.counters(),
+        error: film.error_estimate(),
+    }
+}
+
+/// Steps a shard until it is done.
+pub fn finish<P: Profile, I: Intersector>(session: &Session<'_, '_, P, I>, shard: &mut Shard<'_>, rays: u64) {
+    while shard.step(session, Budget { rays }) == Progress::More {}
+}
+
+fn run<P: Profile + Sync, I: Intersector + Sync>(
+    session: &Session<'_, '_, P, I>,
+    shards: &mut [Shard<'_>],
+    schedule: Schedule,
+) {
+    match schedule {
+        Schedule::InOrder(rays) => shards.iter_mut().for_each(|s| finish(session, s, rays)),
+        Schedule::Reversed(rays) => shards.iter_mut().rev().for_each(|s| finish(session, s, rays)),
+        Schedule::InTurn(rays) => {
+            let mut more = true;
+            while more {
+                more = false;
+                for s in shards.iter_mut() {
+                    more |= s.step(session, Budget { rays }) == Progress::More;
+                }
+            }
+        }
+        Schedule::Shuffled(seed, rays) => {
+            let mut rng = SplitMix(seed);
+            let mut left: Vec<&mut Shard<'_>> = shards.iter_mut().collect();
+            while !left.is_empty() {
+                let i = (rng.bits() % left.len() as u64) as usize;
+                if left[i].step(session, Budget { rays: 1 + rng.bits() % rays }) == Progress::Done {
+                    left.swap_remove(i);
+                }
+            }
+        }
+        Schedule::Threads(threads, rays) => std::thread::scope(|scope| {
+            for chunk in shards.chunks_mut(shards.len().div_ceil(threads)) {
+                scope.spawn(move || chunk.iter_mut().for_each(|s| finish(session, s, rays)));
+            }
+        }),
+    }
+}

@@ -1,0 +1,152 @@
+//! The picture is a function of scene, settings, seed and shard count, to the bit: threads, step sizes and the order in
+//! which shards are stepped do not matter, nor, in `reproducible` arithmetic, does the instruction set.
+
+use croupier::Settings;
+use croupier::scene::blob::content_hash;
+use croupier_host::bake::{BakeOptions, bake};
+use croupier_host::builtin;
+use croupier_tests::runner::{Image, Schedule, render, scheduled, settings};
+use croupier_tests::scenes::{blob, cornell, everything};
+use std::fmt::Write;
+use std::path::Path;
+
+/// Killed by: a comb seeded by the clock or shared by shards, a random number that depends on the order of packets, a
+/// step that flushes a half-filled packet at the end of its budget, a merge in the order of completion.
+#[test]
+fn schedules_do_not_change_a_bit() {
+    for (name, scene) in [("cornell", cornell([24, 20])), ("everything", everything([24, 20]))] {
+        let scene = blob(&scene);
+        for strategy in ["classic:2", "fixed:3.3"] {
+            let settings = Settings { shards: 5, aovs: true, seed: 7, max_depth: 5, ..settings(&scene, strategy) };
+            let iterations = [1, 3];
+            let all = |schedule| scheduled(&scene, &settings, &iterations, schedule);
+            let reference = all(Schedule::InOrder(1_000_000_000));
+            assert!(reference.mean() > 0.05 && reference.counters.non_finite == 0);
+            for schedule in [
+                Schedule::InOrder(1),
+                Schedule::InOrder(100),
+                Schedule::Reversed(1 << 30),
+                Schedule::InTurn(1),
+                Schedule::InTurn(37),
+                Schedule::Shuffled(3, 50),
+                Schedule::Shuffled(4, 3000),
+                Schedule::Threads(2, 1_000_000_000),
+                Schedule::Threads(2, 64),
+                Schedule::Threads(5, 1000),
+            ] {
+                let other = all(schedule);
+                assert!(other.bits() == reference.bits(), "{name}, {strategy}, {schedule:?}: the picture differs");
+                assert_eq!(other.counters, reference.counters, "{name}, {strategy}, {schedule:?}");
+                assert_eq!(other.error, reference.error);
+            }
+        }
+    }
+}
+
+/// Same samples whether in one iteration or in many, or divided over other shards, as long as no comb decides anything.
+/// Killed by: keys that contain the iteration or the shard, `first_sample` not carried on, a pixel index local to the
+/// shard.
+#[test]
+fn samples_do_not_depend_on_iterations_or_shards() {
+    for scene in [cornell([21, 10]), everything([21, 10])] {
+        let scene = blob(&scene);
+        let one = Settings { max_depth: 6, aovs: true, ..settings(&scene, "none") };
+        let reference = render(&scene, &one, 12);
+        let same = |other: &Image, what: &str| {
+            for (i, (a, b)) in reference.pixels.iter().zip(&other.pixels).enumerate() {
+                assert_eq!((a.samples, a.rays), (b.samples, b.rays), "{what}, pixel {i}");
+                for (x, y) in a.sum.iter().chain(&a.sum_sqr).zip(b.sum.iter().chain(&b.sum_sqr)) {
+                    assert!((x - y).abs() <= 1e-13 * x.abs(), "{what}, pixel {i}: {x} and {y}");
+                }
+            }
+            assert_eq!(reference.counters.rays(), other.counters.rays());
+        };
+        let in_order = Schedule::InOrder(1 << 20);
+        same(&scheduled(&scene, &one, &[1; 12], in_order), "12 iterations");
+        same(&scheduled(&scene, &one, &[5, 0, 7], in_order), "iterations of 5, 0 and 7");
+        same(&render(&scene, &Settings { shards: 6, ..one }, 12), "6 shards");
+        same(&render(&scene, &Settings { ring: 16, ..one }, 12), "the smallest ring");
+    }
+}
+
+/// Every pixel gets exactly its samples, whatever the size and the number of shards. Killed by: tiles owned by no shard
+/// or by two, a cursor that skips the pixels beside an empty slot, roots lost when the ring is small.
+#[test]
+fn every_pixel_gets_its_samples() {
+    let scene = blob(&cornell([8, 8]));
+    let base = Settings { max_depth: 2, ..settings(&scene, "fixed:1.5") };
+    for size in [[1, 1], [1, 9], [17, 1], [8, 8], [9, 17], [40, 3], [33, 31]] {
+        for shards in [1, 2, 3, 7, 16, 100] {
+            for ring in [16, 64] {
+                let spp = 3;
+                let image = render(&scene, &Settings { size, shards, ring, ..base }, spp);
+                assert_eq!(image.pixels.len(), (size[0] * size[1]) as usize);
+                let short = image.pixels.iter().position(|p| p.samples != u64::from(spp));
+                assert_eq!(short, None, "{size:?}, {shards} shards, ring {ring}: a pixel without its samples");
+                assert_eq!(image.counters.camera_samples, u64::from(spp * size[0] * size[1]));
+            }
+        }
+    }
+}
+
+/// Killed by: a seed that is not used, or of which only the low word is.
+#[test]
+fn seeds_give_other_pictures() {
+    let scene = blob(&cornell([8, 8]));
+    let image = |seed| render(&scene, &Settings { seed, ..settings(&scene, "classic") }, 2).bits();
+    let seeds = [0, 1, 1 << 32, 1 << 63, u64::MAX];
+    let images = seeds.map(image);
+    for i in 0..seeds.len() {
+        for j in 0..i {
+            assert!(images[i] != images[j], "seeds {} and {}", seeds[i], seeds[j]);
+        }
+    }
+    assert!(image(1) == images[1]);
+}
+
+/// The host's driver gives the same bits for any number of threads. Killed by: merging in the order of completion.
+#[test]
+fn the_driver_does_not_depend_on_threads() {
+    use croupier_host::drive::{Options, Unobserved, drive};
+    use croupier_host::render::Target;
+    let scene = blob(&everything([24, 16]));
+    let settings = Settings { shards: 7, ..settings(&scene, "classic:2") };
+    let hash = |threads| {
+        let options = Options { settings, target: Target::Spp(5), threads };
+        let r = drive(&scene, &options, &Unobserved).unwrap();
+        assert_eq!(r.spp, 5);
+        (r.hash(), r.counters)
+    };
+    assert_eq!(hash(1), hash(2));
+    assert_eq!(hash(1), hash(3));
+}
+
+/// One file of hashes for all builds: baseline x86-64, x86-64-v3 and every other target must agree. `BLESS=1` rewrites
+/// it after a change that is meant to change pictures. Killed by: a fused multiply-add, an estimate instruction or a
+/// reduction whose order depends on the instruction set.
+#[test]
+fn pictures_have_the_same_bits_on_every_target() {
+    if !croupier::simd::REPRODUCIBLE {
+        println!("skipped: `fast` arithmetic does not promise the same bits everywhere");
+        return;
+    }
+    let mut box_of_the_program = builtin::cornell_box();
+    box_of_the_program.camera.size = [48, 48];
+    let mut text = String::from("# scene, strategy, hash of all sums of the film; rewrite with BLESS=1\n");
+    for (name, scene) in [("builtin", box_of_the_program), ("everything", everything([48, 36]))] {
+        let scene = bake(&scene, &BakeOptions::default(), |_, _| {}).unwrap().bytes;
+        for strategy in ["classic", "throughput", "fixed:3.3"] {
+            let settings =
+                Settings { shards: 4, aovs: true, max_depth: 12, split_budget: 64, ..settings(&scene, strategy) };
+            let image = scheduled(&scene, &settings, &[1, 3], Schedule::Threads(2, 4096));
+            assert_eq!(image.counters.non_finite, 0);
+            writeln!(text, "{name} {strategy} {:016x}", content_hash(&image.bits())).unwrap();
+        }
+    }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("snapshots/hashes.txt");
+    if std::env::var_os("BLESS").is_some() {
+        std::fs::write(&path, &text).unwrap();
+    }
+    let committed = std::fs::read_to_string(&path).unwrap_or_default();
+    assert_eq!(text, committed, "pictures changed; if that is meant, run with BLESS=1 and review the file");
+}

@@ -1,0 +1,106 @@
+//! Stepping allocates nothing: an allocator that reports every call while it is forbidden. Alone in its binary, because
+//! the allocator is global.
+
+use croupier::accel::WideBvh;
+use croupier::profile::{Full, Profile};
+use croupier::{Budget, Plan, Progress, Scene, Session, Settings, Shard, Strategy};
+use croupier_host::blob::AlignedBytes;
+use croupier_tests::scenes::{blob, cornell, everything};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+thread_local! {
+    /// Calls since they were forbidden; `None` while they are allowed.
+    static CALLS: Cell<Option<u64>> = const { Cell::new(None) };
+}
+
+struct Watched;
+
+fn note() {
+    CALLS.with(|c| c.set(c.get().map(|n| n + 1)));
+}
+
+// SAFETY: every call is passed on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Watched {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        note();
+        // SAFETY: the caller's promise.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, p: *mut u8, layout: Layout) {
+        note();
+        // SAFETY: the caller's promise.
+        unsafe { System.dealloc(p, layout) }
+    }
+
+    unsafe fn realloc(&self, p: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        note();
+        // SAFETY: the caller's promise.
+        unsafe { System.realloc(p, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Watched = Watched;
+
+/// Runs `f` and panics if it called the allocator.
+#[track_caller]
+fn without_allocating<T>(f: impl FnOnce() -> T) -> T {
+    CALLS.set(Some(0));
+    let result = f();
+    let calls = CALLS.take();
+    assert_eq!(calls, Some(0), "calls of the allocator");
+    result
+}
+
+/// The watch sees what it must. Killed by: an allocator that is not installed.
+#[test]
+#[should_panic(expected = "calls of the allocator")]
+fn the_watch_works() {
+    without_allocating(|| std::hint::black_box(vec![1u8; 100]).len());
+}
+
+/// From bytes to picture, with every strategy and every effect. Killed by: a `Vec` or a `format!` anywhere on the way.
+#[test]
+fn nothing_is_allocated_between_bytes_and_picture() {
+    for scene in [blob(&cornell([20, 12])), blob(&everything([20, 12]))] {
+        for (name, _) in Strategy::TABLE {
+            let text = if *name == "fixed" { "fixed:3.3" } else { name };
+            let strategy = Strategy::parse(text).unwrap();
+            render::<Full>(&scene, strategy);
+        }
+    }
+}
+
+fn render<P: Profile>(bytes: &[u8], strategy: Strategy) {
+    let scene = without_allocating(|| Scene::from_bytes(bytes)).unwrap();
+    let settings = Settings { strategy, shards: 2, aovs: true, max_depth: 6, ..Settings::for_scene(&scene) };
+    let plan = without_allocating(|| Plan::new(&settings)).unwrap();
+    let mut shared = AlignedBytes::zeroed(plan.session().size);
+    let mut blocks = [(); 2].map(|_| AlignedBytes::zeroed(plan.shard().size));
+    let [first, second] = &mut blocks;
+    without_allocating(|| {
+        let intersector = WideBvh::new(&scene);
+        let mut session = Session::<P, _>::new(scene, intersector, &plan, shared.as_mut()).unwrap();
+        let mut shards =
+            [Shard::new(&plan, 0, first.as_mut()).unwrap(), Shard::new(&plan, 1, second.as_mut()).unwrap()];
+        for samples in [1, 3] {
+            session.begin_iteration(samples);
+            assert!(session.end_iteration(&shards).is_err());
+            for s in &mut shards {
+                while s.step(&session, Budget { rays: 1000 }) == Progress::More {}
+            }
+            session.end_iteration(&shards).unwrap();
+        }
+        session.begin_iteration(8);
+        for s in &mut shards {
+            let _ = s.step(&session, Budget { rays: 50 });
+            s.stop();
+            while s.step(&session, Budget { rays: 1000 }) == Progress::More {}
+        }
+        session.end_iteration(&shards).unwrap();
+        let estimate = session.film().error_estimate();
+        assert!(estimate.rel_mse.is_finite() && session.counters().rays() > 0);
+    });
+}
