@@ -123,7 +123,7 @@ fn agrees_with_brute_force() {
     }
 }
 
-// Killed by: dropping the test for det = 0, dropping the comparison with `limit`.
+// Killed by: dropping the comparison with `limit`, one edge function forgotten.
 #[test]
 fn needles_and_degenerate_triangles_do_no_harm() {
     let mut r = Rng(2);
@@ -204,12 +204,18 @@ fn bits(h: &Hit8, i: usize) -> [u32; 5] {
 }
 
 // A lane alone, with garbage beside it, in a packet: the same bits. Killed by: a packet test that is not monotone, a
-// different order of roundings alone and in packets, garbage that reaches a reduction.
+// different order of roundings alone and in packets, t not bounded by the entry of its leaf.
 #[test]
 fn lanes_do_not_see_each_other() {
     let mut r = Rng(3);
     let mut triangles = star(24, [0.0; 3], 1.0, 5);
     triangles.extend(soup(500, [0.0; 3], 3.0, 0.4, &mut r));
+    // needles, whose t is so uncertain that it may come before their box
+    triangles.extend(
+        soup(2000, [0.0; 3], 1.0, 2.0, &mut r)
+            .into_iter()
+            .map(|[a, b, c]| [a, b, [0, 1, 2].map(|k| b[k] + 1e-6 * (c[k] - b[k]))]),
+    );
     let mesh = Mesh::new(triangles);
     let bvh = WideBvh::new(&mesh.scene());
     let garbage = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, 3e38, -3e38, 1e-40];
@@ -250,7 +256,7 @@ fn lanes_do_not_see_each_other() {
     assert!(packed > 3000, "{packed}");
 }
 
-// Killed by: a missing finiteness or zero check in the set-up, `tmin < tmax` dropped.
+// Killed by: comparisons that a NaN passes, a threshold for slow components that ignores the ray's length.
 #[test]
 fn invalid_rays_hit_nothing() {
     let mesh = Mesh::new(star(16, [0.0; 3], 1.0, 7));
@@ -273,7 +279,10 @@ fn invalid_rays_hit_nothing() {
         assert!(bvh.occluded(&rays8, Mask8::first(chunk.len())).none());
     }
     // extreme but valid directions still hit
-    let rays = [1e-30, 1e-15, 1.0, 1e15, 1e30f32].map(|s| Ray::new([0.0; 3], [s, -0.5 * s, 0.25 * s]));
+    let rays = [1e-30, 1e-15, 1.0, 1e15, 1e30f32].map(|s| {
+        let d = [s, -0.5 * s, 0.25 * s];
+        Ray { o: [0.0; 3], d, tmin: 0.1 / s, tmax: 10.0 / s }
+    });
     assert_eq!(bvh.closest(&packet(&rays), Mask8::first(5)).hit.count(), 5);
     let empty = WideBvh::from_parts(&[], &[]);
     assert!(empty.closest(&packet(&rays), Mask8::all_lanes()).hit.none());
@@ -320,7 +329,7 @@ fn restarting_behind_each_hit_enumerates_all() {
 }
 
 // The result is a function of the triangles: of two equal ones the lower index, whatever the tree. Killed by: `<=` for
-// `<` in the comparison of t, culling of subtrees that start exactly at the closest hit.
+// `<` in the comparison of t.
 #[test]
 fn ties_go_to_the_lower_index_in_every_tree() {
     let mut r = Rng(6);
