@@ -99,8 +99,8 @@ fn is_a_difference() {
 fn takes_any_input() {
     let a = vec![[f32::NAN, f32::INFINITY, -1.0]; 6];
     assert!(flip(3, 2, &a, &[[0.5; 3]; 6], Viewing::default()).iter().all(|e| (0.0..=1.0).contains(e)));
-    assert_eq!(flip(0, 0, &[], &[], Viewing::default()), []);
-    assert_eq!(flip(0, 5, &[], &[], Viewing::default()), []);
+    assert!(flip(0, 0, &[], &[], Viewing::default()).is_empty());
+    assert!(flip(0, 5, &[], &[], Viewing::default()).is_empty());
     assert_eq!(flip(1, 1, &[[0.0; 3]], &[], Viewing::default()), [0.0]);
     assert_eq!(flip(5, 1, &[], &[], Viewing::default()).len(), 5);
 }
