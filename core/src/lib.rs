@@ -12,6 +12,30 @@
 //! | [`rrs`] | how many samples a vertex gets | where it is |
 //! | `tracer` | packets, queues, stages | files, threads, clocks |
 //! | [`film`] | sums per pixel and their error | paths |
+//!
+//! A host asks how much memory is needed, hands it over, and steps the shards from as many threads as it likes:
+//!
+//! ```
+//! use croupier::{Budget, Plan, Progress, Scene, Session, Settings, Shard, accel::WideBvh, profile::Full};
+//!
+//! /// Renders 16 samples per pixel and returns the estimated relMSE.
+//! fn render(blob: &[u8], shared: &mut [u8], block: &mut [u8]) -> Result<f64, Box<dyn core::error::Error>> {
+//!     let scene = Scene::from_bytes(blob)?;
+//!     // `plan.session()` and `plan.shard()` are the sizes of the two blocks; see `BLOCK_ALIGN` for their alignment.
+//!     let plan = Plan::new(&Settings::for_scene(&scene))?;
+//!     let mut session = Session::<Full, _>::new(scene, WideBvh::new(&scene), &plan, shared)?;
+//!     let mut shard = Shard::new(&plan, 0, block)?;
+//!     session.begin_iteration(16);
+//!     while shard.step(&session, Budget { rays: 10_000 }) == Progress::More {}
+//!     session.end_iteration([&shard])?;
+//!     Ok(session.film().error_estimate().rel_mse)
+//! }
+//! assert!(render(b"no scene", &mut [], &mut []).is_err());
+//! ```
+//!
+//! The picture is a function of scene bytes, settings and samples per iteration: threads, order of the shards and step
+//! sizes do not change a bit of it, and neither does the instruction set unless the feature `fast` is on. The crate
+//! computes with the instructions it is compiled for; on x86-64 set `-C target-cpu=x86-64-v3` in the program's own build.
 #![no_std]
 #![forbid(unsafe_code)]
 

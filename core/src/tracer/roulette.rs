@@ -73,7 +73,7 @@ impl Shard<'_> {
         let n = rrs::comb(a.active.zero_unless(s), self.comb_bits());
         self.record_factors(a.active, s, &v);
         v.beta = v.beta / s;
-        v.albedo_product = v.albedo_product * albedo.mean();
+        v.albedo_product *= albedo.mean();
         v.count = U32x8::new(n);
         let root = v.root.to_array();
         let records = v.to_records();
@@ -108,7 +108,7 @@ impl Shard<'_> {
             let root = root.to_array();
             let bits =
                 splitting.lanes().filter(|&i| self.roots.get(root[i]).splits >= budget).fold(0, |m, i| m | 1 << i);
-            cut = cut | Mask8::from_bits(bits);
+            cut |= Mask8::from_bits(bits);
             self.counters.budget_capped += u64::from(cut.count());
         }
         cut.select(F32x8::ONE, s)

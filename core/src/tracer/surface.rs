@@ -63,7 +63,7 @@ impl Shard<'_> {
         if wants_aov {
             self.record_first_hit(first, f, hit, &s);
         }
-        going = going & s.scatters;
+        going &= s.scatters;
         self.close_lanes(mask.and_not(going), f.root);
         if going.none() {
             return;

@@ -30,7 +30,7 @@ impl Shard<'_> {
         }
         self.charge(f.active, f.root);
         let mut hit = session.intersector().closest(&f.ray, f.active);
-        hit.hit = hit.hit & f.active;
+        hit.hit &= f.active;
         hit
     }
 }
