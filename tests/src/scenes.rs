@@ -170,7 +170,7 @@ pub fn everything(size: [u32; 2]) -> SceneDescription {
         ..SceneDescription::default()
     };
     let texel = |x: u32, y: u32| {
-        let light = (x / 2 + y / 2) % 2 == 0;
+        let light = (x / 2 + y / 2).is_multiple_of(2);
         [if light { 220 } else { 40 }, (60 + 20 * x) as u8, (250 - 25 * y) as u8, 255]
     };
     s.textures.push(Texture {
