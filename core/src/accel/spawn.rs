@@ -62,9 +62,14 @@ pub fn offset(p: Vec3x8, ng: Vec3x8, error: F32x8, d: Vec3x8) -> Vec3x8 {
 }
 
 /// The segments from `p` to `q`, both moved off their surfaces, as rays with `d = q' - p'` and `0 < t < 1`.
+///
+/// `q` moves by `32 2^-24 |d| . |q_ng|` more than its own error: `d` and the t of the triangle test are rounded relative
+/// to the distance, whatever the coordinates of `q`. A lamp in a plane through the origin has an error of 0 and would
+/// stand in its own light.
 pub fn shadow_ray(p: Vec3x8, ng: Vec3x8, error: F32x8, q: Vec3x8, q_ng: Vec3x8, q_error: F32x8) -> Ray8 {
     let d = q - p;
     let o = offset(p, ng, error, d);
-    let d = offset(q, q_ng, q_error, -d) - o;
+    let reach = d.abs().dot(q_ng.abs()) * (32.0 / 16_777_216.0);
+    let d = offset(q, q_ng, q_error + reach, -d) - o;
     Ray8 { o, d, tmin: F32x8::ZERO, tmax: F32x8::ONE }
 }
