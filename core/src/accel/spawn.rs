@@ -46,8 +46,9 @@ pub fn surface_point(scene: &Scene<'_>, triangle: U32x8, u: F32x8, v: F32x8, mas
 }
 
 /// Normal of twice the area's length from the two shorter edges: of a needle the two long ones are nearly parallel, and the
-/// roundings of their cross product would tilt it.
-fn normal(a: Vec3x8, b: Vec3x8, c: Vec3x8) -> Vec3x8 {
+/// roundings of their cross product would tilt it. If all three are nearly parallel (an obtuse needle) it may be tilted by
+/// some 2^-24 of length over width.
+pub(crate) fn normal(a: Vec3x8, b: Vec3x8, c: Vec3x8) -> Vec3x8 {
     let (ab, bc, ca) = (b - a, c - b, a - c);
     let (x, y, z) = (ab.length_sqr(), bc.length_sqr(), ca.length_sqr());
     let skip_ab = x.ge(y) & x.ge(z);
