@@ -220,10 +220,10 @@ pub fn glowing_box(rho: f32, radiance: f32, size: [u32; 2]) -> SceneDescription 
     s
 }
 
-/// A small diffuse floor spot at the origin, seen in all pixels from above at a slant, in the dark.
+/// A small diffuse floor spot at the origin, seen in all pixels from half a unit away at a slant (0, 0.6, 0.8), in the dark.
 pub fn spot(rho: f32, size: [u32; 2]) -> SceneDescription {
     let mut s =
-        SceneDescription { camera: camera([0.0, 3.0, 4.0], [0.0; 3], 0.01, size), ..SceneDescription::default() };
+        SceneDescription { camera: camera([0.0, 0.3, 0.4], [0.0; 3], 0.01, size), ..SceneDescription::default() };
     let floor = s.add_material("floor", grey(rho));
     add_quad(&mut s, "floor", floor, facing_y(1.0, 0.0, 1.0));
     s

@@ -16,6 +16,7 @@ mod spawn;
 mod triangle;
 mod wide;
 
+pub(crate) use spawn::normal;
 pub use spawn::{SurfacePoint8, offset, shadow_ray, surface_point};
 pub use wide::WideBvh;
 

@@ -149,7 +149,7 @@ pub(super) fn walk_packet<const ANY: bool>(
             } else {
                 for i in 0..triangles as usize {
                     let p = each(|v| each(|k| F32x8::splat(leaf.p[3 * v + axes[k]][i])));
-                    let Some(c) = intersect(&p, &line, b.t) else { continue };
+                    let Some(c) = intersect::<ANY>(&p, &line, b.t) else { continue };
                     // rays that miss the leaf's box miss its triangles, also when they go alone
                     let mask = c.mask & inside;
                     if ANY {

@@ -87,7 +87,7 @@ fn rows(leaf: &Leaf, axes: [usize; 3]) -> [[F32x8; 3]; 3] {
 /// Any: returns whether there is a hit at or before `best.t`.
 #[inline(always)]
 pub(super) fn test_leaf<const ANY: bool>(leaf: &Leaf, r: &Ray1, entry: f32, best: &mut Hit1) -> bool {
-    let Some(c) = intersect(&rows(leaf, r.axes), &r.line, F32x8::splat(best.t)) else { return false };
+    let Some(c) = intersect::<ANY>(&rows(leaf, r.axes), &r.line, F32x8::splat(best.t)) else { return false };
     if ANY {
         return true;
     }

@@ -16,6 +16,9 @@
 //!    has just left can be hit again. If t is within its error bound of 0 (pbrt-v4's bound for this test, section 6.8.8)
 //!    the side of the plane decides, in f64. This rejects hits of the own surface without opening gaps: a triangle that
 //!    lies in front is never rejected.
+//! 4. The same at the other end of a shadow ray: a needle of a lamp (1000 : 1 and thinner) may seem to stand before its own
+//!    sample. If t is within its error bound of the limit, the plane decides as well. Closest hits need no such care:
+//!    nothing ends just before their limit.
 
 use croupier_simd::{F32x8, Mask8};
 
@@ -45,9 +48,10 @@ pub(super) struct Line {
     pub tmin: F32x8,
 }
 
-/// Lanes with `tmin < t <= limit` inside the triangle. Degenerate triangles (no area seen along the ray) are missed.
+/// Lanes with `tmin < t <= limit` inside the triangle; `ANY`: for rays that end at `limit`, others treat it as the closest
+/// hit so far. Degenerate triangles (no area seen along the ray) are missed.
 #[inline(always)]
-pub(super) fn intersect(p: &Vertices, r: &Line, limit: F32x8) -> Option<Candidates> {
+pub(super) fn intersect<const ANY: bool>(p: &Vertices, r: &Line, limit: F32x8) -> Option<Candidates> {
     let shear = |p: &[F32x8; 3]| {
         let z = p[2] - r.o[2];
         [(p[0] - r.o[0]) - r.shear[0] * z, (p[1] - r.o[1]) - r.shear[1] * z, z]
@@ -81,6 +85,20 @@ pub(super) fn intersect(p: &Vertices, r: &Line, limit: F32x8) -> Option<Candidat
             }
         }
     }
+    if ANY {
+        let last = (a[2] * r.shear[2]).max(b[2] * r.shear[2]).max(c[2] * r.shear[2]);
+        let doubt = mask & last.ge(limit);
+        if doubt.any() {
+            let doubt = doubt & t.ge(limit - error(&a, &b, &c, [u, v, w], scale, r.shear[2]));
+            if doubt.any() {
+                let (p, o, d) = (*p, r.o, r.d);
+                mask = mask.and_not(beyond(&p, &o, &d, limit, doubt));
+                if mask.none() {
+                    return None;
+                }
+            }
+        }
+    }
     Some(Candidates { mask, t, u: v * scale, v: w * scale })
 }
 
@@ -101,17 +119,33 @@ fn error(a: &[F32x8; 3], b: &[F32x8; 3], c: &[F32x8; 3], e: [F32x8; 3], scale: F
 #[cold]
 #[inline(never)]
 fn not_ahead(p: &Vertices, o: &[F32x8; 3], d: &[F32x8; 3], doubt: Mask8) -> Mask8 {
-    let mut bits = 0;
-    for i in doubt.lanes() {
-        let at = |v: &[F32x8; 3]| v.map(|x| f64::from(x.lane(i)));
-        let sub = |p: [f64; 3], q: [f64; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
-        let dot = |p: [f64; 3], q: [f64; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
-        let (a, b, c) = (at(&p[0]), at(&p[1]), at(&p[2]));
-        let (e, f) = (sub(b, a), sub(c, a));
-        let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
-        let (height, slope) = (dot(sub(a, at(o)), n), dot(at(d), n));
-        let ahead = (height > 0.0 && slope > 0.0) || (height < 0.0 && slope < 0.0);
-        bits |= u32::from(!ahead) << i;
-    }
-    Mask8::from_bits(bits)
+    let ahead = |i: usize| {
+        let (height, slope) = plane(p, o, d, i);
+        (height > 0.0 && slope > 0.0) || (height < 0.0 && slope < 0.0)
+    };
+    Mask8::from_bits(doubt.lanes().filter(|i| !ahead(*i)).fold(0, |bits, i| bits | 1 << i))
+}
+
+/// The lanes of `doubt` whose triangle's plane is not met up to `limit`, decided like [`not_ahead`].
+#[cold]
+#[inline(never)]
+fn beyond(p: &Vertices, o: &[F32x8; 3], d: &[F32x8; 3], limit: F32x8, doubt: Mask8) -> Mask8 {
+    let met = |i: usize| {
+        let (height, slope) = plane(p, o, d, i);
+        let reach = slope * f64::from(limit.lane(i));
+        (slope > 0.0 && height <= reach) || (slope < 0.0 && height >= reach)
+    };
+    Mask8::from_bits(doubt.lanes().filter(|i| !met(*i)).fold(0, |bits, i| bits | 1 << i))
+}
+
+/// How far the plane of the triangle in lane `i` is from the origin, and how far the direction goes towards it, in units
+/// of twice the area.
+fn plane(p: &Vertices, o: &[F32x8; 3], d: &[F32x8; 3], i: usize) -> (f64, f64) {
+    let at = |v: &[F32x8; 3]| v.map(|x| f64::from(x.lane(i)));
+    let sub = |p: [f64; 3], q: [f64; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
+    let dot = |p: [f64; 3], q: [f64; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
+    let (a, b, c) = (at(&p[0]), at(&p[1]), at(&p[2]));
+    let (e, f) = (sub(b, a), sub(c, a));
+    let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
+    (dot(sub(a, at(o)), n), dot(at(d), n))
 }

@@ -10,6 +10,7 @@
 //! is r^2 / (A cos).
 
 use super::{Chosen, LightSample8, LightSelector, usable};
+use crate::accel;
 use crate::scene::Scene;
 use crate::scene::blob::{Light, NONE};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -45,7 +46,7 @@ impl Corners {
     /// Unit normal of the front side; NaN for a degenerate triangle.
     #[inline(always)]
     fn normal(&self) -> Vec3x8 {
-        (self.b - self.a).cross(self.c - self.a).normalize()
+        accel::normal(self.a, self.b, self.c).normalize()
     }
 }
 
