@@ -61,7 +61,9 @@ impl PixelStats {
         self.sum.map(|s| s / n)
     }
 
-    /// Squared standard error of the mean per channel. One sample tells nothing of its error: its own square stands in.
+    /// Squared standard error of the mean per channel, its samples taken as independent. With roulette or splitting that
+    /// is an upper bound: one comb rounds a packet, and the roundings of its samples cancel (standard errors of up to
+    /// twice the true ones were measured). One sample tells nothing of its error: its own square stands in.
     pub fn variance_of_mean(&self) -> [f64; 3] {
         let n = self.samples as f64;
         core::array::from_fn(|c| match self.samples {
