@@ -14,14 +14,14 @@
 //! 3. The stack holds the interval's entry and where the child's box is, eight bytes. The rays are tested against the box
 //!    when it is popped: fewer tests, as some are behind a hit by then, and a fifth of the memory of keeping their entries.
 
-use super::setup::{AXES, Setup, each};
+use super::setup::{Setup, each};
 use super::single::{Hit1, Keys, Ray1, STACK, test_leaf, walk};
 use super::triangle::{Line, intersect};
 use crate::scene::blob::{CHILD_INDEX, LEAF_BIT, Leaf, NONE, Node};
 use croupier_simd::{F32x8, Mask8, U32x8};
 
-/// Groups of at most this many rays go one by one (3 and 4 measured alike).
-pub(super) const FEW: u32 = 4;
+/// Groups of at most this many rays go one by one (3 is faster than 4 on primary rays, all else alike).
+pub(super) const FEW: u32 = 3;
 
 /// Closest hits of eight rays; any hit: `triangle` other than [`NONE`] where there is one.
 pub(super) struct Best {
@@ -67,16 +67,21 @@ pub(super) fn walk_packet<const ANY: bool>(
 ) -> u32 {
     let lead = group.trailing_zeros() as usize & 7;
     let members = Mask8::from_bits(group);
-    let axes = AXES[s.axis(lead)];
-    let axes = each(|k| axes[k].min(2));
-    let get = |a: &[[f32; 8]; 3]| each(|k| F32x8::new(a[axes[k]]));
+    let axes = s.axes(lead);
     // lanes outside the group may hold anything: give them the values of the first ray
-    let only = |a: &[[f32; 8]; 3]| each(|k| members.select(F32x8::new(a[axes[k]]), F32x8::splat(a[axes[k]][lead])));
+    let only = |a: &[[f32; 8]; 3]| each(|k| members.select(F32x8::new(a[k]), F32x8::splat(a[k][lead])));
     let (near, far, ninv) = (only(&s.near), only(&s.far), only(&s.ninv));
-    let line = Line { o: get(&s.o), d: get(&s.d), shear: each(|k| F32x8::new(s.shear[k])), tmin: F32x8::new(s.tmin) };
-    let negative = each(|k| s.negative[axes[k]] >> lead & 1 == 1);
-    let low = each(|k| axes[k] + if negative[k] { 3 } else { 0 });
-    let high = each(|k| axes[k] + if negative[k] { 0 } else { 3 });
+    let line = Line {
+        o: each(|k| F32x8::new(s.o[axes[k]])),
+        shear: each(|k| F32x8::new(s.shear[k])),
+        tmin: F32x8::new(s.tmin),
+        setup: s,
+        axes,
+        lane: None,
+    };
+    let low = s.rows(lead);
+    let high = each(|k| 2 * k + 3 - low[k]);
+    let negative = each(|k| low[k] > 2);
     // the earliest entry has the origin farthest along the direction, the latest exit the one farthest behind
     let bound = |v: F32x8, largest: bool| F32x8::splat(if largest { v.max_lane() } else { v.min_lane() });
     let in_o = each(|k| bound(near[k], !negative[k]));
@@ -112,8 +117,8 @@ pub(super) fn walk_packet<const ANY: bool>(
                 let rows = &node.bounds;
                 let (mut enter, mut leave) = (earliest, F32x8::splat(latest));
                 for k in 0..3 {
-                    let x = in_o[k] - F32x8::new(rows[low[k].min(5)]);
-                    let y = out_o[k] - F32x8::new(rows[high[k].min(5)]);
+                    let x = in_o[k] - F32x8::new(rows[low[k]]);
+                    let y = out_o[k] - F32x8::new(rows[high[k]]);
                     enter = enter.max((x * inv_lo[k]).min(x * inv_hi[k]));
                     leave = leave.min((y * inv_lo[k]).max(y * inv_hi[k]));
                 }
@@ -187,8 +192,8 @@ pub(super) fn walk_packet<const ANY: bool>(
             let mut leave = b.t;
             entry = line.tmin;
             for k in 0..3 {
-                entry = entry.max((near[k] - F32x8::splat(node.bounds[low[k].min(5)][slot])) * ninv[k]);
-                leave = leave.min((far[k] - F32x8::splat(node.bounds[high[k].min(5)][slot])) * ninv[k]);
+                entry = entry.max((near[k] - F32x8::splat(node.bounds[low[k]][slot])) * ninv[k]);
+                leave = leave.min((far[k] - F32x8::splat(node.bounds[high[k]][slot])) * ninv[k]);
             }
             inside = entry.le(leave);
             if inside.any() {

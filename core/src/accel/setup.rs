@@ -16,9 +16,6 @@
 use super::Ray8;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
-/// Axes after the major axis, cyclic, so that the shear keeps orientation.
-pub(super) const AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
-
 /// `[f(0), f(1), f(2)]`; `array::map` would go through memory.
 #[inline(always)]
 pub(super) fn each<T>(f: impl Fn(usize) -> T) -> [T; 3] {
@@ -37,7 +34,7 @@ pub(super) struct Setup {
     pub far: [[f32; 8]; 3],
     /// `-1/d`.
     pub ninv: [[f32; 8]; 3],
-    /// `d[kx]/d[kz]`, `d[ky]/d[kz]`, `1/d[kz]` with the axes of [`AXES`].
+    /// `d[kx]/d[kz]`, `d[ky]/d[kz]`, `1/d[kz]` with the axes of [`Setup::axes`].
     pub shear: [[f32; 8]; 3],
     /// `max(tmin, 0)`.
     pub tmin: [f32; 8],
@@ -94,16 +91,23 @@ impl Setup {
         }
     }
 
-    /// Major axis of lane `i`.
+    /// The axes of lane `i`, cyclic so that the shear keeps orientation; the last is the major one. All are below 3,
+    /// which the compiler sees.
     #[inline(always)]
-    pub fn axis(&self, i: usize) -> usize {
+    pub fn axes(&self, i: usize) -> [usize; 3] {
         if self.major[0] >> i & 1 == 1 {
-            0
+            [1, 2, 0]
         } else if self.major[1] >> i & 1 == 1 {
-            1
+            [2, 0, 1]
         } else {
-            2
+            [0, 1, 2]
         }
+    }
+
+    /// Rows of a node that hold the near planes of lane `i`; the far ones are at `3 - x`, `5 - y`, `7 - z`.
+    #[inline(always)]
+    pub fn rows(&self, i: usize) -> [usize; 3] {
+        each(|k| if self.negative[k] >> i & 1 == 1 { k + 3 } else { k })
     }
 
     /// The lanes among `of` with the octant and the major axis of lane `i`.

@@ -14,7 +14,7 @@
 //! 4. A hit counts from `max(t, entry of its leaf)`: so a subtree entered after the closest hit holds nothing closer, not
 //!    even by rounding, and the result does not depend on the order of visits. Equal t: the lower triangle index.
 
-use super::setup::{AXES, Setup, each};
+use super::setup::{Setup, each};
 use super::triangle::{Line, intersect};
 use crate::scene::blob::{CHILD_INDEX, LEAF_BIT, Leaf, NONE, Node};
 use croupier_simd::F32x8;
@@ -26,37 +26,35 @@ pub(super) const STACK: usize = 256;
 /// Entry distance (upper half, float bits) and child reference of the subtrees to visit.
 pub(super) type Keys = [u64; STACK];
 
-/// Constants of one ray, one value in all lanes, axes permuted by its major axis.
-pub(super) struct Ray1 {
-    line: Line,
+/// Constants of one ray, one value in all lanes.
+pub(super) struct Ray1<'a> {
+    line: Line<'a>,
     near: [F32x8; 3],
     far: [F32x8; 3],
     ninv: [F32x8; 3],
-    /// Axes of the rows of a leaf.
-    axes: [usize; 3],
     /// Rows of a node's near planes.
     rows: [usize; 3],
 }
 
-impl Ray1 {
+impl<'a> Ray1<'a> {
     /// Lane `i` of `s`.
     #[inline(always)]
-    pub fn new(s: &Setup, i: usize) -> Self {
+    pub fn new(s: &'a Setup, i: usize) -> Self {
         let i = i & 7;
-        let axes = AXES[s.axis(i)];
-        let get = |a: &[[f32; 8]; 3]| each(|k| F32x8::splat(a[axes[k]][i]));
+        let axes = s.axes(i);
         Self {
             line: Line {
-                o: get(&s.o),
-                d: get(&s.d),
+                o: each(|k| F32x8::splat(s.o[axes[k]][i])),
                 shear: each(|k| F32x8::splat(s.shear[k][i])),
                 tmin: F32x8::splat(s.tmin[i]),
+                setup: s,
+                axes,
+                lane: Some(i),
             },
-            near: get(&s.near),
-            far: get(&s.far),
-            ninv: get(&s.ninv),
-            axes,
-            rows: each(|k| axes[k] + 3 * (s.negative[axes[k]] >> i & 1) as usize),
+            near: each(|k| F32x8::splat(s.near[k][i])),
+            far: each(|k| F32x8::splat(s.far[k][i])),
+            ninv: each(|k| F32x8::splat(s.ninv[k][i])),
+            rows: s.rows(i),
         }
     }
 }
@@ -80,14 +78,14 @@ impl Hit1 {
 /// The triangles of a leaf as the rows of `axes`.
 #[inline(always)]
 fn rows(leaf: &Leaf, axes: [usize; 3]) -> [[F32x8; 3]; 3] {
-    each(|v| each(|k| F32x8::new(leaf.p[3 * v + axes[k].min(2)])))
+    each(|v| each(|k| F32x8::new(leaf.p[3 * v + axes[k]])))
 }
 
 /// Tests `r` against the triangles of `leaf`, which it enters at `entry`. Closest: improves `best`, returns whether it did.
 /// Any: returns whether there is a hit at or before `best.t`.
 #[inline(always)]
-pub(super) fn test_leaf<const ANY: bool>(leaf: &Leaf, r: &Ray1, entry: f32, best: &mut Hit1) -> bool {
-    let Some(c) = intersect::<ANY>(&rows(leaf, r.axes), &r.line, F32x8::splat(best.t)) else { return false };
+pub(super) fn test_leaf<const ANY: bool>(leaf: &Leaf, r: &Ray1<'_>, entry: f32, best: &mut Hit1) -> bool {
+    let Some(c) = intersect::<ANY>(&rows(leaf, r.line.axes), &r.line, F32x8::splat(best.t)) else { return false };
     if ANY {
         return true;
     }
@@ -107,14 +105,13 @@ pub(super) fn test_leaf<const ANY: bool>(leaf: &Leaf, r: &Ray1, entry: f32, best
 pub(super) fn walk<const ANY: bool>(
     (nodes, leaves): (&[Node], &[Leaf]),
     (root, entry): (u32, f32),
-    r: &Ray1,
+    r: &Ray1<'_>,
     best: &mut Hit1,
     stack: &mut Keys,
     base: usize,
 ) -> bool {
-    // the limits let the compiler drop bounds checks
-    let [n0, n1, n2] = each(|k| r.rows[k].min(5));
-    let [f0, f1, f2] = each(|k| (2 * r.axes[k].min(2) + 3 - r.rows[k]).min(5));
+    let [n0, n1, n2] = r.rows;
+    let [f0, f1, f2] = each(|k| 2 * k + 3 - r.rows[k]);
     let mut limit = F32x8::splat(best.t);
     let mut sp = base;
     let mut current = u64::from(entry.to_bits()) << 32 | u64::from(root);

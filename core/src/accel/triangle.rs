@@ -20,6 +20,7 @@
 //!    sample. If t is within its error bound of the limit, the plane decides as well. Closest hits need no such care:
 //!    nothing ends just before their limit.
 
+use super::setup::Setup;
 use croupier_simd::{F32x8, Mask8};
 
 /// Three vertices, axes permuted.
@@ -41,17 +42,22 @@ pub(super) struct Candidates {
 }
 
 /// Constants of a ray (or of eight) that the test reads, axes permuted.
-pub(super) struct Line {
+pub(super) struct Line<'a> {
     pub o: [F32x8; 3],
-    pub d: [F32x8; 3],
     pub shear: [F32x8; 3],
     pub tmin: F32x8,
+    /// Where the rays come from; read in doubtful cases only.
+    pub setup: &'a Setup,
+    /// The permutation.
+    pub axes: [usize; 3],
+    /// The lane of `setup` that all lanes here hold; eight rays have `None`.
+    pub lane: Option<usize>,
 }
 
 /// Lanes with `tmin < t <= limit` inside the triangle; `ANY`: for rays that end at `limit`, others treat it as the closest
 /// hit so far. Degenerate triangles (no area seen along the ray) are missed.
 #[inline(always)]
-pub(super) fn intersect<const ANY: bool>(p: &Vertices, r: &Line, limit: F32x8) -> Option<Candidates> {
+pub(super) fn intersect<const ANY: bool>(p: &Vertices, r: &Line<'_>, limit: F32x8) -> Option<Candidates> {
     let shear = |p: &[F32x8; 3]| {
         let z = p[2] - r.o[2];
         [(p[0] - r.o[0]) - r.shear[0] * z, (p[1] - r.o[1]) - r.shear[1] * z, z]
@@ -59,15 +65,14 @@ pub(super) fn intersect<const ANY: bool>(p: &Vertices, r: &Line, limit: F32x8) -
     let (a, b, c) = (shear(&p[0]), shear(&p[1]), shear(&p[2]));
     let edge = |p: &[F32x8; 3], q: &[F32x8; 3]| p[0] * q[1] - p[1] * q[0];
     let (u, v, w) = (edge(&c, &b), edge(&a, &c), edge(&b, &a));
-    let det = u + v + w;
     let zero = F32x8::ZERO;
-    let inside = u.min(v).min(w).ge(zero) | u.max(v).max(w).le(zero);
-    // false for NaN as well
-    let inside = inside & (det.lt(zero) | det.gt(zero));
+    // both sides hold where all three are 0 (no area seen, unused slots): exclusive or drops those
+    let inside = u.min(v).min(w).ge(zero) ^ u.max(v).max(w).le(zero);
     if inside.none() {
         return None;
     }
-    let scale = F32x8::ONE / det;
+    let scale = F32x8::ONE / (u + v + w);
+    // NaN from garbage fails here
     let t = (u * a[2] + v * b[2] + w * c[2]) * scale * r.shear[2];
     let mut mask = inside & t.gt(r.tmin) & t.le(limit);
     if mask.none() {
@@ -77,9 +82,9 @@ pub(super) fn intersect<const ANY: bool>(p: &Vertices, r: &Line, limit: F32x8) -
     if (mask & behind).any() {
         let doubt = mask & behind & t.le(error(&a, &b, &c, [u, v, w], scale, r.shear[2]));
         if doubt.any() {
-            // copies: a reference to the originals would keep them in memory on the hot path
-            let (p, o, d) = (*p, r.o, r.d);
-            mask = mask.and_not(not_ahead(&p, &o, &d, doubt));
+            // a copy: a reference to the original would keep it in memory on the hot path
+            let p = *p;
+            mask = mask.and_not(not_ahead(&p, r.setup, r.axes, r.lane, doubt));
             if mask.none() {
                 return None;
             }
@@ -91,8 +96,8 @@ pub(super) fn intersect<const ANY: bool>(p: &Vertices, r: &Line, limit: F32x8) -
         if doubt.any() {
             let doubt = doubt & t.ge(limit - error(&a, &b, &c, [u, v, w], scale, r.shear[2]));
             if doubt.any() {
-                let (p, o, d) = (*p, r.o, r.d);
-                mask = mask.and_not(beyond(&p, &o, &d, limit, doubt));
+                let p = *p;
+                mask = mask.and_not(beyond(&p, r.setup, r.axes, r.lane, limit, doubt));
                 if mask.none() {
                     return None;
                 }
@@ -118,9 +123,9 @@ fn error(a: &[F32x8; 3], b: &[F32x8; 3], c: &[F32x8; 3], e: [F32x8; 3], scale: F
 /// products of those with 2^-53 relative error, against heights that are at least some 2^-24 of the coordinates.
 #[cold]
 #[inline(never)]
-fn not_ahead(p: &Vertices, o: &[F32x8; 3], d: &[F32x8; 3], doubt: Mask8) -> Mask8 {
+fn not_ahead(p: &Vertices, s: &Setup, axes: [usize; 3], lane: Option<usize>, doubt: Mask8) -> Mask8 {
     let ahead = |i: usize| {
-        let (height, slope) = plane(p, o, d, i);
+        let (height, slope) = plane(p, s, axes, lane, i);
         (height > 0.0 && slope > 0.0) || (height < 0.0 && slope < 0.0)
     };
     Mask8::from_bits(doubt.lanes().filter(|i| !ahead(*i)).fold(0, |bits, i| bits | 1 << i))
@@ -129,9 +134,9 @@ fn not_ahead(p: &Vertices, o: &[F32x8; 3], d: &[F32x8; 3], doubt: Mask8) -> Mask
 /// The lanes of `doubt` whose triangle's plane is not met up to `limit`, decided like [`not_ahead`].
 #[cold]
 #[inline(never)]
-fn beyond(p: &Vertices, o: &[F32x8; 3], d: &[F32x8; 3], limit: F32x8, doubt: Mask8) -> Mask8 {
+fn beyond(p: &Vertices, s: &Setup, axes: [usize; 3], lane: Option<usize>, limit: F32x8, doubt: Mask8) -> Mask8 {
     let met = |i: usize| {
-        let (height, slope) = plane(p, o, d, i);
+        let (height, slope) = plane(p, s, axes, lane, i);
         let reach = slope * f64::from(limit.lane(i));
         (slope > 0.0 && height <= reach) || (slope < 0.0 && height >= reach)
     };
@@ -140,12 +145,13 @@ fn beyond(p: &Vertices, o: &[F32x8; 3], d: &[F32x8; 3], limit: F32x8, doubt: Mas
 
 /// How far the plane of the triangle in lane `i` is from the origin, and how far the direction goes towards it, in units
 /// of twice the area.
-fn plane(p: &Vertices, o: &[F32x8; 3], d: &[F32x8; 3], i: usize) -> (f64, f64) {
+fn plane(p: &Vertices, s: &Setup, axes: [usize; 3], lane: Option<usize>, i: usize) -> (f64, f64) {
     let at = |v: &[F32x8; 3]| v.map(|x| f64::from(x.lane(i)));
+    let from = |rays: &[[f32; 8]; 3]| axes.map(|k| f64::from(rays[k.min(2)][lane.unwrap_or(i) & 7]));
     let sub = |p: [f64; 3], q: [f64; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
     let dot = |p: [f64; 3], q: [f64; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
     let (a, b, c) = (at(&p[0]), at(&p[1]), at(&p[2]));
     let (e, f) = (sub(b, a), sub(c, a));
     let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
-    (dot(sub(a, at(o)), n), dot(at(d), n))
+    (dot(sub(a, from(&s.o)), n), dot(from(&s.d), n))
 }

@@ -6,7 +6,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::ploc::PlocBuilder;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 /// A box.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,7 +67,14 @@ pub(super) fn build(triangles: &[[[f32; 3]; 3]], effort: Effort) -> Vec<Binary> 
     let boxes: Vec<Aabb> = groups.iter().map(|(b, _)| Aabb { min: b.min.into(), max: b.max.into() }).collect();
     let p = match effort {
         Effort::Fast => BvhBuildParams::very_fast_build(),
-        Effort::Medium => BvhBuildParams::medium_build(),
+        // better than obvhs's own medium preset by 5 % of the rays per second, for twice its time
+        Effort::Medium => BvhBuildParams {
+            ploc_search_distance: PlocSearchDistance::High,
+            search_depth_threshold: 2,
+            sort_precision: SortPrecision::U128,
+            reinsertion_batch_ratio: 0.3,
+            ..BvhBuildParams::medium_build()
+        },
         Effort::Slow => BvhBuildParams::very_slow_build(),
     };
     // triangles are not split: a box always holds all of its triangles' vertices
