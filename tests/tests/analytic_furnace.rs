@@ -202,6 +202,7 @@ fn closed_boxes_sum_the_geometric_series() {
                 // long paths: many rays, and roulette makes them noisy
                 let spp = match (max_depth, strategy) {
                     (200, "classic:2") if rho > 0.8 => 3000,
+                    (200, "fixed:1.3") if rho > 0.8 => 512,
                     (200, _) if rho > 0.8 => 64,
                     (12.., _) => 1024,
                     _ => 512,
