@@ -69,20 +69,13 @@ impl F32x8 {
     /// `self < o ? o : self`, so a NaN in either gives `self`.
     #[inline(always)]
     pub fn max(self, o: Self) -> Self {
-        // `maxps a, b` is `a > b ? a : b`: the definition above in one instruction
-        #[cfg(any(target_arch = "x86_64", target_arch = "x86"))]
-        return Self(o.0.fast_max(self.0));
-        #[cfg(not(any(target_arch = "x86_64", target_arch = "x86")))]
-        return self.lt(o).select(o, self);
+        self.lt(o).select(o, self)
     }
 
     /// `o < self ? o : self`, so a NaN in either gives `self`.
     #[inline(always)]
     pub fn min(self, o: Self) -> Self {
-        #[cfg(any(target_arch = "x86_64", target_arch = "x86"))]
-        return Self(o.0.fast_min(self.0));
-        #[cfg(not(any(target_arch = "x86_64", target_arch = "x86")))]
-        return o.lt(self).select(o, self);
+        o.lt(self).select(o, self)
     }
 
     /// Between `lo` and `hi`; a NaN becomes `lo`.
