@@ -354,3 +354,24 @@ fn ties_go_to_the_lower_index_in_every_tree() {
         }
     }
 }
+
+// The same bits for every instruction set. Killed by: any fused or estimated operation, another order of roundings.
+#[test]
+fn hits_have_the_same_bits_on_every_target() {
+    let mut r = Rng(8);
+    let mesh = Mesh::new(soup(1000, [0.0; 3], 1.0, 0.2, &mut r));
+    let bvh = WideBvh::new(&mesh.scene());
+    let mut hash = 0xcbf2_9ce4_8422_2325u64;
+    for n in 0..1000 {
+        let (o, d, spread) = (r.cube(), r.cube(), [0.05, 1.0][n % 2]);
+        let rays: [Ray; 8] = std::array::from_fn(|_| {
+            let e = r.cube();
+            Ray::new(o, [0, 1, 2].map(|k| d[k] + spread * e[k]))
+        });
+        let h = bvh.closest(&packet(&rays), Mask8::all_lanes());
+        for x in (0..8).flat_map(|i| bits(&h, i)) {
+            hash = (hash ^ u64::from(x)).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+    }
+    assert_eq!(format!("{hash:016x}"), "aaee4c40f3be465a");
+}
