@@ -120,7 +120,12 @@ impl Shard<'_> {
 
     fn record_first_hit(&mut self, first: Mask8, f: &Flight8, hit: &Hit8, s: &Shading8) {
         let root = f.root.to_array();
-        for i in first.lanes() {
+        // a host's intersector may answer anything
+        let good = first & hit.t.is_finite() & s.ns.is_finite() & s.reflectance.is_finite();
+        for i in first.and_not(good).lanes() {
+            self.count_non_finite(root[i]);
+        }
+        for i in good.lanes() {
             let pixel = self.roots.get(root[i]).pixel as usize;
             let Some(aov) = self.aovs.get_mut(pixel) else { continue };
             let (albedo, normal) = (s.reflectance.lane(i), s.ns.lane(i));
