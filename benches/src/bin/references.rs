@@ -1,24 +1,27 @@
 //! Is the picture right? Renders the shared test scenes with every strategy and tests them for bias against references of
-//! another renderer.
+//! another renderer (Mitsuba 3).
 //!
 //! Per scene and strategy, independent seeds are rendered in this process (the scene is loaded and baked once) and their
 //! mean, with the standard error that follows from their spread, is compared with `reference.exr`, whose standard error
 //! is `reference_stderr.exr`. Block means of 8x8 pixels give z-scores with both errors in quadrature
 //! ([`croupier_host::compare::bias`], the firefly-robust kind). A row passes if
 //!
-//! - at most 2 % of the scores are beyond 3,
-//! - their mean lies within +-0.15,
-//! - none is beyond 6 that [`NOTES`] does not explain,
-//! - the mean of the image is within 0.5 % or 3 standard errors of the reference's.
+//! - at most [`MAX_BEYOND3`] of the scores are beyond 3,
+//! - their mean is within +-[`MAX_MEAN`],
+//! - none is beyond 6,
+//! - the mean of the image is within [`MAX_RATIO`] or 3 standard errors of the reference's.
 //!
-//! Biased strategies must fail: rows of [`Plan::biased`] pass if the test notices.
+//! Blocks in which the reference is known to be wrong, and why, are listed in [`NOTES`]: scores are taken without them,
+//! and the table shows the figures with them in brackets. Biased settings must fail: their rows are as expected if the
+//! test notices.
 //!
-//! Exit status: 0 all as expected or the scenes are not there, 1 otherwise.
+//! The output is `benches/REFERENCES.md`; it depends on nothing but the program and the scenes. Exit status: 0 all rows as
+//! expected, or the scenes are not there; 1 otherwise.
 
 use clap::Parser;
 use croupier::{Scene, Settings, Strategy};
 use croupier_host::bake::{BakeOptions, Baked, bake};
-use croupier_host::compare::{Bias, BiasOptions, BlockZ, Estimate, Ratio, bias, ratio};
+use croupier_host::compare::{Bias, BiasOptions, BlockZ, Estimate, Ratio, block_scores, ratio};
 use croupier_host::drive::{Options, Unobserved, drive_scene};
 use croupier_host::image::{Picture, Rgb};
 use croupier_host::load::load;
@@ -29,6 +32,13 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
+/// Largest part of the scores beyond 3.
+const MAX_BEYOND3: f64 = 0.02;
+/// Largest mean score.
+const MAX_MEAN: f64 = 0.15;
+/// Largest relative difference of the image means that needs no excuse by noise.
+const MAX_RATIO: f64 = 0.005;
+
 #[derive(Parser)]
 #[command(about = "Tests renders of the shared scenes for bias against their references")]
 struct Args {
@@ -38,22 +48,22 @@ struct Args {
     /// Only these scenes.
     #[arg(long = "scene", value_name = "NAME")]
     only: Vec<String>,
-    /// Only these strategies (any that `croupier render --rrs` knows), expected to be unbiased.
+    /// Instead of the table's strategies these (any that `croupier render --rrs` knows), expected to be unbiased.
     #[arg(long = "strategy", value_name = "NAME")]
     strategies: Vec<String>,
-    /// Independent seeds per row.
-    #[arg(long, default_value_t = 16)]
+    /// Independent seeds per row, at least 2.
+    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u32).range(2..))]
     seeds: u32,
-    /// Number of the first seed.
+    /// The first of them.
     #[arg(long, default_value_t = 0)]
     first_seed: u64,
     /// Multiplies the samples per pixel of every row.
     #[arg(long, default_value_t = 1.0)]
     effort: f64,
-    /// Half the samples, and few strategies.
+    /// Few strategies.
     #[arg(long)]
     quick: bool,
-    /// Threads; 0 takes one per processor.
+    /// Threads; 0 takes one per processor. Does not change the figures.
     #[arg(long, default_value_t = 0)]
     threads: usize,
     /// One JSON document instead of the table.
@@ -64,17 +74,19 @@ struct Args {
     save: Option<PathBuf>,
 }
 
-/// Scenes, and samples per pixel and seed: what gives each about the same time.
-const SCENES: &[(&str, f64)] = &[
-    ("cbox", 16.0),
-    ("kitchen", 16.0),
-    ("bathroom", 16.0),
-    ("living_room", 16.0),
-    ("pool", 16.0),
-    ("water_caustic", 16.0),
-    ("veach_mis", 16.0),
-    ("white_furnace", 16.0),
-    ("material_spheres", 16.0),
+/// Scenes, and samples per pixel and seed. All seeds together come near the samples of the reference: with much fewer, a
+/// block that missed its rare bright samples has too low a mean *and* too low a variance, which shifts the mean score
+/// below 0 (with many more, the reference's own do the opposite).
+const SCENES: &[(&str, u32)] = &[
+    ("cbox", 32),
+    ("kitchen", 64),
+    ("bathroom", 16),
+    ("living_room", 24),
+    ("pool", 64),
+    ("water_caustic", 24),
+    ("veach_mis", 32),
+    ("white_furnace", 24),
+    ("material_spheres", 32),
 ];
 
 /// One row of the table for every scene.
@@ -83,10 +95,10 @@ struct Plan {
     /// Path segments; the scene's own (40) if absent.
     depth: Option<u32>,
     split_budget: u32,
-    /// Samples per pixel relative to [`SCENES`]: split samples cost more each.
+    /// Samples per pixel relative to [`SCENES`]: the longer the paths, the fewer.
     effort: f64,
     quick: bool,
-    /// Scenes in which the bias must show; empty if there must be none in any.
+    /// Scenes in which a bias must show; empty if there must be none in any.
     biased: &'static [&'static str],
 }
 
@@ -96,8 +108,11 @@ impl Plan {
     }
 }
 
-/// Splitting without a bound doubles the work 39 times: a few splits per camera sample are enough to test it.
-const FEW_SPLITS: u32 = 6;
+/// Splitting at every vertex without a bound doubles the work 39 times: a few splits per camera sample show as much.
+const FEW_SPLITS: u32 = 3;
+
+/// Scenes with enough light that needs many bounces.
+const INDIRECT: &[&str] = &["cbox", "kitchen", "bathroom", "living_room"];
 
 const PLANS: &[Plan] = &[
     Plan::unbiased("contribution"),
@@ -106,37 +121,65 @@ const PLANS: &[Plan] = &[
     Plan::unbiased("throughput:mean"),
     Plan::unbiased("albedo"),
     Plan { quick: true, ..Plan::unbiased("classic") },
-    Plan::unbiased("fixed:0.7"),
-    Plan { quick: true, split_budget: FEW_SPLITS, effort: 0.25, ..Plan::unbiased("fixed:2") },
-    Plan { depth: Some(40), ..Plan::unbiased("none") },
-    Plan { quick: true, biased: INDIRECT, ..Plan::unbiased("threshold") },
-    Plan { quick: true, biased: INDIRECT, depth: Some(3), ..Plan::unbiased("none") },
+    Plan { effort: 1.5, ..Plan::unbiased("fixed:0.7") },
+    Plan { quick: true, split_budget: FEW_SPLITS, effort: 0.125, ..Plan::unbiased("fixed:2") },
+    Plan { depth: Some(40), effort: 0.5, ..Plan::unbiased("none") },
+    Plan { quick: true, biased: INDIRECT, effort: 0.5, ..Plan::unbiased("threshold") },
+    Plan { quick: true, biased: INDIRECT, effort: 0.5, depth: Some(3), ..Plan::unbiased("none") },
 ];
 
-/// Scenes whose light takes enough bounces.
-const INDIRECT: &[&str] = &["cbox", "kitchen", "bathroom", "living_room"];
+/// Where a reference is known to be wrong.
+struct Note {
+    scene: &'static str,
+    /// Does it concern the block with this first column and row?
+    applies: fn(usize, usize) -> bool,
+    why: &'static str,
+}
 
-/// Blocks whose scores may be beyond 6, and why: scene, first column, first row, reason.
-const NOTES: &[(&str, usize, usize, &str)] = &[];
+const NOTES: &[Note] = &[Note {
+    scene: "white_furnace",
+    applies: on_polished_outline,
+    why: "Outlines of the spheres with a smooth specular lobe (Mirror, Dielectric, Plastic, ConductorAl). Near the \
+          outline interpolated normals send some specular paths into the faceted sphere. The reference lets rays start \
+          9e-5 (1 + largest coordinate) beside the surface; that is a third of the facets' depth, so such paths are \
+          caught inside until max_depth and 1 % of the outline's light is lost. Here rays start within the rounding \
+          error of the surface, and the paths leave at the next facet. With the reference's offset put into \
+          `accel::surface_point` the scores of these blocks are inconspicuous (largest 3.8, 0.26 % of all beyond 3).",
+}];
 
-const MAX_BEYOND3: f64 = 0.02;
-const MAX_MEAN: f64 = 0.15;
-const MAX_RATIO: f64 = 0.005;
+/// Circles of radius 28 pixels, as `white_furnace` shows these spheres, met by an 8x8 block.
+fn on_polished_outline(x: usize, y: usize) -> bool {
+    const CENTRES: [[f64; 2]; 4] = [[97.2, 34.4], [158.8, 34.4], [35.6, 157.6], [158.8, 157.6]];
+    CENTRES.iter().any(|&c| {
+        let distance = |near: bool| {
+            let along = |first: usize, c: f64| {
+                let [low, high] = [first as f64 - c, (first + 8) as f64 - c];
+                if near { low.max(-high).max(0.0) } else { high.max(-low) }
+            };
+            along(x, c[0]).hypot(along(y, c[1]))
+        };
+        distance(true) <= 29.0 && distance(false) >= 27.0
+    })
+}
+
+fn note(scene: &str, b: &BlockZ) -> Option<&'static Note> {
+    NOTES.iter().find(|n| n.scene == scene && (n.applies)(b.x, b.y))
+}
 
 /// A finished row.
 struct Row {
     scene: String,
     strategy: String,
-    /// The bias must show.
     biased: bool,
     spp: u32,
     seeds: u32,
     seconds: f64,
     mrays: f64,
     ratio: Ratio,
+    /// Without the blocks of [`NOTES`].
     bias: Bias,
-    /// Blocks beyond 6 without a note.
-    unexplained: usize,
+    /// All blocks, if that is not the same.
+    all: Option<Bias>,
     /// Which of the four tests fail.
     failed: Vec<&'static str>,
 }
@@ -149,8 +192,8 @@ impl Row {
     fn verdict(&self) -> String {
         match (self.failed.is_empty(), self.biased) {
             (true, false) => "passes".into(),
-            (false, true) => format!("fails, as it must ({})", self.failed.join(", ")),
-            (true, true) => "PASSES, BUT IS BIASED".into(),
+            (false, true) => format!("biased, and found: {}", self.failed.join(", ")),
+            (true, true) => "BIASED, BUT PASSES".into(),
             (false, false) => format!("FAILS: {}", self.failed.join(", ")),
         }
     }
@@ -159,22 +202,51 @@ impl Row {
         json!({
             "scene": self.scene, "strategy": self.strategy, "biased": self.biased, "spp": self.spp,
             "seeds": self.seeds, "seconds": self.seconds, "mrays": self.mrays, "ratio": self.ratio,
-            "bias": self.bias, "unexplained": self.unexplained, "failed": self.failed,
-            "as_expected": self.as_expected(),
+            "bias": self.bias, "bias_all_blocks": self.all, "failed": self.failed, "as_expected": self.as_expected(),
         })
+    }
+
+    fn print(&self) {
+        let Self { ratio, bias, all, .. } = self;
+        // a figure without the blocks of the notes, and with them
+        let figure = |f: &dyn Fn(&Bias) -> String| {
+            let with = all.as_ref().map_or(String::new(), |all| format!(" ({})", f(all)));
+            f(bias) + &with
+        };
+        println!(
+            "| {} | {} | {} x {} | {:.0} | {:.5} +- {:.5} | {} | {} | {} | {} | {} |",
+            self.scene,
+            self.strategy,
+            self.seeds,
+            self.spp,
+            self.mrays,
+            ratio.value,
+            ratio.stderr.unwrap_or(f64::NAN),
+            figure(&|b| format!("{:.2} %", 100.0 * b.beyond3)),
+            figure(&|b| format!("{:+.3}", b.mean)),
+            figure(&|b| format!("{:.2}", b.rms)),
+            figure(&|b| format!("{:.2}", b.max)),
+            self.verdict()
+        );
+        if !self.biased {
+            for b in bias.beyond6.iter().take(8) {
+                let channel = ["R", "G", "B"].get(b.channel).unwrap_or(&"?");
+                eprintln!("  block ({}, {}) {channel}: z {:.2}, {:.5} for {:.5}", b.x, b.y, b.z, b.image, b.reference);
+            }
+        }
     }
 }
 
 /// A scene with its reference.
 struct Subject {
     name: String,
-    spp: f64,
+    spp: u32,
     baked: Baked,
     reference: Estimate,
 }
 
 impl Subject {
-    fn open(folder: &Path, name: &str, spp: f64) -> Result<Self, Box<dyn Error>> {
+    fn open(folder: &Path, name: &str, spp: u32) -> Result<Self, Box<dyn Error>> {
         let folder = folder.join(name);
         let (scene, _) = load(&folder)?;
         let baked = bake(&scene, &BakeOptions::default(), |_, _| ())?;
@@ -184,10 +256,10 @@ impl Subject {
     }
 
     fn test(&self, args: &Args, plan: &Plan, strategy: &str) -> Result<Row, Box<dyn Error>> {
+        let start = Instant::now();
         let scene = Scene::from_bytes(&self.baked.bytes)?;
         let base = Settings::for_scene(&scene);
-        let halved = if args.quick { 0.5 } else { 1.0 };
-        let spp = (self.spp * plan.effort * args.effort * halved).round().max(1.0) as u32;
+        let spp = (f64::from(self.spp) * plan.effort * args.effort).round().max(1.0) as u32;
         let settings = Settings {
             shards: 16,
             max_depth: plan.depth.unwrap_or(base.max_depth),
@@ -195,9 +267,9 @@ impl Subject {
             split_budget: plan.split_budget,
             ..base
         };
-        let (mut images, mut mrays, start) = (Vec::new(), 0.0, Instant::now());
+        let (mut images, mut mrays) = (Vec::new(), 0.0);
         for seed in 0..u64::from(args.seeds) {
-            let settings = Settings { seed: args.first_seed + seed, ..settings };
+            let settings = Settings { seed: args.first_seed.wrapping_add(seed), ..settings };
             let options = Options { settings, target: Target::Spp(spp), threads: args.threads };
             let rendered = drive_scene(scene, &options, &Unobserved)?;
             mrays += rendered.counters.rays() as f64 * 1e-6;
@@ -209,14 +281,15 @@ impl Subject {
         if let Some(folder) = &args.save {
             save(&image, &folder.join(format!("{} {name}.exr", self.name).replace([' ', ':', ','], "_")))?;
         }
+
         let ratio = ratio(&image.image_mean(), &self.reference.image_mean());
-        let scores = bias(&image, &self.reference, &BiasOptions { robust: true, ..BiasOptions::default() })?;
-        let explained = |b: &BlockZ| NOTES.iter().any(|&(s, x, y, _)| (s, x, y) == (&self.name, b.x, b.y));
-        let unexplained = scores.beyond6.iter().filter(|b| !explained(b)).count();
+        let scores = block_scores(&image, &self.reference, &BiasOptions { robust: true, ..BiasOptions::default() })?;
+        let unnoted: Vec<BlockZ> = scores.iter().filter(|b| note(&self.name, b).is_none()).copied().collect();
+        let bias = Bias::of(&unnoted);
         let tests = [
-            ("beyond 3", scores.beyond3 <= MAX_BEYOND3),
-            ("mean z", scores.mean.abs() <= MAX_MEAN),
-            ("beyond 6", unexplained == 0),
+            ("beyond 3", bias.beyond3 <= MAX_BEYOND3),
+            ("mean z", bias.mean.abs() <= MAX_MEAN),
+            ("beyond 6", bias.beyond6.is_empty()),
             ("image mean", (ratio.value - 1.0).abs() <= MAX_RATIO.max(3.0 * ratio.stderr.unwrap_or(0.0))),
         ];
         Ok(Row {
@@ -228,17 +301,17 @@ impl Subject {
             seconds: start.elapsed().as_secs_f64(),
             mrays,
             ratio,
-            bias: scores,
-            unexplained,
+            all: (unnoted.len() < scores.len()).then(|| Bias::of(&scores)),
+            bias,
             failed: tests.iter().filter(|t| !t.1).map(|t| t.0).collect(),
         })
     }
 }
 
 fn save(image: &Estimate, path: &Path) -> Result<(), Box<dyn Error>> {
-    let mut picture = Picture::new(image.width, image.height);
     let layer =
-        |pixels: &[[f64; 3]], f: fn(f64) -> f64| pixels.iter().map(|p| p.map(|x| f(x) as f32)).collect::<Vec<_>>();
+        |pixels: &[[f64; 3]], f: fn(f64) -> f64| -> Vec<_> { pixels.iter().map(|p| p.map(|x| f(x) as f32)).collect() };
+    let mut picture = Picture::new(image.width, image.height);
     picture.add3("", ["R", "G", "B"], &layer(&image.mean, |x| x));
     picture.add3("stderr", ["R", "G", "B"], &layer(&image.variance, f64::sqrt));
     Ok(picture.write_exr(path)?)
@@ -255,34 +328,21 @@ fn plans(args: &Args, scene: &str) -> Vec<(&'static Plan, String)> {
 }
 
 const HEAD: &str = "\
-| scene | strategy | seeds x spp | Mrays | s | image / reference | beyond 3 | mean z | rms z | largest | verdict |
-|---|---|---|---|---|---|---|---|---|---|---|";
+# Against references
 
-fn print(r: &Row) {
-    let Row { ratio, bias, .. } = r;
-    println!(
-        "| {} | {} | {} x {} | {:.0} | {:.1} | {:.5} +- {:.5} | {:.2} % | {:+.3} | {:.3} | {:.2} | {} |",
-        r.scene,
-        r.strategy,
-        r.seeds,
-        r.spp,
-        r.mrays,
-        r.seconds,
-        ratio.value,
-        ratio.stderr.unwrap_or(f64::NAN),
-        100.0 * bias.beyond3,
-        bias.mean,
-        bias.rms,
-        bias.max,
-        r.verdict()
-    );
-}
+Made by `cargo run --release -p croupier-benches --bin references > benches/REFERENCES.md`; what the columns mean and
+what a row must fulfil is said in `benches/src/bin/references.rs`. Figures in brackets include the blocks of the notes.
+
+| scene | strategy | seeds x spp | Mrays | image / reference | beyond 3 | mean z | rms z | largest z | verdict |
+|---|---|---|---|---|---|---|---|---|---|";
 
 fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
     if !args.json {
         println!("{HEAD}");
     }
+    let start = Instant::now();
     let mut rows = Vec::new();
+    let mut notes = Vec::new();
     for &(name, spp) in SCENES.iter().filter(|s| args.only.is_empty() || args.only.iter().any(|o| o == s.0)) {
         if !args.scenes.join(name).is_dir() {
             eprintln!("{name}: skipped, there is no folder {}", args.scenes.join(name).display());
@@ -292,36 +352,23 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         for (plan, strategy) in plans(args, name) {
             let row = subject.test(args, plan, &strategy).map_err(|e| format!("{name}, {strategy}: {e}"))?;
             if !args.json {
-                print(&row);
-                report(&row);
+                row.print();
             }
             rows.push(row);
         }
+        notes.extend(NOTES.iter().filter(|n| n.scene == name));
     }
     let good = rows.iter().filter(|r| r.as_expected()).count();
     if args.json {
         let rows: Vec<Value> = rows.iter().map(Row::json).collect();
-        println!("{}", json!({ "rows": rows, "as_expected": good }));
+        let notes: Vec<Value> = notes.iter().map(|n| json!({ "scene": n.scene, "why": n.why })).collect();
+        println!("{}", json!({ "rows": rows, "as_expected": good, "notes": notes }));
     } else {
-        let seconds: f64 = rows.iter().map(|r| r.seconds).sum();
-        println!("\n{good} of {} rows as expected, {seconds:.0} s of rendering", rows.len());
+        println!("\n{good} of {} rows as expected.", rows.len());
+        notes.iter().for_each(|n| println!("\n**Note, {}.** {}", n.scene, n.why));
     }
+    eprintln!("{:.0} s", start.elapsed().as_secs_f64());
     Ok(good == rows.len())
-}
-
-/// Blocks beyond 6, to standard error.
-fn report(row: &Row) {
-    if row.biased {
-        return;
-    }
-    for b in row.bias.beyond6.iter().take(8) {
-        let note = NOTES.iter().find(|&&(s, x, y, _)| (s, x, y) == (&row.scene, b.x, b.y));
-        let note = note.map_or("no note", |n| n.3);
-        eprintln!(
-            "  block ({}, {}) channel {}: z {:.2}, {:.5} for {:.5}: {note}",
-            b.x, b.y, b.channel, b.z, b.image, b.reference
-        );
-    }
 }
 
 fn main() -> ExitCode {

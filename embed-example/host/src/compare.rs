@@ -11,7 +11,7 @@
 mod bias;
 mod equivalence;
 
-pub use bias::{Bias, BiasOptions, BlockZ, bias};
+pub use bias::{Bias, BiasOptions, BlockZ, bias, block_scores};
 pub use equivalence::{Equivalence, equivalence, normal_cdf, normal_quantile};
 
 use crate::flip::{self, Viewing};

@@ -74,19 +74,25 @@ pub struct Bias {
 
 /// Tests `image` against `reference`. Both variances count; where one is 0 that side is taken as exact.
 pub fn bias(image: &Estimate, reference: &Estimate, options: &BiasOptions) -> Result<Bias, CompareError> {
-    let scores = scores(image, reference, options)?;
-    let n = scores.len() as f64;
-    let beyond3 = scores.iter().filter(|b| b.z.abs() > 3.0).count() as f64 / n;
-    let mut beyond6: Vec<BlockZ> = scores.iter().filter(|b| b.z.abs() > 6.0).copied().collect();
-    beyond6.sort_by(|a, b| b.z.abs().total_cmp(&a.z.abs()));
-    Ok(Bias {
-        scores: scores.len(),
-        beyond3,
-        mean: scores.iter().map(|b| b.z).sum::<f64>() / n,
-        rms: (scores.iter().map(|b| b.z * b.z).sum::<f64>() / n).sqrt(),
-        max: scores.iter().map(|b| b.z.abs()).fold(0.0, f64::max),
-        beyond6,
-    })
+    Ok(Bias::of(&block_scores(image, reference, options)?))
+}
+
+impl Bias {
+    /// Sums up scores, all of [`block_scores`] or a part of them. Everything is 0 without scores.
+    pub fn of(scores: &[BlockZ]) -> Self {
+        let n = scores.len().max(1) as f64;
+        let beyond3 = scores.iter().filter(|b| b.z.abs() > 3.0).count() as f64 / n;
+        let mut beyond6: Vec<BlockZ> = scores.iter().filter(|b| b.z.abs() > 6.0).copied().collect();
+        beyond6.sort_by(|a, b| b.z.abs().total_cmp(&a.z.abs()));
+        Self {
+            scores: scores.len(),
+            beyond3,
+            mean: scores.iter().map(|b| b.z).sum::<f64>() / n,
+            rms: (scores.iter().map(|b| b.z * b.z).sum::<f64>() / n).sqrt(),
+            max: scores.iter().map(|b| b.z.abs()).fold(0.0, f64::max),
+            beyond6,
+        }
+    }
 }
 
 /// Means over blocks, and the variances of those means, per channel.
@@ -136,7 +142,12 @@ impl Blocks {
     }
 }
 
-fn scores(image: &Estimate, reference: &Estimate, options: &BiasOptions) -> Result<Vec<BlockZ>, CompareError> {
+/// The score of every block and channel, row by row.
+pub fn block_scores(
+    image: &Estimate,
+    reference: &Estimate,
+    options: &BiasOptions,
+) -> Result<Vec<BlockZ>, CompareError> {
     let (width, height) = (image.width, image.height);
     if (width, height) != (reference.width, reference.height) {
         return Err(CompareError::Size { first: (width, height), second: (reference.width, reference.height) });
