@@ -79,7 +79,7 @@ struct Args {
 /// below 0 (with many more, the reference's own do the opposite).
 const SCENES: &[(&str, u32)] = &[
     ("cbox", 32),
-    ("kitchen", 96),
+    ("kitchen", 64),
     ("bathroom", 16),
     ("living_room", 24),
     ("pool", 64),
@@ -95,7 +95,7 @@ struct Plan {
     /// Path segments; the scene's own (40) if absent.
     depth: Option<u32>,
     split_budget: u32,
-    /// Samples per pixel relative to [`SCENES`]: split samples cost more each.
+    /// Samples per pixel relative to [`SCENES`]: the longer the paths, the fewer.
     effort: f64,
     quick: bool,
     /// Scenes in which a bias must show; empty if there must be none in any.
@@ -109,7 +109,7 @@ impl Plan {
 }
 
 /// Splitting at every vertex without a bound doubles the work 39 times: a few splits per camera sample show as much.
-const FEW_SPLITS: u32 = 6;
+const FEW_SPLITS: u32 = 3;
 
 /// Scenes with enough light that needs many bounces.
 const INDIRECT: &[&str] = &["cbox", "kitchen", "bathroom", "living_room"];
@@ -122,8 +122,8 @@ const PLANS: &[Plan] = &[
     Plan::unbiased("albedo"),
     Plan { quick: true, ..Plan::unbiased("classic") },
     Plan { effort: 1.5, ..Plan::unbiased("fixed:0.7") },
-    Plan { quick: true, split_budget: FEW_SPLITS, effort: 0.25, ..Plan::unbiased("fixed:2") },
-    Plan { depth: Some(40), ..Plan::unbiased("none") },
+    Plan { quick: true, split_budget: FEW_SPLITS, effort: 0.125, ..Plan::unbiased("fixed:2") },
+    Plan { depth: Some(40), effort: 0.5, ..Plan::unbiased("none") },
     Plan { quick: true, biased: INDIRECT, effort: 0.5, ..Plan::unbiased("threshold") },
     Plan { quick: true, biased: INDIRECT, effort: 0.5, depth: Some(3), ..Plan::unbiased("none") },
 ];
