@@ -10,6 +10,7 @@
 //! | [`bsdf`] | scattering in local frames | geometry, lights |
 //! | [`light`] | emission and its sampling | scattering |
 //! | [`rrs`] | how many samples a vertex gets | where it is |
+//! | [`learn`] | statistics by place and direction | how paths are traced |
 //! | `tracer` | packets, queues, stages | files, threads, clocks |
 //! | [`film`] | sums per pixel and their error | paths |
 //!
@@ -43,6 +44,7 @@ pub mod accel;
 pub mod bsdf;
 pub mod camera;
 pub mod film;
+pub mod learn;
 pub mod light;
 mod memory;
 pub mod profile;

@@ -1,0 +1,193 @@
+//! The statistics of one bin, in the three forms they take: gathered, kept, looked up.
+
+use bytemuck::{Pod, Zeroable};
+use croupier_simd::{F32x8, Vec3x8};
+
+/// Direction bins of a leaf.
+pub(super) const BINS: usize = 16;
+
+/// Samples (and pairs) that one bin takes from one shard in one iteration: below it no f32 sum stalls.
+pub const BIN_LIMIT: u32 = 1 << 16;
+
+/// Values and costs above 2^55 count as 2^55: [`BIN_LIMIT`] of their squares are still finite.
+pub const MAX_VALUE: f32 = 36_028_797_018_963_968.0;
+/// Twice the square of [`MAX_VALUE`].
+const MAX_SQUARE: f32 = 2.0 * MAX_VALUE * MAX_VALUE;
+
+/// Samples that the mean of a bin's leaf counts for in the bin.
+const LEAF_SAMPLES: f64 = 8.0;
+/// Pairs that `moment - mean^2` counts for in the variance.
+const SPREAD_PAIRS: f64 = 16.0;
+
+/// What a shard has gathered in an iteration.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Record {
+    count: u32,
+    pairs: u32,
+    cost: f32,
+    sum: [f32; 3],
+    sqr: [f32; 3],
+    pair: [f32; 3],
+}
+
+impl Record {
+    /// Adds a finite sample; `false` if the bin is full.
+    pub(super) fn add(&mut self, x: [f32; 3], cost: f32) -> bool {
+        if self.count >= BIN_LIMIT {
+            return false;
+        }
+        self.count += 1;
+        self.cost += cost.clamp(0.0, MAX_VALUE);
+        for ((sum, sqr), x) in self.sum.iter_mut().zip(&mut self.sqr).zip(x) {
+            let x = x.clamp(0.0, MAX_VALUE);
+            *sum += x;
+            *sqr += x * x;
+        }
+        true
+    }
+
+    /// Adds a finite half squared difference; `false` if the bin is full.
+    pub(super) fn add_pair(&mut self, half_squared_difference: [f32; 3]) -> bool {
+        if self.pairs >= BIN_LIMIT {
+            return false;
+        }
+        self.pairs += 1;
+        for (sum, d) in self.pair.iter_mut().zip(half_squared_difference) {
+            *sum += d.clamp(0.0, MAX_SQUARE);
+        }
+        true
+    }
+}
+
+/// Sums over all iterations; f64, so that 1e9 samples lose nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct BinSums {
+    pub(super) count: f64,
+    pub(super) pairs: f64,
+    cost: f64,
+    sum: [f64; 3],
+    sqr: [f64; 3],
+    pair: [f64; 3],
+}
+
+/// Numbers of a [`BinSums`].
+const FIELDS: usize = size_of::<BinSums>() / 8;
+
+impl BinSums {
+    pub(super) const ZERO: Self =
+        Self { count: 0.0, pairs: 0.0, cost: 0.0, sum: [0.0; 3], sqr: [0.0; 3], pair: [0.0; 3] };
+
+    pub(super) fn fields(&self) -> &[f64; FIELDS] {
+        bytemuck::cast_ref(self)
+    }
+
+    pub(super) fn fields_mut(&mut self) -> &mut [f64; FIELDS] {
+        bytemuck::cast_mut(self)
+    }
+
+    pub(super) fn scale(&mut self, s: f64) {
+        self.fields_mut().iter_mut().for_each(|x| *x *= s);
+    }
+
+    /// Adds `share` of `o`.
+    pub(super) fn add(&mut self, o: &Self, share: f64) {
+        for (a, b) in self.fields_mut().iter_mut().zip(o.fields()) {
+            *a += share * b;
+        }
+    }
+
+    pub(super) fn absorb(&mut self, r: &Record) {
+        self.count += f64::from(r.count);
+        self.pairs += f64::from(r.pairs);
+        self.cost += f64::from(r.cost);
+        for (a, b) in [(&mut self.sum, r.sum), (&mut self.sqr, r.sqr), (&mut self.pair, r.pair)] {
+            a.iter_mut().zip(b).for_each(|(a, b)| *a += f64::from(b));
+        }
+    }
+}
+
+/// What look-ups read: all numbers finite, none negative.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Frozen {
+    mean: [f32; 3],
+    cost: f32,
+    moment: [f32; 3],
+    count: f32,
+    variance: [f32; 3],
+    /// Makes rows of twelve.
+    reserved: f32,
+}
+
+/// `x`, between 0 and `max`; a NaN is 0.
+fn saturate(x: f64, max: f32) -> f32 {
+    if x > 0.0 { x.min(f64::from(max)) as f32 } else { 0.0 }
+}
+
+impl Frozen {
+    pub(super) const ZERO: Self =
+        Self { mean: [0.0; 3], cost: 0.0, moment: [0.0; 3], count: 0.0, variance: [0.0; 3], reserved: 0.0 };
+
+    /// Of a bin in a leaf with the sums `leaf`. The bin is shrunk towards its leaf, whose mean counts for as many samples
+    /// as other bins have, at most [`LEAF_SAMPLES`].
+    fn of(bin: &BinSums, leaf: &BinSums) -> Self {
+        let others = |all: f64, own: f64| (all - own).clamp(0.0, LEAF_SAMPLES);
+        let (w, wp) = (others(leaf.count, bin.count), others(leaf.pairs, bin.pairs));
+        let (n, pairs) = (bin.count + w, bin.pairs + wp);
+        let per_sample = w / leaf.count;
+        let per_pair = if wp > 0.0 { wp / leaf.pairs } else { 0.0 };
+        let mut f = Self::ZERO;
+        f.cost = saturate((bin.cost + per_sample * leaf.cost) / n, MAX_VALUE);
+        f.count = saturate(n, MAX_VALUE);
+        let sums = bin.sum.iter().zip(&leaf.sum).zip(bin.sqr.iter().zip(&leaf.sqr));
+        let sums = sums.zip(bin.pair.iter().zip(&leaf.pair));
+        let out = f.mean.iter_mut().zip(&mut f.moment).zip(&mut f.variance);
+        for (((mean, moment), variance), (((s, ls), (q, lq)), (p, lp))) in out.zip(sums) {
+            let (m, m2) = ((s + per_sample * ls) / n, (q + per_sample * lq) / n);
+            *mean = saturate(m, MAX_VALUE);
+            *moment = saturate(m2, MAX_SQUARE).max(*mean * *mean);
+            let spread = (m2 - m * m).max(0.0);
+            let v = (p + per_pair * lp + SPREAD_PAIRS * spread) / (pairs + SPREAD_PAIRS);
+            *variance = saturate(v, MAX_SQUARE).min(*moment);
+        }
+        f
+    }
+}
+
+/// What look-ups read of one leaf. One without samples says so with `count` 0.
+pub(super) fn freeze_leaf(sums: &[BinSums], frozen: &mut [Frozen]) {
+    let mut leaf = BinSums::ZERO;
+    sums.iter().for_each(|b| leaf.add(b, 1.0));
+    for (f, b) in frozen.iter_mut().zip(sums) {
+        *f = if leaf.count > 0.0 { Frozen::of(b, &leaf) } else { Frozen::ZERO };
+    }
+}
+
+/// What the cache knows of eight bins. All values are finite and none is negative; where `count` is 0 all are 0.
+#[derive(Clone, Copy, Debug)]
+pub struct Local8 {
+    /// Mean of the values.
+    pub mean: Vec3x8,
+    /// Mean of their squares, at least `mean^2`.
+    pub moment: Vec3x8,
+    /// Their variance at a point, without the spread of the mean over the cell as far as pairs tell; at most `moment`.
+    pub variance: Vec3x8,
+    /// Mean cost of a sample, rays.
+    pub cost: F32x8,
+    /// Confidence: samples of the bin and up to eight of the other bins of its leaf, older ones discounted.
+    pub count: F32x8,
+}
+
+impl Local8 {
+    pub(super) fn gather(row: impl Fn(usize) -> Frozen) -> Self {
+        let rows: [Frozen; 8] = [row(0), row(1), row(2), row(3), row(4), row(5), row(6), row(7)];
+        let first = rows.map(|f| {
+            F32x8::new([f.mean[0], f.mean[1], f.mean[2], f.cost, f.moment[0], f.moment[1], f.moment[2], f.count])
+        });
+        let [mx, my, mz, cost, qx, qy, qz, count] = F32x8::transpose(first);
+        let variance = Vec3x8::from_fn(|i| rows.get(i).map_or([0.0; 3], |f| f.variance));
+        Self { mean: Vec3x8::new(mx, my, mz), moment: Vec3x8::new(qx, qy, qz), variance, cost, count }
+    }
+}

@@ -1,0 +1,248 @@
+//! The cache of statistics by place and direction (EARS, SIGGRAPH 2022, section 5; Müller et al. 2017 for the tree).
+//!
+//! An octree over the scene has 4x4 direction bins in every leaf. A bin keeps count, sums and squared sums of the
+//! *values* of samples (reflected radiance over albedo, linear rgb) that were drawn at vertices in it, and of their cost
+//! (rays). Sums also exist of half the squared difference of two samples of the same vertex: their mean is the variance
+//! at a point, whereas `moment - mean^2` has the spread of the mean over the cell in it as well.
+//!
+//! There are two octrees. Matte vertices are keyed by their shading normal, all others by a direction of the caller's
+//! choice. Shards look up in what [`Cache::freeze`] computed and log into their own [`Training`]; between iterations
+//! those are absorbed in shard order, so the cache is the same whatever the threads did.
+
+pub use super::bins::{BIN_LIMIT, Local8, MAX_VALUE};
+pub use super::save::CacheError;
+pub use super::training::Training;
+
+use super::bins::{BINS, BinSums, Frozen, freeze_leaf};
+use super::tree::{MAX_DEPTH, MAX_LEAVES, Node, ROOTS, Tree, direction_bin};
+use crate::memory::{Carver, Layout, Measure, MemoryError};
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+
+/// How many nodes and leaves there is room for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CacheSize {
+    splits: u32,
+}
+
+impl CacheSize {
+    /// The largest cache whose shared side and `shards` training sides fit in `bytes` together; `None` if none does.
+    /// The smallest, two leaves that never split, takes 5 KiB and 1.5 KiB more for each shard.
+    pub fn within(bytes: usize, shards: u32) -> Option<Self> {
+        let fits = |splits: u32| Self { splits }.bytes(shards).is_some_and(|b| b <= bytes);
+        if !fits(0) {
+            return None;
+        }
+        // largest that fits, by bisection; `fits(low)` always holds
+        let (mut low, mut high) = (0, (MAX_LEAVES - ROOTS) / 7 + 1);
+        while high - low > 1 {
+            let middle = low + (high - low) / 2;
+            if fits(middle) { low = middle } else { high = middle }
+        }
+        Some(Self { splits: low })
+    }
+
+    /// Bytes of the shared side and of `shards` training sides.
+    pub fn bytes(self, shards: u32) -> Option<usize> {
+        let training = Training::layout(self)?.size.checked_mul(shards as usize)?;
+        Cache::layout(self)?.size.checked_add(training)
+    }
+
+    /// Leaves of both octrees.
+    pub fn leaves(self) -> u32 {
+        ROOTS + 7 * self.splits
+    }
+
+    pub(super) fn bins(self) -> usize {
+        self.leaves() as usize * BINS
+    }
+}
+
+/// The shared side: frozen while shards work, changed between iterations.
+#[derive(Debug)]
+pub struct Cache<'m> {
+    pub(super) tree: Tree<'m>,
+    pub(super) sums: &'m mut [BinSums],
+    frozen: &'m mut [Frozen],
+    pub(super) size: CacheSize,
+    splits_refused: u64,
+}
+
+impl<'m> Cache<'m> {
+    /// The block that [`Self::new`] needs; `None` if it cannot be addressed.
+    pub fn layout(size: CacheSize) -> Option<Layout> {
+        Self::measure(Measure::new(), size).layout()
+    }
+
+    /// An empty cache in a block of its own, over the bounds `lo` to `hi`, world space.
+    pub fn new(size: CacheSize, lo: [f32; 3], hi: [f32; 3], block: &'m mut [u8]) -> Result<Self, MemoryError> {
+        let given = block.len();
+        let layout = Self::layout(size).ok_or(MemoryError::TooSmall { needed: usize::MAX, given })?;
+        Self::carve(&mut Carver::new(block, layout)?, size, lo, hi)
+    }
+
+    pub(crate) fn measure(m: Measure, size: CacheSize) -> Measure {
+        Tree::measure(m, Tree::nodes_for(size.splits)).add::<BinSums>(size.bins()).add::<Frozen>(size.bins())
+    }
+
+    pub(crate) fn carve(c: &mut Carver<'m>, size: CacheSize, lo: [f32; 3], hi: [f32; 3]) -> Result<Self, MemoryError> {
+        let tree = Tree::carve(c, Tree::nodes_for(size.splits), size.leaves(), lo, hi)?;
+        Ok(Self { tree, sums: c.take(size.bins())?, frozen: c.take(size.bins())?, size, splits_refused: 0 })
+    }
+
+    /// The bins of eight vertices, `u32::MAX` in inactive lanes. `dir` is a unit vector in world space: the shading
+    /// normal where `matte`. Places outside the bounds belong to the nearest leaf.
+    #[inline]
+    pub fn find(&self, matte: Mask8, p: Vec3x8, dir: Vec3x8, active: Mask8) -> U32x8 {
+        self.bins_of(self.tree.find(matte, p, None), dir, active)
+    }
+
+    /// As [`Self::find`], of places moved by `jitter - 0.5` of the edge of their leaf, `jitter` in [0, 1). So what is
+    /// looked up has no visible borders: it is a box filter over the leaves, by sampling.
+    #[inline]
+    pub fn find_jittered(&self, matte: Mask8, p: Vec3x8, dir: Vec3x8, jitter: [F32x8; 3], active: Mask8) -> U32x8 {
+        self.bins_of(self.tree.find(matte, p, Some(jitter)), dir, active)
+    }
+
+    #[inline(always)]
+    fn bins_of(&self, first: U32x8, dir: Vec3x8, active: Mask8) -> U32x8 {
+        U32x8::select(active, first + direction_bin(dir), U32x8::splat(u32::MAX))
+    }
+
+    /// What is known of eight bins; 0 in inactive lanes.
+    #[inline]
+    pub fn local(&self, bin: U32x8, active: Mask8) -> Local8 {
+        let bin = U32x8::select(active, bin, U32x8::splat(u32::MAX)).to_array();
+        Local8::gather(|i| *bin.get(i).and_then(|b| self.frozen.get(*b as usize)).unwrap_or(&Frozen::ZERO))
+    }
+
+    /// Begins the end of an iteration: everything so far counts `keep` times as much, 0 to 1.
+    pub fn begin_merge(&mut self, keep: f64) {
+        let keep = if keep >= 0.0 { keep.min(1.0) } else { 0.0 };
+        self.used_mut().iter_mut().for_each(|b| b.scale(keep));
+    }
+
+    /// Adds what a shard gathered. Shards in order, so that the sums have the same bits whoever worked when.
+    pub fn absorb(&mut self, t: &Training<'_>) {
+        self.used_mut().iter_mut().zip(t.records()).for_each(|(b, r)| b.absorb(r));
+    }
+
+    /// Ends the end of an iteration: splits leaves of more than `split_count` samples (taken as at least 1), then
+    /// computes what look-ups read. Bins may have new numbers afterwards.
+    ///
+    /// Children inherit an eighth of their parent's sums each, and are split again while that is still too many. When
+    /// leaves run out, those with most samples have been split first; the rest is counted by [`Self::splits_refused`].
+    pub fn freeze(&mut self, split_count: f64) {
+        let limit = if split_count.is_nan() { f64::INFINITY } else { split_count.max(1.0) };
+        let mut threshold = f64::INFINITY;
+        // A pass splits what is above its threshold and finds the largest leaf that is left, for the next threshold.
+        loop {
+            let (largest, full) = self.split_above(threshold);
+            if full {
+                let refused = self.tree.indices().filter(|i| self.may_split(*i).is_some_and(|n| n > limit)).count();
+                self.splits_refused += refused as u64;
+                break;
+            }
+            if largest <= limit {
+                break;
+            }
+            threshold = (0.5 * largest).max(limit);
+        }
+        self.refresh();
+    }
+
+    /// Samples of the largest leaf that is left and may be split, and whether one was refused.
+    fn split_above(&mut self, threshold: f64) -> (f64, bool) {
+        let (mut largest, mut full) = (0.0f64, false);
+        for index in self.tree.indices() {
+            let Some(count) = self.may_split(index) else { continue };
+            let rest = if count <= threshold {
+                count
+            } else if self.split(index) {
+                count / 8.0
+            } else {
+                full = true;
+                count
+            };
+            largest = largest.max(rest);
+        }
+        (largest, full)
+    }
+
+    /// Samples of a leaf above the depth limit.
+    fn may_split(&self, index: u32) -> Option<f64> {
+        match self.tree.node(index) {
+            Node::Leaf { number, depth } if depth < MAX_DEPTH => Some(self.leaf(number).iter().map(|b| b.count).sum()),
+            _ => None,
+        }
+    }
+
+    /// Splits a leaf; `false` if there is no room or it is too deep.
+    pub(super) fn split(&mut self, index: u32) -> bool {
+        let Node::Leaf { number, .. } = self.tree.node(index) else { return false };
+        let Some(first) = self.tree.split(index) else { return false };
+        self.leaf_mut(number).iter_mut().for_each(|b| b.scale(0.125));
+        let from = number as usize * BINS;
+        for child in first..first + 7 {
+            self.sums.copy_within(from..from + BINS, child as usize * BINS);
+        }
+        true
+    }
+
+    /// Computes what look-ups read.
+    pub(super) fn refresh(&mut self) {
+        let used = self.tree.leaves() as usize * BINS;
+        let sums = self.sums.chunks_exact(BINS);
+        let frozen = self.frozen.chunks_exact_mut(BINS);
+        sums.zip(frozen).take(used / BINS).for_each(|(s, f)| freeze_leaf(s, f));
+    }
+
+    /// Forgets everything, the tree included.
+    pub fn reset(&mut self) {
+        self.used_mut().fill(BinSums::ZERO);
+        self.tree.reset();
+        self.refresh();
+    }
+
+    pub(super) fn leaf(&self, number: u32) -> &[BinSums] {
+        let from = number as usize * BINS;
+        self.sums.get(from..from + BINS).unwrap_or(&[])
+    }
+
+    pub(super) fn leaf_mut(&mut self, number: u32) -> &mut [BinSums] {
+        let from = number as usize * BINS;
+        self.sums.get_mut(from..from + BINS).unwrap_or(&mut [])
+    }
+
+    fn used_mut(&mut self) -> &mut [BinSums] {
+        self.sums.get_mut(..self.tree.leaves() as usize * BINS).unwrap_or(&mut [])
+    }
+
+    /// Bins in use; look-ups give smaller numbers. [`Training::clear`] wants it.
+    pub fn bins(&self) -> u32 {
+        self.tree.leaves() * BINS as u32
+    }
+
+    /// Leaves in use, of both octrees.
+    pub fn leaves(&self) -> u32 {
+        self.tree.leaves()
+    }
+
+    /// Nodes in use, leaves included.
+    pub fn nodes(&self) -> u32 {
+        self.tree.nodes()
+    }
+
+    /// What there is room for.
+    pub fn size(&self) -> CacheSize {
+        self.size
+    }
+
+    /// Leaves that were too large but found no room, summed over all calls of [`Self::freeze`] and [`Self::merge`].
+    pub fn splits_refused(&self) -> u64 {
+        self.splits_refused
+    }
+
+    pub(super) fn refuse_split(&mut self) {
+        self.splits_refused += 1;
+    }
+}

@@ -1,0 +1,365 @@
+//! The cache as bytes: for the next frame, another machine, another run.
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 64 | [`Header`] |
+//! | nodes, padded to a multiple of 8 | shape: a byte per node, 1 inner, 0 leaf; parents first, children in order |
+//! | 1536 per leaf | sums of the leaves in the order of the shape |
+//!
+//! All numbers are little-endian. There are no indices, so bytes cannot describe anything but a tree: what is left to
+//! check is that the shape ends where it says, how deep it goes, and the numbers. Bytes are checked as a whole before
+//! anything is changed.
+
+use super::bins::{BINS, BinSums};
+use super::cache::Cache;
+use super::tree::{MAX_DEPTH, Node, ROOTS};
+use crate::scene::blob::content_hash;
+use bytemuck::{Pod, Zeroable};
+use core::fmt;
+
+/// First bytes of a saved cache.
+const MAGIC: u64 = u64::from_le_bytes(*b"CRPCACHE");
+/// Version of the format.
+const VERSION: u32 = 1;
+/// Largest sum: adding up such files, or squaring their means, stays finite.
+const MAX_SUM: f64 = 1e100;
+
+const HEADER: usize = size_of::<Header>();
+const LEAF_BYTES: usize = BINS * size_of::<BinSums>();
+
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+struct Header {
+    magic: u64,
+    /// [`content_hash`] of everything after it.
+    hash: u64,
+    version: u32,
+    nodes: u32,
+    leaves: u32,
+    /// Bits of the cube's smallest corner and edge.
+    cube: [u32; 4],
+    reserved: [u32; 5],
+}
+
+/// Why bytes are not a cache that can be loaded, or a cache cannot be saved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum CacheError {
+    /// Too few bytes, or too many.
+    Length {
+        /// Bytes needed.
+        needed: usize,
+        /// Bytes given.
+        given: usize,
+    },
+    /// Not a saved cache: its first eight bytes.
+    Magic(u64),
+    /// A version of the format that is not known.
+    Version(u32),
+    /// The hash of the contents is not the one stored.
+    Hash {
+        /// Stored.
+        stored: u64,
+        /// Of the bytes.
+        found: u64,
+    },
+    /// Of other bounds than this cache.
+    Bounds {
+        /// 0 to 2: smallest corner of the cube; 3: its edge.
+        index: u32,
+        /// Of this cache.
+        expected: f32,
+        /// Of the bytes.
+        found: f32,
+    },
+    /// A node that is neither 0 nor 1, or an inner one at the depth limit.
+    Node {
+        /// Its place in the shape.
+        index: u32,
+        /// Its byte.
+        found: u8,
+        /// Its depth.
+        depth: u32,
+    },
+    /// The shape has other numbers of nodes and leaves than the header.
+    Shape {
+        /// Nodes and leaves of the header.
+        expected: [u32; 2],
+        /// Nodes and leaves met.
+        found: [u32; 2],
+    },
+    /// A sum that is negative, not finite or above 1e100.
+    Sum {
+        /// Leaf, in the order of the shape.
+        leaf: u32,
+        /// Bin of the leaf.
+        bin: u32,
+        /// Number of the bin.
+        field: u32,
+        /// Its value.
+        found: f64,
+    },
+    /// More leaves than there is room for.
+    Full {
+        /// Leaves needed.
+        needed: u32,
+        /// Leaves there is room for.
+        room: u32,
+    },
+}
+
+impl fmt::Display for CacheError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Length { needed, given } => write!(f, "saved cache has {needed} bytes, {given} given"),
+            Self::Magic(m) => write!(f, "not a saved cache: starts with {m:#018x}"),
+            Self::Version(v) => write!(f, "saved cache of version {v}, only {VERSION} is known"),
+            Self::Hash { stored, found } => write!(f, "saved cache has hash {found:#018x}, header says {stored:#018x}"),
+            Self::Bounds { index: 3, expected, found } => write!(f, "saved cache has edge {found}, need {expected}"),
+            Self::Bounds { index, expected, found } => {
+                write!(f, "saved cache starts at {found} on axis {index}, need {expected}")
+            }
+            Self::Node { index, found, depth } => {
+                write!(f, "node {index} of the saved cache is {found} at depth {depth}")
+            }
+            Self::Shape { expected: [n, l], found: [m, k] } => {
+                write!(f, "saved cache has {m} nodes and {k} leaves, header says {n} and {l}")
+            }
+            Self::Sum { leaf, bin, field, found } => {
+                write!(f, "leaf {leaf} bin {bin} field {field} of the saved cache is {found}, need 0 to {MAX_SUM:e}")
+            }
+            Self::Full { needed, room } => write!(f, "saved cache has {needed} leaves, there is room for {room}"),
+        }
+    }
+}
+
+impl core::error::Error for CacheError {}
+
+/// Shape and sums that were checked.
+struct Saved<'b> {
+    shape: &'b [u8],
+    sums: &'b [u8],
+    leaves: u32,
+}
+
+fn padded(nodes: u32) -> usize {
+    (nodes as usize).saturating_add(7) & !7
+}
+
+/// Bytes of a saved cache.
+fn length(nodes: u32, leaves: u32) -> usize {
+    (leaves as usize).saturating_mul(LEAF_BYTES).saturating_add(HEADER).saturating_add(padded(nodes))
+}
+
+fn read_sums(bytes: &[u8]) -> BinSums {
+    let mut sums = BinSums::ZERO;
+    for (x, b) in sums.fields_mut().iter_mut().zip(bytes.as_chunks().0) {
+        *x = f64::from_le_bytes(*b);
+    }
+    sums
+}
+
+impl<'b> Saved<'b> {
+    fn check(bytes: &'b [u8], cube: [f32; 4]) -> Result<Self, CacheError> {
+        let given = bytes.len();
+        let (header, body) = bytes.split_at_checked(HEADER).ok_or(CacheError::Length { needed: HEADER, given })?;
+        let header = words_to_native(bytemuck::pod_read_unaligned(header));
+        if header.magic != MAGIC {
+            return Err(CacheError::Magic(header.magic));
+        }
+        if header.version != VERSION {
+            return Err(CacheError::Version(header.version));
+        }
+        let needed = length(header.nodes, header.leaves);
+        if given != needed {
+            return Err(CacheError::Length { needed, given });
+        }
+        let found = content_hash(bytes.get(16..).unwrap_or(&[]));
+        if header.hash != found {
+            return Err(CacheError::Hash { stored: header.hash, found });
+        }
+        for (index, (expected, found)) in (0..).zip(cube.into_iter().zip(header.cube)) {
+            if expected.to_bits() != found {
+                return Err(CacheError::Bounds { index, expected, found: f32::from_bits(found) });
+            }
+        }
+        let (shape, sums) = body.split_at_checked(padded(header.nodes)).unwrap_or((&[], &[]));
+        let shape = shape.get(..header.nodes as usize).unwrap_or(&[]);
+        check_shape(shape, [header.nodes, header.leaves])?;
+        for (i, b) in (0u32..).zip(sums.chunks_exact(size_of::<BinSums>())) {
+            let bin = read_sums(b);
+            // a NaN is in no range
+            let bad = (0u32..).zip(bin.fields()).find(|(_, x)| !(0.0..=MAX_SUM).contains(*x));
+            if let Some((field, found)) = bad {
+                let (leaf, bin) = (i / BINS as u32, i % BINS as u32);
+                return Err(CacheError::Sum { leaf, bin, field, found: *found });
+            }
+        }
+        Ok(Self { shape, sums, leaves: header.leaves })
+    }
+
+    fn leaf(&self, number: u32) -> [BinSums; BINS] {
+        let from = number as usize * LEAF_BYTES;
+        let bytes = self.sums.get(from..).unwrap_or(&[]);
+        let mut bins = [BinSums::ZERO; BINS];
+        for (bin, b) in bins.iter_mut().zip(bytes.chunks_exact(size_of::<BinSums>())) {
+            *bin = read_sums(b);
+        }
+        bins
+    }
+}
+
+/// Are there two trees, one after the other, in exactly these bytes?
+fn check_shape(shape: &[u8], expected: [u32; 2]) -> Result<(), CacheError> {
+    // nodes still to come at every depth
+    let mut open = [0u32; MAX_DEPTH as usize + 1];
+    if let Some(o) = open.first_mut() {
+        *o = ROOTS;
+    }
+    let (mut depth, mut leaves) = (0usize, 0u32);
+    for (index, found) in (0u32..).zip(shape.iter().copied()) {
+        let bad = CacheError::Node { index, found, depth: depth as u32 };
+        let excess = CacheError::Shape { expected, found: [index, leaves] };
+        let o = open.get_mut(depth).filter(|o| **o > 0).ok_or(excess)?;
+        *o -= 1;
+        match found {
+            0 => leaves += 1,
+            1 => {
+                depth += 1;
+                *open.get_mut(depth).ok_or(bad)? = 8;
+            }
+            _ => return Err(bad),
+        }
+        while depth > 0 && open.get(depth) == Some(&0) {
+            depth -= 1;
+        }
+    }
+    let found = [shape.len() as u32, leaves];
+    if open != [0; MAX_DEPTH as usize + 1] || found != expected {
+        return Err(CacheError::Shape { expected, found });
+    }
+    Ok(())
+}
+
+/// Numbers of a header between the machine's byte order and little-endian.
+fn words_to_native(h: Header) -> Header {
+    Header {
+        magic: u64::from_le(h.magic),
+        hash: u64::from_le(h.hash),
+        version: u32::from_le(h.version),
+        nodes: u32::from_le(h.nodes),
+        leaves: u32::from_le(h.leaves),
+        cube: h.cube.map(u32::from_le),
+        reserved: h.reserved,
+    }
+}
+
+/// The next node and the next leaf of a [`Saved`].
+#[derive(Default)]
+struct Cursor {
+    node: usize,
+    leaf: u32,
+}
+
+impl Cache<'_> {
+    /// Bytes that [`Self::save`] writes.
+    pub fn saved_len(&self) -> usize {
+        length(self.nodes(), self.leaves())
+    }
+
+    /// Writes the tree and its sums; returns the bytes written. Equal statistics give equal bytes, whatever the order in
+    /// which the tree grew.
+    pub fn save(&self, out: &mut [u8]) -> Result<usize, CacheError> {
+        let (needed, given) = (self.saved_len(), out.len());
+        let short = CacheError::Length { needed, given };
+        let out = out.get_mut(..needed).ok_or(short)?;
+        let (head, body) = out.split_at_mut_checked(HEADER).ok_or(short)?;
+        let (shape, sums) = body.split_at_mut_checked(padded(self.nodes())).ok_or(short)?;
+        shape.fill(0);
+        let (mut nodes, mut leaves) = (shape.iter_mut(), sums.chunks_exact_mut(LEAF_BYTES));
+        for root in 0..ROOTS {
+            self.tree.visit(root, &mut |node| {
+                let byte = nodes.next();
+                match node {
+                    Node::Inner { .. } => byte.into_iter().for_each(|b| *b = 1),
+                    Node::Leaf { number, .. } => {
+                        let numbers = self.leaf(number).iter().flat_map(BinSums::fields);
+                        let bytes = leaves.next().unwrap_or(&mut []).as_chunks_mut().0;
+                        bytes.iter_mut().zip(numbers).for_each(|(b, x)| *b = x.to_le_bytes());
+                    }
+                }
+            });
+        }
+        let mut header = Header {
+            magic: MAGIC,
+            hash: 0,
+            version: VERSION,
+            nodes: self.nodes(),
+            leaves: self.leaves(),
+            cube: self.tree.cube.map(f32::to_bits),
+            reserved: [0; 5],
+        };
+        head.copy_from_slice(bytemuck::bytes_of(&words_to_native(header)));
+        header.hash = content_hash(out.get(16..).unwrap_or(&[]));
+        if let Some(head) = out.get_mut(..HEADER) {
+            head.copy_from_slice(bytemuck::bytes_of(&words_to_native(header)));
+        }
+        Ok(needed)
+    }
+
+    /// Takes over a saved cache of the same bounds, in place of what it has. Bytes with more leaves than there is room
+    /// for are refused; [`Self::merge`] into an empty cache takes what fits. After an error the cache is as before.
+    pub fn load(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
+        let saved = Saved::check(bytes, self.tree.cube)?;
+        let room = self.size.leaves();
+        if saved.leaves > room {
+            return Err(CacheError::Full { needed: saved.leaves, room });
+        }
+        self.reset();
+        self.add(&saved);
+        Ok(())
+    }
+
+    /// Adds a saved cache of the same bounds. Where its tree is finer, this one grows as long as there is room, else the
+    /// finer sums join in one leaf; where it is coarser, leaves get an eighth per level. After an error the cache is as
+    /// before.
+    pub fn merge(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
+        let saved = Saved::check(bytes, self.tree.cube)?;
+        self.add(&saved);
+        Ok(())
+    }
+
+    fn add(&mut self, saved: &Saved<'_>) {
+        let mut at = Cursor::default();
+        (0..ROOTS).for_each(|root| self.add_node(root, saved, &mut at));
+        self.refresh();
+    }
+
+    /// Adds the next saved node and all below it to a node of this tree. Recursion ends at the depth limit.
+    fn add_node(&mut self, index: u32, saved: &Saved<'_>, at: &mut Cursor) {
+        let inner = saved.shape.get(at.node) == Some(&1);
+        at.node += 1;
+        if !inner {
+            let bins = saved.leaf(at.leaf);
+            at.leaf += 1;
+            return self.hand_down(index, &bins, 1.0);
+        }
+        if matches!(self.tree.node(index), Node::Leaf { .. }) && !self.split(index) {
+            self.refuse_split();
+        }
+        match self.tree.node(index) {
+            Node::Inner { child } => (child..child + 8).for_each(|c| self.add_node(c, saved, at)),
+            Node::Leaf { .. } => (0..8).for_each(|_| self.add_node(index, saved, at)),
+        }
+    }
+
+    /// Adds a share of sums to all leaves below a node, in proportion to their volumes.
+    fn hand_down(&mut self, index: u32, bins: &[BinSums; BINS], share: f64) {
+        match self.tree.node(index) {
+            Node::Inner { child } => (child..child + 8).for_each(|c| self.hand_down(c, bins, 0.125 * share)),
+            Node::Leaf { number, .. } => {
+                self.leaf_mut(number).iter_mut().zip(bins).for_each(|(b, o)| b.add(o, share));
+            }
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! A shard's side of the cache: what it has gathered in the current iteration.
+
+use super::bins::Record;
+use super::cache::CacheSize;
+use crate::memory::{Carver, Layout, Measure, MemoryError};
+
+/// Records of one shard, one for every bin that the cache may ever have.
+#[derive(Debug)]
+pub struct Training<'m> {
+    records: &'m mut [Record],
+    used: usize,
+}
+
+impl<'m> Training<'m> {
+    /// The block that [`Self::new`] needs; `None` if it cannot be addressed.
+    pub fn layout(size: CacheSize) -> Option<Layout> {
+        Self::measure(Measure::new(), size).layout()
+    }
+
+    /// A training side in a block of its own, without bins until [`Self::clear`].
+    pub fn new(size: CacheSize, block: &'m mut [u8]) -> Result<Self, MemoryError> {
+        let given = block.len();
+        let layout = Self::layout(size).ok_or(MemoryError::TooSmall { needed: usize::MAX, given })?;
+        Self::carve(&mut Carver::new(block, layout)?, size)
+    }
+
+    pub(crate) fn measure(m: Measure, size: CacheSize) -> Measure {
+        m.add::<Record>(size.bins())
+    }
+
+    pub(crate) fn carve(c: &mut Carver<'m>, size: CacheSize) -> Result<Self, MemoryError> {
+        Ok(Self { records: c.take(size.bins())?, used: 0 })
+    }
+
+    /// Forgets everything and takes samples of bins below `used_bins` ([`super::cache::Cache::bins`]).
+    pub fn clear(&mut self, used_bins: u32) {
+        self.used = (used_bins as usize).min(self.records.len());
+        self.used_mut().fill(bytemuck::Zeroable::zeroed());
+    }
+
+    /// Adds a sample. Negative values count as 0, values above [`super::cache::MAX_VALUE`] as that.
+    ///
+    /// `false` if it was not taken: the bin does not exist, a number is not finite, or the bin has
+    /// [`super::cache::BIN_LIMIT`] samples of this iteration. That limit looks at the count alone, so it biases no mean.
+    #[inline]
+    pub fn log(&mut self, bin: u32, x: [f32; 3], cost: f32) -> bool {
+        let finite = x.iter().all(|x| x.is_finite()) && cost.is_finite();
+        finite && self.used_mut().get_mut(bin as usize).is_some_and(|r| r.add(x, cost))
+    }
+
+    /// Adds half the squared difference of two samples of one vertex, per channel; an unbiased estimate of the variance
+    /// there. Limits as in [`Self::log`].
+    #[inline]
+    pub fn log_pair(&mut self, bin: u32, half_squared_difference: [f32; 3]) -> bool {
+        let finite = half_squared_difference.iter().all(|x| x.is_finite());
+        finite && self.used_mut().get_mut(bin as usize).is_some_and(|r| r.add_pair(half_squared_difference))
+    }
+
+    pub(super) fn records(&self) -> &[Record] {
+        self.records.get(..self.used).unwrap_or(&[])
+    }
+
+    fn used_mut(&mut self) -> &mut [Record] {
+        self.records.get_mut(..self.used).unwrap_or(&mut [])
+    }
+}

@@ -1,0 +1,193 @@
+//! The octree: which leaf a place belongs to.
+//!
+//! A node is one word. A leaf's has the high bit, its depth and its number; an inner node's is the index of the first
+//! of its eight children, which lie together. Places are numbers of cells on a grid of 2^16 per axis in a cube around
+//! the bounds; bit `15 - d` of the three numbers picks the child at depth `d`. So a descent compares no floats, and eight
+//! lanes go down in lockstep with their loads overlapping.
+
+use super::bins::BINS;
+use crate::memory::{Carver, Measure, MemoryError};
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+
+/// Deepest leaf.
+pub(super) const MAX_DEPTH: u32 = 16;
+/// Most leaves: their numbers have 26 bits.
+pub(super) const MAX_LEAVES: u32 = 1 << 26;
+/// Roots: matte vertices, all others.
+pub(super) const ROOTS: u32 = 2;
+/// Children lie at multiples of 8, so the roots have eight words as well.
+const FIRST_CHILD: u32 = 8;
+
+const LEAF: u32 = 1 << 31;
+const NUMBER: u32 = MAX_LEAVES - 1;
+const CELLS: f32 = 65_536.0;
+/// Largest float below [`CELLS`].
+const LAST: f32 = 65_535.996;
+
+/// What a node's word says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Node {
+    Inner { child: u32 },
+    Leaf { number: u32, depth: u32 },
+}
+
+#[derive(Debug)]
+pub(super) struct Tree<'m> {
+    nodes: &'m mut [u32],
+    used: u32,
+    leaves: u32,
+    max_leaves: u32,
+    /// Smallest corner and edge of the cube.
+    pub(super) cube: [f32; 4],
+    scale: f32,
+}
+
+impl<'m> Tree<'m> {
+    pub(super) const fn nodes_for(splits: u32) -> u32 {
+        FIRST_CHILD + 8 * splits
+    }
+
+    pub(super) fn measure(m: Measure, nodes: u32) -> Measure {
+        m.add::<u32>(nodes as usize)
+    }
+
+    pub(super) fn carve(
+        c: &mut Carver<'m>,
+        nodes: u32,
+        max_leaves: u32,
+        lo: [f32; 3],
+        hi: [f32; 3],
+    ) -> Result<Self, MemoryError> {
+        let cube = cube(lo, hi);
+        let [.., edge] = cube;
+        let mut tree =
+            Self { nodes: c.take(nodes as usize)?, used: 0, leaves: 0, max_leaves, cube, scale: CELLS / edge };
+        tree.reset();
+        Ok(tree)
+    }
+
+    /// Two roots, both leaves.
+    pub(super) fn reset(&mut self) {
+        self.nodes.iter_mut().zip(0..ROOTS).for_each(|(n, root)| *n = LEAF | root);
+        (self.used, self.leaves) = (FIRST_CHILD, ROOTS);
+    }
+
+    pub(super) fn leaves(&self) -> u32 {
+        self.leaves
+    }
+
+    /// Nodes that can be reached from the roots.
+    pub(super) fn nodes(&self) -> u32 {
+        self.used - FIRST_CHILD + ROOTS
+    }
+
+    /// Indices of all nodes so far.
+    pub(super) fn indices(&self) -> impl Iterator<Item = u32> + use<> {
+        (0..ROOTS).chain(FIRST_CHILD..self.used)
+    }
+
+    pub(super) fn node(&self, index: u32) -> Node {
+        let word = self.nodes.get(index as usize).copied().unwrap_or(LEAF);
+        if word & LEAF == 0 {
+            Node::Inner { child: word }
+        } else {
+            Node::Leaf { number: word & NUMBER, depth: (word & !LEAF) >> 26 }
+        }
+    }
+
+    /// Makes a leaf an inner node. The first child keeps its number; the first of the seven new numbers is returned.
+    /// `None` if there is no room, or the leaf has [`MAX_DEPTH`].
+    pub(super) fn split(&mut self, index: u32) -> Option<u32> {
+        let Node::Leaf { number, depth } = self.node(index) else { return None };
+        if depth >= MAX_DEPTH || self.max_leaves - self.leaves < 7 {
+            return None;
+        }
+        let (child, first) = (self.used, self.leaves);
+        let group = self.nodes.get_mut(child as usize..)?.get_mut(..8)?;
+        let numbers = core::iter::once(number).chain(first..);
+        group.iter_mut().zip(numbers).for_each(|(n, number)| *n = LEAF | (depth + 1) << 26 | number);
+        *self.nodes.get_mut(index as usize)? = child;
+        self.used += 8;
+        self.leaves += 7;
+        Some(first)
+    }
+
+    /// Calls `f` with every node below and including `index`: parents first, children in order.
+    pub(super) fn visit(&self, index: u32, f: &mut impl FnMut(Node)) {
+        let node = self.node(index);
+        f(node);
+        if let Node::Inner { child } = node {
+            (child..child + 8).for_each(|c| self.visit(c, f));
+        }
+    }
+
+    /// Places on the grid, in [0, 2^16). Those outside the cube move to its faces, NaN to the first cell.
+    #[inline(always)]
+    fn place(&self, p: Vec3x8) -> [F32x8; 3] {
+        let [x, y, z, _] = self.cube;
+        [p.x - x, p.y - y, p.z - z].map(|d| (d * self.scale).clamp(0.0, LAST))
+    }
+
+    /// The words of the leaves around eight places.
+    #[inline(always)]
+    fn descend(&self, root: U32x8, place: [F32x8; 3]) -> U32x8 {
+        let [x, y, z] = place.map(|c| c.to_i32().to_u32());
+        let load = |index: U32x8| {
+            let index = index.to_array();
+            U32x8::new(index.map(|i| self.nodes.get(i as usize).copied().unwrap_or(LEAF)))
+        };
+        let mut index = root;
+        let mut word = load(index);
+        for bit in (0..MAX_DEPTH).rev() {
+            let leaf = F32x8::from_bits(word).is_sign_negative();
+            if leaf.all() {
+                break;
+            }
+            let one = U32x8::splat(1);
+            let octant = (x >> bit & one) | (y >> bit & one) << 1 | (z >> bit & one) << 2;
+            index = U32x8::select(leaf, index, word + octant);
+            word = load(index);
+        }
+        word
+    }
+
+    /// First bin of the leaf per lane. With `jitter` in [0, 1) of the leaf around a place that was moved by
+    /// `jitter - 0.5` of the edge of its own leaf, but not out of the cube.
+    #[inline(always)]
+    pub(super) fn find(&self, matte: Mask8, p: Vec3x8, jitter: Option<[F32x8; 3]>) -> U32x8 {
+        let root = U32x8::select(matte, U32x8::splat(0), U32x8::splat(1));
+        let place = self.place(p);
+        let mut word = self.descend(root, place);
+        if let Some([a, b, c]) = jitter {
+            // 2^(16 - depth), built from its exponent.
+            let edge = F32x8::from_bits((U32x8::splat(127 + MAX_DEPTH) - (word >> 26 & U32x8::splat(31))) << 23);
+            let [x, y, z] = place;
+            let moved = [(x, a), (y, b), (z, c)].map(|(q, u)| (q + (u - 0.5) * edge).clamp(0.0, LAST));
+            word = self.descend(root, moved);
+        }
+        (word & U32x8::splat(NUMBER)) * U32x8::splat(BINS as u32)
+    }
+}
+
+/// Smallest corner and edge of a cube around the bounds; the unit cube's where those are not finite.
+fn cube(lo: [f32; 3], hi: [f32; 3]) -> [f32; 4] {
+    let [x, y, z] = lo.map(|x| if x.is_finite() { x } else { 0.0 });
+    let extent = lo.iter().zip(&hi).map(|(l, h)| h - l).fold(0.0, f32::max);
+    // the largest coordinate stays inside; a point or a plane has an edge as well, whose reciprocal is finite
+    let edge = extent * (1.0 + 1.0 / 65_536.0);
+    [x, y, z, if edge.is_finite() && edge > 1e-30 { edge } else { 1.0 }]
+}
+
+/// Which of a leaf's 16 bins a unit vector belongs to.
+///
+/// Bins have equal areas: four slabs of the height, each cut into quadrants by the signs of the two other
+/// coordinates. The sphere is turned first, by a matrix of thirds: axis-parallel directions, which normals often have,
+/// lie at least 10 degrees inside their bins, and no two of them share one.
+#[inline(always)]
+pub(super) fn direction_bin(d: Vec3x8) -> U32x8 {
+    let (x, y, z) = (d.x + d.x, d.y + d.y, d.z + d.z);
+    let (a, b, height) = (x + y - d.z, y + z - d.x, x + z - d.y);
+    let bit = |m: Mask8, v: u32| U32x8::select(m, U32x8::splat(v), U32x8::splat(0));
+    let above = |h: f32| bit(height.ge(F32x8::splat(h)), 1);
+    above(-1.5) + above(0.0) + above(1.5) + bit(a.lt(F32x8::ZERO), 4) + bit(b.lt(F32x8::ZERO), 8)
+}
