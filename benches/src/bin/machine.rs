@@ -9,6 +9,7 @@ use clap::Parser;
 use croupier::accel::WideBvh;
 use croupier::profile::{AnyProfile, Full, Matte, Profile};
 use croupier::{BYTES_PER_PATH, Budget, Counters, Plan, Progress, Scene, Session, Settings, Shard, Strategy};
+use croupier_benches::clock::Clock;
 use croupier_host::bake::{BakeOptions, Baked, bake};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::{builtin, load};
@@ -16,7 +17,6 @@ use std::error::Error;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
 
 #[derive(Parser)]
 #[command(about = "Lane utilisation, waiting vertices and speed of the packet machine")]
@@ -139,25 +139,6 @@ impl<'a> Row<'a> {
             self.plan.settings().ring,
             speeds[speeds.len() / 2],
         )
-    }
-}
-
-/// CPU time of this thread, or wall time where that is unknown.
-struct Clock(Instant, Option<Duration>);
-
-impl Clock {
-    fn start() -> Self {
-        Self(Instant::now(), Self::cpu())
-    }
-
-    fn cpu() -> Option<Duration> {
-        let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-        Some(Duration::from_nanos(text.split(' ').next()?.parse().ok()?))
-    }
-
-    fn seconds(&self) -> f64 {
-        let cpu = self.1.zip(Self::cpu()).map(|(a, b)| b.saturating_sub(a)).filter(|d| !d.is_zero());
-        cpu.unwrap_or_else(|| self.0.elapsed()).as_secs_f64()
     }
 }
 

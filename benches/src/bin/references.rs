@@ -20,11 +20,10 @@
 
 use clap::Parser;
 use croupier::{Scene, Settings, Strategy};
-use croupier_host::bake::{BakeOptions, Baked, bake};
+use croupier_benches::subject::Subject;
 use croupier_host::compare::{Bias, BiasOptions, BlockZ, Estimate, Ratio, block_scores, ratio};
 use croupier_host::drive::{Options, Unobserved, drive_scene};
 use croupier_host::image::{Picture, Rgb};
-use croupier_host::load::load;
 use croupier_host::render::Target;
 use serde_json::{Value, json};
 use std::error::Error;
@@ -237,75 +236,57 @@ impl Row {
     }
 }
 
-/// A scene with its reference.
-struct Subject {
-    name: String,
-    spp: u32,
-    baked: Baked,
-    reference: Estimate,
-}
-
-impl Subject {
-    fn open(folder: &Path, name: &str, spp: u32) -> Result<Self, Box<dyn Error>> {
-        let folder = folder.join(name);
-        let (scene, _) = load(&folder)?;
-        let baked = bake(&scene, &BakeOptions::default(), |_, _| ())?;
-        let image = Rgb::read_exr(&folder.join("reference.exr"))?;
-        let stderr = Rgb::read_exr(&folder.join("reference_stderr.exr"))?;
-        Ok(Self { name: name.into(), spp, baked, reference: Estimate::from_image(&image, Some(&stderr))? })
+/// One row: renders the seeds and tests their mean.
+fn test(subject: &Subject, spp: u32, args: &Args, plan: &Plan, strategy: &str) -> Result<Row, Box<dyn Error>> {
+    let start = Instant::now();
+    let scene = Scene::from_bytes(&subject.baked.bytes)?;
+    let base = Settings::for_scene(&scene);
+    let spp = (f64::from(spp) * plan.effort * args.effort).round().max(1.0) as u32;
+    let settings = Settings {
+        shards: 16,
+        max_depth: plan.depth.unwrap_or(base.max_depth),
+        strategy: Strategy::parse(strategy)?,
+        split_budget: plan.split_budget,
+        ..base
+    };
+    let (mut images, mut mrays) = (Vec::new(), 0.0);
+    for seed in 0..u64::from(args.seeds) {
+        let settings = Settings { seed: args.first_seed.wrapping_add(seed), ..settings };
+        let options = Options { settings, target: Target::Spp(spp), threads: args.threads };
+        let rendered = drive_scene(scene, &options, &Unobserved)?;
+        mrays += rendered.counters.rays() as f64 * 1e-6;
+        let [width, height] = rendered.size.map(|s| s as usize);
+        images.push(Rgb::new(width, height, rendered.image()).ok_or("a picture without its pixels")?);
+    }
+    let image = Estimate::from_seeds(&images)?;
+    let name = plan.depth.map_or(strategy.into(), |d| format!("{strategy}, depth {d}"));
+    if let Some(folder) = &args.save {
+        save(&image, &folder.join(format!("{} {name}.exr", subject.name).replace([' ', ':', ','], "_")))?;
     }
 
-    fn test(&self, args: &Args, plan: &Plan, strategy: &str) -> Result<Row, Box<dyn Error>> {
-        let start = Instant::now();
-        let scene = Scene::from_bytes(&self.baked.bytes)?;
-        let base = Settings::for_scene(&scene);
-        let spp = (f64::from(self.spp) * plan.effort * args.effort).round().max(1.0) as u32;
-        let settings = Settings {
-            shards: 16,
-            max_depth: plan.depth.unwrap_or(base.max_depth),
-            strategy: Strategy::parse(strategy)?,
-            split_budget: plan.split_budget,
-            ..base
-        };
-        let (mut images, mut mrays) = (Vec::new(), 0.0);
-        for seed in 0..u64::from(args.seeds) {
-            let settings = Settings { seed: args.first_seed.wrapping_add(seed), ..settings };
-            let options = Options { settings, target: Target::Spp(spp), threads: args.threads };
-            let rendered = drive_scene(scene, &options, &Unobserved)?;
-            mrays += rendered.counters.rays() as f64 * 1e-6;
-            let [width, height] = rendered.size.map(|s| s as usize);
-            images.push(Rgb::new(width, height, rendered.image()).ok_or("a picture without its pixels")?);
-        }
-        let image = Estimate::from_seeds(&images)?;
-        let name = plan.depth.map_or(strategy.into(), |d| format!("{strategy}, depth {d}"));
-        if let Some(folder) = &args.save {
-            save(&image, &folder.join(format!("{} {name}.exr", self.name).replace([' ', ':', ','], "_")))?;
-        }
-
-        let ratio = ratio(&image.image_mean(), &self.reference.image_mean());
-        let scores = block_scores(&image, &self.reference, &BiasOptions { robust: true, ..BiasOptions::default() })?;
-        let unnoted: Vec<BlockZ> = scores.iter().filter(|b| note(&self.name, b).is_none()).copied().collect();
-        let bias = Bias::of(&unnoted);
-        let tests = [
-            ("beyond 3", bias.beyond3 <= MAX_BEYOND3),
-            ("mean z", bias.mean.abs() <= MAX_MEAN),
-            ("beyond 6", bias.beyond6.is_empty()),
-            ("image mean", (ratio.value - 1.0).abs() <= MAX_RATIO.max(3.0 * ratio.stderr.unwrap_or(0.0))),
-        ];
-        Ok(Row {
-            scene: self.name.clone(),
-            strategy: name,
-            biased: !plan.biased.is_empty(),
-            spp,
-            seeds: args.seeds,
-            seconds: start.elapsed().as_secs_f64(),
-            mrays,
-            ratio,
-            all: (unnoted.len() < scores.len()).then(|| Bias::of(&scores)),
-            bias,
-            failed: tests.iter().filter(|t| !t.1).map(|t| t.0).collect(),
-        })
-    }
+    let ratio = ratio(&image.image_mean(), &subject.reference.image_mean());
+    let scores = block_scores(&image, &subject.reference, &BiasOptions { robust: true, ..BiasOptions::default() })?;
+    let unnoted: Vec<BlockZ> = scores.iter().filter(|b| note(&subject.name, b).is_none()).copied().collect();
+    let bias = Bias::of(&unnoted);
+    let tests = [
+        ("beyond 3", bias.beyond3 <= MAX_BEYOND3),
+        ("mean z", bias.mean.abs() <= MAX_MEAN),
+        ("beyond 6", bias.beyond6.is_empty()),
+        ("image mean", (ratio.value - 1.0).abs() <= MAX_RATIO.max(3.0 * ratio.stderr.unwrap_or(0.0))),
+    ];
+    Ok(Row {
+        scene: subject.name.clone(),
+        strategy: name,
+        biased: !plan.biased.is_empty(),
+        spp,
+        seeds: args.seeds,
+        seconds: start.elapsed().as_secs_f64(),
+        mrays,
+        ratio,
+        all: (unnoted.len() < scores.len()).then(|| Bias::of(&scores)),
+        bias,
+        failed: tests.iter().filter(|t| !t.1).map(|t| t.0).collect(),
+    })
 }
 
 fn save(image: &Estimate, path: &Path) -> Result<(), Box<dyn Error>> {
@@ -348,9 +329,9 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
             eprintln!("{name}: skipped, there is no folder {}", args.scenes.join(name).display());
             continue;
         }
-        let subject = Subject::open(&args.scenes, name, spp).map_err(|e| format!("{name}: {e}"))?;
+        let subject = Subject::open(&args.scenes, name).map_err(|e| format!("{name}: {e}"))?;
         for (plan, strategy) in plans(args, name) {
-            let row = subject.test(args, plan, &strategy).map_err(|e| format!("{name}, {strategy}: {e}"))?;
+            let row = test(&subject, spp, args, plan, &strategy).map_err(|e| format!("{name}, {strategy}: {e}"))?;
             if !args.json {
                 row.print();
             }

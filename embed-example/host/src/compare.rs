@@ -69,8 +69,12 @@ pub struct PixelError {
 /// Unless `keep_outliers`, the floor([`OUTLIERS`] n) of the n pixels with the largest error (mean of their three
 /// channels) are left out. A pixel that is not finite counts as an infinite error.
 pub fn relmse(image: &Rgb, reference: &Rgb, keep_outliers: bool) -> Result<PixelError, CompareError> {
-    let fraction = if keep_outliers { 0.0 } else { OUTLIERS };
-    mean_error(image, reference, fraction, |x, r| (x - r) * (x - r) / (r * r + RELMSE_EPSILON))
+    relmse_without(image, reference, if keep_outliers { 0.0 } else { OUTLIERS })
+}
+
+/// [`relmse`] with another part of the pixels left out, in [0, 1): the more, the less a few fireflies count.
+pub fn relmse_without(image: &Rgb, reference: &Rgb, outliers: f64) -> Result<PixelError, CompareError> {
+    mean_error(image, reference, outliers, |x, r| (x - r) * (x - r) / (r * r + RELMSE_EPSILON))
 }
 
 /// MSE: the mean over all pixels and channels of (x - ref)².
@@ -276,7 +280,7 @@ pub fn compare(inputs: &Inputs<'_>, options: &CompareOptions) -> Result<Comparis
         images: images.len(),
         relmse: mean(&relative.iter().map(|e| e.value).collect::<Vec<_>>()),
         relmse_discarded_pixels: relative.first().map_or(0, |e| e.discarded),
-        relmse_of_reference: reference_stderr.map(|_| noise_of(&exact)),
+        relmse_of_reference: reference_stderr.map(|_| relmse_of(&exact)),
         mse: mean(&squared),
         flip: mean(&perceived),
         nonfinite_pixels: relative.iter().map(|e| e.nonfinite).sum(),
@@ -288,8 +292,8 @@ pub fn compare(inputs: &Inputs<'_>, options: &CompareOptions) -> Result<Comparis
     })
 }
 
-/// Expected relMSE of an estimate against the truth, from its variance.
-fn noise_of(estimate: &Estimate) -> f64 {
+/// Expected relMSE of an estimate against the truth, from its variance, over all pixels.
+pub fn relmse_of(estimate: &Estimate) -> f64 {
     let per_pixel =
         |(m, v): (&[f64; 3], &[f64; 3])| m.iter().zip(v).map(|(m, v)| v / (m * m + RELMSE_EPSILON)).sum::<f64>() / 3.0;
     mean(&estimate.mean.iter().zip(&estimate.variance).map(per_pixel).collect::<Vec<_>>())

@@ -167,7 +167,8 @@ pub fn drive_with<P: Profile + Send + Sync>(
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build()?;
 
-    let start = Instant::now();
+    // later by every pause for the observer
+    let mut start = Instant::now();
     let mut spp = 0u32;
     let mut error = None;
     let mut stopped_early = false;
@@ -185,6 +186,9 @@ pub fn drive_with<P: Profile + Send + Sync>(
         }
         spp = spp.saturating_add(samples);
         error = Some(session.film().error_estimate());
+        let pause = Instant::now();
+        observer.iteration(session.film(), (pause - start).as_secs_f64());
+        start += pause.elapsed();
     }
     let film = session.film();
     Ok(Rendered {

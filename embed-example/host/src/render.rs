@@ -4,7 +4,7 @@ use crate::drive::{Options, Rendered, drive_scene};
 use crate::image::Picture;
 use croupier::film::{PixelAov, PixelStats};
 use croupier::profile::AnyProfile;
-use croupier::{Plan, Scene, Settings, Strategy};
+use croupier::{Film, Plan, Scene, Settings, Strategy};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -88,6 +88,9 @@ pub trait Observer: Sync {
     fn progress(&self, progress: &Progress);
     /// True ends the render soon; what was rendered is still returned.
     fn stop(&self) -> bool;
+    /// An iteration is finished: the picture so far and the wall-clock seconds it took. Called from the thread that
+    /// renders; the time spent in here does not count as rendering.
+    fn iteration(&self, _film: &Film<'_>, _seconds: f64) {}
 }
 
 /// Figures of a finished render.

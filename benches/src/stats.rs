@@ -1,0 +1,80 @@
+//! Medians over seeds, and error over time.
+
+use std::fmt;
+
+/// A median with its interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Median {
+    /// The middle value, or the mean of the two.
+    pub median: f64,
+    /// Lower end of the interval.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+impl Median {
+    /// Of independent values, with the narrowest pair of order statistics, equally far from both ends, that holds the true
+    /// median with at least 95 %; of fewer than six values none does, and it is their range ([`coverage`]). This holds for
+    /// every distribution, and errors of renders have long tails. `None` of nothing.
+    pub fn of(values: &[f64]) -> Option<Self> {
+        let mut v = values.to_vec();
+        v.sort_by(f64::total_cmp);
+        let (n, k) = (v.len(), left_out(v.len()));
+        let (&low, &high) = (v.get(k)?, v.get(n - 1 - k)?);
+        Some(Self { median: 0.5 * (v[(n - 1) / 2] + v[n / 2]), low, high })
+    }
+}
+
+impl fmt::Display for Median {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { median, low, high } = *self;
+        write!(f, "{} [{}, {}]", digits(median), digits(low), digits(high))
+    }
+}
+
+/// Chance that the interval of [`Median`] of `n` values holds the true median.
+pub fn coverage(n: usize) -> f64 {
+    1.0 - 2.0 * lower_tail(n, left_out(n))
+}
+
+/// Order statistics outside the interval, on each side: the most that leave 95 % inside.
+fn left_out(n: usize) -> usize {
+    (0..n / 2).take_while(|&k| lower_tail(n, k) <= 0.025).last().unwrap_or(0)
+}
+
+/// Chance that at most `k` of `n` values lie below the true median: a fair coin's.
+fn lower_tail(n: usize, k: usize) -> f64 {
+    let (mut term, mut sum) = (0.5f64.powi(n as i32), 0.0);
+    for i in 0..=k {
+        sum += term;
+        term *= (n - i) as f64 / (i + 1) as f64;
+    }
+    sum
+}
+
+/// Geometric mean; NaN of nothing.
+pub fn geometric_mean(values: &[f64]) -> f64 {
+    (values.iter().map(|x| x.ln()).sum::<f64>() / values.len() as f64).exp()
+}
+
+/// When an error first comes down to `level`, from points (time, error) in the order of time: a line in logarithms between
+/// the two points around it. A curve that starts below gives its first time; one that ends above, `None`.
+pub fn time_to(curve: &[(f64, f64)], level: f64) -> Option<f64> {
+    let i = curve.iter().position(|&(_, e)| e <= level)?;
+    let (t, e) = curve[i];
+    let Some(&(t0, e0)) = i.checked_sub(1).and_then(|i| curve.get(i)) else { return Some(t) };
+    if !e0.is_finite() || e <= 0.0 {
+        return Some(t);
+    }
+    Some(t0 * (t / t0).powf((e0 / level).ln() / (e0 / e).ln()))
+}
+
+/// Three significant digits.
+pub fn digits(x: f64) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return x.to_string();
+    }
+    let decimals = (2.0 - x.abs().log10().floor()).max(0.0);
+    format!("{x:.*}", decimals as usize)
+}
