@@ -3,14 +3,47 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// Sums over the camera samples of one pixel.
+/// Sums over the camera samples that one shard drew for a pixel in one iteration.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub struct PixelStats {
+pub(crate) struct PixelSums {
     /// Radiance, linear Rec. 709.
     pub sum: [f64; 3],
     /// Squared radiance.
     pub sum_sqr: [f64; 3],
+    /// Camera samples.
+    pub samples: u64,
+    /// Rays traced for them.
+    pub rays: u64,
+}
+
+impl PixelSums {
+    /// Adds one camera sample.
+    pub(crate) fn add(&mut self, radiance: [f64; 3], rays: u32) {
+        for (c, x) in radiance.into_iter().enumerate() {
+            self.sum[c] += x;
+            self.sum_sqr[c] += x * x;
+        }
+        self.samples += 1;
+        self.rays += u64::from(rays);
+    }
+}
+
+/// Weighted sums over the camera samples of one pixel. All samples of an iteration have the same weight `w`: 1, or for
+/// strategies that learn the inverse variance of the iteration's picture, so that early iterations do not spoil late ones.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct PixelStats {
+    /// Sum of w x, x the radiance of a camera sample in linear Rec. 709.
+    pub sum: [f64; 3],
+    /// Sum of w^2 x^2.
+    pub sum_sqr: [f64; 3],
+    /// Sum of w^2 x.
+    pub cross: [f64; 3],
+    /// Sum of w.
+    pub weight: f64,
+    /// Sum of w^2.
+    pub weight_sqr: f64,
     /// Camera samples.
     pub samples: u64,
     /// Rays traced for them.
@@ -33,50 +66,46 @@ pub struct PixelAov {
     pub factor: [f64; 4],
     /// How many vertices those are.
     pub vertices: [f64; 4],
+    /// Paths: camera samples and what splitting added.
+    pub paths: f64,
 }
 
 impl PixelStats {
-    /// Adds one camera sample.
-    pub(crate) fn add(&mut self, radiance: [f64; 3], rays: u32) {
-        for (c, x) in radiance.into_iter().enumerate() {
-            self.sum[c] += x;
-            self.sum_sqr[c] += x * x;
-        }
-        self.samples += 1;
-        self.rays += u64::from(rays);
-    }
-
-    fn merge(&mut self, o: &Self) {
+    fn merge(&mut self, o: &PixelSums, w: f64) {
         for c in 0..3 {
-            self.sum[c] += o.sum[c];
-            self.sum_sqr[c] += o.sum_sqr[c];
+            self.sum[c] += w * o.sum[c];
+            self.sum_sqr[c] += w * w * o.sum_sqr[c];
+            self.cross[c] += w * w * o.sum[c];
         }
+        self.weight += w * o.samples as f64;
+        self.weight_sqr += w * w * o.samples as f64;
         self.samples += o.samples;
         self.rays += o.rays;
     }
 
     /// Mean radiance; 0 before the first sample.
     pub fn mean(&self) -> [f64; 3] {
-        let n = self.samples.max(1) as f64;
-        self.sum.map(|s| s / n)
+        let w = if self.samples == 0 { 1.0 } else { self.weight };
+        self.sum.map(|s| s / w)
     }
 
     /// Squared standard error of the mean per channel, its samples taken as independent. With roulette or splitting that
     /// is an upper bound: one comb rounds a packet, and the roundings of its samples cancel (standard errors of up to
     /// twice the true ones were measured). One sample tells nothing of its error: its own square stands in.
     pub fn variance_of_mean(&self) -> [f64; 3] {
-        let n = self.samples as f64;
+        let (w, w2, m) = (self.weight, self.weight_sqr, self.mean());
+        // w^2 - w2 is w^2 (1 - 1 / n) for n samples of equal weight
         core::array::from_fn(|c| match self.samples {
             0 => 0.0,
-            1 => self.sum_sqr[c],
-            _ => ((self.sum_sqr[c] - self.sum[c] * self.sum[c] / n) / (n * (n - 1.0))).max(0.0),
+            1 => m[c] * m[c],
+            _ => ((self.sum_sqr[c] - 2.0 * m[c] * self.cross[c] + m[c] * m[c] * w2) / (w * w - w2)).max(0.0),
         })
     }
 }
 
 impl PixelAov {
     fn merge(&mut self, o: &Self) {
-        let (a, b): (&mut [f64; 16], &[f64; 16]) = (bytemuck::cast_mut(self), bytemuck::cast_ref(o));
+        let (a, b): (&mut [f64; 17], &[f64; 17]) = (bytemuck::cast_mut(self), bytemuck::cast_ref(o));
         for (a, b) in a.iter_mut().zip(b) {
             *a += *b;
         }
@@ -123,9 +152,10 @@ impl Film<'_> {
         self.aovs
     }
 
-    pub(crate) fn merge(&mut self, pixel: usize, stats: &PixelStats, aov: Option<&PixelAov>) {
+    /// Adds what a shard drew for a pixel, each sample with weight `w`.
+    pub(crate) fn merge(&mut self, pixel: usize, sums: &PixelSums, aov: Option<&PixelAov>, w: f64) {
         if let Some(p) = self.pixels.get_mut(pixel) {
-            p.merge(stats);
+            p.merge(sums, w);
         }
         if let (Some(a), Some(b)) = (self.aovs.get_mut(pixel), aov) {
             a.merge(b);
@@ -140,7 +170,11 @@ impl Film<'_> {
             return ErrorEstimate::default();
         }
         let discard = n / 10_000;
-        let limit = if discard == 0 { f32::INFINITY } else { self.kth_largest_error(discard) };
+        let limit = if discard == 0 {
+            f32::INFINITY
+        } else {
+            kth_largest(discard, |show| self.pixels.iter().for_each(|p| show(relative_error(p) as f32)))
+        };
         let (mut all, mut kept, mut kept_sqr, mut count) = (0.0, 0.0, 0.0, 0u64);
         for p in self.pixels.iter() {
             let e = relative_error(p);
@@ -161,28 +195,29 @@ impl Film<'_> {
             rel_mse_all: all / n as f64,
         }
     }
+}
 
-    /// The `k`-th largest relative error (k >= 1), by radix selection on the float's bits: four passes, no memory.
-    fn kth_largest_error(&self, k: usize) -> f32 {
-        let (mut prefix, mut left) = (0u32, k);
-        for shift in [24u32, 16, 8, 0] {
-            let mut histogram = [0usize; 256];
-            for p in self.pixels.iter() {
-                let bits = (relative_error(p) as f32).to_bits();
-                if shift == 24 || bits >> (shift + 8) == prefix >> (shift + 8) {
-                    histogram[(bits >> shift & 0xff) as usize] += 1;
-                }
+/// The `k`-th largest (k >= 1) of the non-negative values that `visit` shows, by radix selection on the float's bits: four
+/// visits, no memory. 0 if there are fewer.
+pub(crate) fn kth_largest(k: usize, mut visit: impl FnMut(&mut dyn FnMut(f32))) -> f32 {
+    let (mut prefix, mut left) = (0u32, k);
+    for shift in [24u32, 16, 8, 0] {
+        let mut histogram = [0usize; 256];
+        visit(&mut |x| {
+            let bits = x.to_bits();
+            if shift == 24 || bits >> (shift + 8) == prefix >> (shift + 8) {
+                histogram[(bits >> shift & 0xff) as usize] += 1;
             }
-            for digit in (0..256usize).rev() {
-                if left <= histogram[digit] {
-                    prefix |= (digit as u32) << shift;
-                    break;
-                }
-                left -= histogram[digit];
+        });
+        for digit in (0..256usize).rev() {
+            if left <= histogram[digit] {
+                prefix |= (digit as u32) << shift;
+                break;
             }
+            left -= histogram[digit];
         }
-        f32::from_bits(prefix)
     }
+    f32::from_bits(prefix)
 }
 
 /// One pixel's share of relMSE: mean over channels of variance / (mean^2 + eps), the mean's square freed of its own

@@ -43,6 +43,7 @@
 pub mod accel;
 pub mod bsdf;
 pub mod camera;
+pub mod denoise;
 pub mod film;
 pub mod learn;
 pub mod light;

@@ -1,7 +1,9 @@
 //! What all shards share: frozen while they work, changed between iterations.
 
 use crate::accel::Intersector;
-use crate::film::Film;
+use crate::film::{Film, PixelSums};
+use crate::learn::cache::Cache;
+use crate::learn::{Knowledge, PictureStatistics};
 use crate::light::PowerSelector;
 use crate::memory::{Carver, MemoryError};
 use crate::profile::Profile;
@@ -39,6 +41,11 @@ pub enum SessionError {
     },
     /// No iteration has begun.
     NoIteration,
+    /// An estimate of the pixels that does not fit.
+    Estimate {
+        /// Its values.
+        given: usize,
+    },
 }
 
 impl fmt::Display for SessionError {
@@ -55,6 +62,7 @@ impl fmt::Display for SessionError {
             }
             Self::Unfinished { shard } => write!(f, "shard {shard} has not finished the iteration"),
             Self::Plan { shard } => write!(f, "shard {shard} was made for another plan"),
+            Self::Estimate { given } => write!(f, "an estimate of {given} values does not fit the settings"),
             Self::NoIteration => f.write_str("no iteration has begun"),
         }
     }
@@ -82,6 +90,7 @@ pub struct Session<'s, 'm, P: Profile, I: Intersector> {
     selector: PowerSelector<'s>,
     film: Film<'m>,
     counters: Counters,
+    knowledge: Knowledge<'m>,
     iteration: Iteration,
     running: bool,
     max_depth: u32,
@@ -108,6 +117,7 @@ impl<'s, 'm, P: Profile, I: Intersector> Session<'s, 'm, P, I> {
                 aovs: c.take(if s.aovs { pixels } else { 0 }).map_err(SessionError::Memory)?,
             },
             counters: Counters::default(),
+            knowledge: Knowledge::carve(&mut c, s, plan.cache, &scene).map_err(SessionError::Memory)?,
             iteration: Iteration::default(),
             running: false,
             max_depth: s.max_depth.min(HARD_STOP),
@@ -149,10 +159,18 @@ impl<'s, 'm, P: Profile, I: Intersector> Session<'s, 'm, P, I> {
         if expected != self.plan.settings().shards {
             return Err(SessionError::Shards { expected });
         }
-        for s in shards {
-            s.for_each_pixel(|i, stats, aov| self.film.merge(i, stats, aov));
-            self.counters.merge(s.counters());
+        let mut counters = Counters::default();
+        shards.clone().into_iter().for_each(|s| counters.merge(s.counters()));
+        let visit = |show: &mut dyn FnMut(usize, &PixelSums)| {
+            shards.clone().into_iter().for_each(|s| s.for_each_pixel(|i, sums, _| show(i, sums)));
+        };
+        let weight = self.knowledge.weigh(&counters, visit);
+        for s in shards.clone() {
+            s.for_each_pixel(|i, sums, aov| self.film.merge(i, sums, aov, weight));
         }
+        self.counters.merge(&counters);
+        self.knowledge.learn_picture(&self.film, &counters, visit);
+        self.knowledge.learn_scene(shards.into_iter().filter_map(|s| s.training.as_ref()));
         self.running = false;
         Ok(())
     }
@@ -160,6 +178,40 @@ impl<'s, 'm, P: Profile, I: Intersector> Session<'s, 'm, P, I> {
     /// The picture so far, without the iteration under way.
     pub fn film(&self) -> &Film<'m> {
         &self.film
+    }
+
+    /// Variance and cost per camera sample: of the last iteration, and blended over the iterations as factors use them. All
+    /// 0 unless the strategy learns.
+    pub fn picture_statistics(&self) -> [PictureStatistics; 2] {
+        self.knowledge.statistics()
+    }
+
+    /// The statistics of the scene, if the strategy learns them: to be saved, or loaded before the first iteration.
+    pub fn cache(&self) -> Option<&Cache<'m>> {
+        self.knowledge.cache()
+    }
+
+    /// See [`Self::cache`]. Whatever is loaded changes efficiency only. Not while an iteration runs: `None` then.
+    pub fn cache_mut(&mut self) -> Option<&mut Cache<'m>> {
+        if self.running { None } else { self.knowledge.cache_mut() }
+    }
+
+    /// The estimate of the pixels that the strategy works with, rgb planes; `None` if it needs none, or before the end of the
+    /// first iteration.
+    pub fn estimate(&self) -> Option<[&[f32]; 3]> {
+        self.knowledge.estimate()
+    }
+
+    /// Replaces the built-in estimate of the pixels by the host's, row by row, for good. It changes efficiency only.
+    ///
+    /// # Errors
+    /// [`SessionError::Estimate`] if there is not one value per pixel or the settings have no estimate per pixel.
+    pub fn give_estimate(&mut self, rgb: &[[f32; 3]]) -> Result<(), SessionError> {
+        if self.knowledge.give_estimate(rgb) { Ok(()) } else { Err(SessionError::Estimate { given: rgb.len() }) }
+    }
+
+    pub(crate) fn knowledge(&self) -> &Knowledge<'m> {
+        &self.knowledge
     }
 
     /// Counts of all finished iterations.

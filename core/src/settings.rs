@@ -1,8 +1,10 @@
 //! What the caller chooses, and how much memory it costs.
 
 use crate::film::{PixelAov, PixelStats};
+use crate::learn::cache::CacheSize;
+use crate::learn::{Constant, Knowledge, Learning};
 use crate::memory::{Layout, Measure};
-use crate::rrs::Strategy;
+use crate::rrs::{Space, Strategy};
 use crate::scene::Scene;
 use crate::tiles::Tiles;
 use crate::tracer::shard_measure;
@@ -33,6 +35,12 @@ pub struct Settings {
     pub split_budget: u32,
     /// Also gather albedo, normal, depth and factors.
     pub aovs: bool,
+    /// Play roulette for shadow rays too, with the most efficient factor.
+    pub shadow_roulette: bool,
+    /// What stands in for samples that roulette skips.
+    pub constant: Constant,
+    /// Choices of the strategies that learn.
+    pub learning: Learning,
 }
 
 impl Settings {
@@ -47,6 +55,9 @@ impl Settings {
             ring: 512,
             split_budget: 4096,
             aovs: false,
+            shadow_roulette: false,
+            constant: Constant::Off,
+            learning: Learning::default(),
         }
     }
 }
@@ -63,6 +74,12 @@ pub enum SettingsError {
     Depth(u32),
     /// The ring has fewer than [`MIN_RING`] or more than 2^24 vertices.
     Ring(u32),
+    /// The bytes of the cache do not suffice for one leaf in the session and in every shard.
+    Cache(usize),
+    /// The constant is not a finite number, or is to be the cached mean with a strategy that learns nothing of the scene.
+    Constant,
+    /// A choice of [`Learning`] is out of range.
+    Learning,
     /// The memory would exceed what can be addressed.
     Memory,
 }
@@ -74,6 +91,9 @@ impl fmt::Display for SettingsError {
             Self::Shards(n) => write!(f, "{n} shards: need 1 to 65536"),
             Self::Depth(n) => write!(f, "max_depth {n}: need at least 1"),
             Self::Ring(n) => write!(f, "ring of {n} vertices: need {MIN_RING} to 2^24"),
+            Self::Cache(n) => write!(f, "cache of {n} bytes: too small for one leaf per shard and the session"),
+            Self::Constant => f.write_str("the constant of roulette must be finite, and the cached mean needs ear, ears, adrr or adrrs"),
+            Self::Learning => f.write_str("learning: need a ledger of 1 to 2^24 records, a split count above 0, a carry of 0 to 1"),
             Self::Memory => f.write_str("these settings need more memory than can be addressed"),
         }
     }
@@ -86,6 +106,8 @@ impl core::error::Error for SettingsError {}
 pub struct Plan {
     pub(crate) settings: Settings,
     pub(crate) tiles: Tiles,
+    /// Room for statistics of the scene, if they are wanted.
+    pub(crate) cache: Option<CacheSize>,
     session: Layout,
     shard: Layout,
 }
@@ -109,11 +131,14 @@ impl Plan {
         }
         let tiles = Tiles::new(s.size, s.shards);
         let pixels = pixels as usize;
+        let cache = cache_size(&s)?;
         let session = Measure::new().add::<PixelStats>(pixels).add::<PixelAov>(if s.aovs { pixels } else { 0 });
-        let shard = shard_measure(&s, &tiles);
+        let session = Knowledge::measure(session, &s, cache);
+        let shard = shard_measure(&s, cache, &tiles);
         Ok(Self {
             settings: s,
             tiles,
+            cache,
             session: session.layout().ok_or(SettingsError::Memory)?,
             shard: shard.layout().ok_or(SettingsError::Memory)?,
         })
@@ -133,4 +158,24 @@ impl Plan {
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
+}
+
+/// Checks what is to be learned and how; the size of its statistics.
+fn cache_size(s: &Settings) -> Result<Option<CacheSize>, SettingsError> {
+    let fits = match s.constant {
+        Constant::Off => true,
+        Constant::Cached => s.strategy.space() == Some(Space::Scene),
+        Constant::Number(x) => x.is_finite(),
+    };
+    if !fits {
+        return Err(SettingsError::Constant);
+    }
+    if s.strategy.space().is_none() {
+        return Ok(None);
+    }
+    let l = &s.learning;
+    if l.ledger == 0 || l.ledger > 1 << 24 || !(l.split_count > 0.0) || !(0.0..=1.0).contains(&l.carry) {
+        return Err(SettingsError::Learning);
+    }
+    CacheSize::within(l.cache_bytes, s.shards).map(Some).ok_or(SettingsError::Cache(l.cache_bytes))
 }

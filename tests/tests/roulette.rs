@@ -67,6 +67,8 @@ fn vertices(beta: f32, albedo: f32, depth: u32) -> Vertices8 {
         albedo: Vec3x8::splat(albedo, albedo, albedo),
         albedo_product: F32x8::splat(0.5),
         depth: U32x8::splat(depth),
+        shininess: F32x8::ZERO,
+        learned: Learned8::NONE,
     }
 }
 

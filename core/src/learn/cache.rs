@@ -65,6 +65,8 @@ pub struct Cache<'m> {
     frozen: &'m mut [Frozen],
     pub(super) size: CacheSize,
     splits_refused: u64,
+    /// Leaves of a cache without a tree.
+    flat: Option<u32>,
 }
 
 impl<'m> Cache<'m> {
@@ -86,7 +88,7 @@ impl<'m> Cache<'m> {
 
     pub(crate) fn carve(c: &mut Carver<'m>, size: CacheSize, lo: [f32; 3], hi: [f32; 3]) -> Result<Self, MemoryError> {
         let tree = Tree::carve(c, Tree::nodes_for(size.splits), size.leaves(), lo, hi)?;
-        Ok(Self { tree, sums: c.take(size.bins())?, frozen: c.take(size.bins())?, size, splits_refused: 0 })
+        Ok(Self { tree, sums: c.take(size.bins())?, frozen: c.take(size.bins())?, size, splits_refused: 0, flat: None })
     }
 
     /// The bins of eight vertices, `u32::MAX` in inactive lanes. `dir` is a unit vector in world space: the shading
@@ -132,6 +134,9 @@ impl<'m> Cache<'m> {
     /// Children inherit an eighth of their parent's sums each, and are split again while that is still too many. When
     /// leaves run out, those with most samples have been split first; the rest is counted by [`Self::splits_refused`].
     pub fn freeze(&mut self, split_count: f64) {
+        if self.flat.is_some() {
+            return self.refresh();
+        }
         let limit = if split_count.is_nan() { f64::INFINITY } else { split_count.max(1.0) };
         let mut threshold = f64::INFINITY;
         // A pass splits what is above its threshold and finds the largest leaf that is left, for the next threshold.
@@ -190,7 +195,7 @@ impl<'m> Cache<'m> {
 
     /// Computes what look-ups read.
     pub(super) fn refresh(&mut self) {
-        let used = self.tree.leaves() as usize * BINS;
+        let used = self.leaves() as usize * BINS;
         let sums = self.sums.chunks_exact(BINS);
         let frozen = self.frozen.chunks_exact_mut(BINS);
         sums.zip(frozen).take(used / BINS).for_each(|(s, f)| freeze_leaf(s, f));
@@ -214,17 +219,23 @@ impl<'m> Cache<'m> {
     }
 
     fn used_mut(&mut self) -> &mut [BinSums] {
-        self.sums.get_mut(..self.tree.leaves() as usize * BINS).unwrap_or(&mut [])
+        self.sums.get_mut(..self.leaves() as usize * BINS).unwrap_or(&mut [])
     }
 
     /// Bins in use; look-ups give smaller numbers. [`Training::clear`] wants it.
     pub fn bins(&self) -> u32 {
-        self.tree.leaves() * BINS as u32
+        self.leaves() * BINS as u32
     }
 
     /// Leaves in use, of both octrees.
     pub fn leaves(&self) -> u32 {
-        self.tree.leaves()
+        self.flat.unwrap_or_else(|| self.tree.leaves())
+    }
+
+    /// Uses the first `leaves` leaves without a tree: the caller numbers the bins. There is room for no more than
+    /// [`CacheSize::leaves`].
+    pub(crate) fn flatten(&mut self, leaves: u32) {
+        self.flat = Some(leaves.min(self.size.leaves()));
     }
 
     /// Nodes in use, leaves included.

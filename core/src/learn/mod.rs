@@ -1,4 +1,5 @@
-//! What paths have taught so far: statistics by place and direction, from which strategies take their factors.
+//! What paths have taught so far: statistics by place and direction ([`cache`]), an estimate of every pixel, and variance
+//! and cost of the picture. All of it is frozen while an iteration runs and changes when it ends.
 //!
 //! This layer knows places, directions, values and costs. It must not know materials, lights or how paths are traced.
 //! Statistics change efficiency only: whatever they hold, no estimate's mean moves.
@@ -6,6 +7,19 @@
 
 mod bins;
 pub mod cache;
+mod knowledge;
 mod save;
+mod settings;
 mod training;
 mod tree;
+
+pub(crate) use knowledge::Knowledge;
+pub use knowledge::{Estimate, PictureStatistics};
+pub use settings::{Constant, Learning, Objective};
+
+/// Relative cost of a camera ray. Costs are counted, never measured: the picture must not depend on a clock.
+pub(crate) const COST_CAMERA: f32 = 1.0;
+/// Relative cost of a scattered ray and the shading around it.
+pub(crate) const COST_BOUNCE: f32 = 1.0;
+/// Relative cost of a shadow ray.
+pub(crate) const COST_SHADOW: f32 = 1.0;

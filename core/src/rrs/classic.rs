@@ -1,38 +1,53 @@
-//! The baseline of the EARS paper (section 6): throughput times albedo from the fifth bounce. This is the absolute form,
-//! which other renderers mean by "classic"; the form relative to the pixel needs a pixel estimate.
+//! The baseline of the EARS paper (section 6): throughput times albedo from the fifth bounce. The absolute form is what other
+//! renderers mean by "classic"; the authors' program plays relative to the pixel, which suits dark pictures.
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
 //! | `start` | bounces before the first roulette | >= 1 | 5 |
+//! | `relative` | over the estimate of the pixel | yes or no | no |
 
 use super::{RrsStrategy, Vertices8};
 use croupier_simd::{F32x8, U32x8};
 
-/// max rgb of (prefix weight x albedo), at most 1, from bounce `start`.
+/// max rgb of (prefix weight x albedo), over the pixel if `relative`, at most 1, from bounce `start`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Classic {
     /// First bounce that plays.
     pub start: u32,
+    /// Over the estimate of the pixel.
+    pub relative: bool,
 }
 
 impl Default for Classic {
     fn default() -> Self {
-        Self { start: 5 }
+        Self { start: 5, relative: false }
     }
 }
 
 impl Classic {
     pub(super) fn parse(options: &str) -> Option<Self> {
-        super::number(options, 5).filter(|&s: &u32| s >= 1).map(|start| Self { start })
+        let (start, relative) = match options.split_once(':') {
+            Some((start, "relative")) => (start, true),
+            Some(_) => return None,
+            Option::None => (options, false),
+        };
+        super::number(start, 5).filter(|&s: &u32| s >= 1).map(|start| Self { start, relative })
     }
 }
 
 impl RrsStrategy for Classic {
     const NEEDS_ALBEDO: bool = true;
+    const NEEDS_IMAGE: bool = true;
+
+    fn plays_relative(&self) -> bool {
+        self.relative
+    }
 
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
         let early = v.depth.lt(U32x8::splat(self.start));
-        early.select(F32x8::ONE, (v.beta * v.albedo).max_component().min(F32x8::ONE))
+        let expected = v.beta * v.albedo;
+        let expected = if self.relative { expected * v.learned.root_importance() } else { expected };
+        early.select(F32x8::ONE, expected.max_component().min(F32x8::ONE))
     }
 }

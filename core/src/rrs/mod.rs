@@ -6,23 +6,37 @@
 //!
 //! A new strategy is one file and one line in the table below.
 
+mod adrr;
+mod adrrs;
 mod albedo;
+mod bolin_meyer;
 mod classic;
 mod comb;
 mod contribution;
+mod ear;
+mod ears;
 mod fixed;
+mod learned;
 mod none;
 mod threshold;
 mod throughput;
+mod winners;
 
+pub use adrr::Adrr;
+pub use adrrs::Adrrs;
 pub use albedo::Albedo;
+pub use bolin_meyer::BolinMeyer;
 pub use classic::Classic;
 pub use comb::{COMB_ONE, comb};
 pub use contribution::Contribution;
+pub use ear::Ear;
+pub use ears::Ears;
 pub use fixed::Fixed;
+pub use learned::{Learned8, Norm, Space};
 pub use none::None;
 pub use threshold::Threshold;
-pub use throughput::{Norm, Throughput};
+pub use throughput::Throughput;
+pub use winners::Winners;
 
 use core::fmt;
 use croupier_simd::{F32x8, U32x8, Vec3x8};
@@ -45,12 +59,30 @@ pub struct Vertices8 {
     pub albedo_product: F32x8,
     /// Path segments from the camera; the first vertex has 1.
     pub depth: U32x8,
+    /// Phong exponent that corresponds to the material's roughness; 0 unless [`Strategy::needs_shininess`].
+    pub shininess: F32x8,
+    /// What was learned before the iteration.
+    pub learned: Learned8,
 }
 
 /// One way to choose factors.
 pub trait RrsStrategy {
     /// Does [`Self::factor`] read `albedo` or `albedo_product`?
     const NEEDS_ALBEDO: bool = false;
+
+    /// Does it read `shininess`?
+    const NEEDS_SHININESS: bool = false;
+
+    /// Does it read the picture's part of `learned`?
+    const NEEDS_IMAGE: bool = false;
+
+    /// Over what does it learn local statistics, if at all? They need the albedo and the picture.
+    const SPACE: Option<Space> = Option::None;
+
+    /// With these options, is the picture's part of `learned` needed ([`Self::NEEDS_IMAGE`])?
+    fn plays_relative(&self) -> bool {
+        true
+    }
 
     /// The factor per lane, before clamping to [[`MIN_FACTOR`], [`MAX_FACTOR`]]. Lanes that are not finite count as 1.
     fn factor(&self, v: &Vertices8) -> F32x8;
@@ -85,6 +117,23 @@ macro_rules! strategies {
                 match self { $(Self::$name(_) => <$name as RrsStrategy>::NEEDS_ALBEDO),* }
             }
 
+            /// See [`RrsStrategy::NEEDS_SHININESS`].
+            pub fn needs_shininess(&self) -> bool {
+                match self { $(Self::$name(_) => <$name as RrsStrategy>::NEEDS_SHININESS),* }
+            }
+
+            /// Does it need the statistics of the picture?
+            pub fn needs_image(&self) -> bool {
+                self.space().is_some() || match self {
+                    $(Self::$name(x) => <$name as RrsStrategy>::NEEDS_IMAGE && x.plays_relative()),*
+                }
+            }
+
+            /// See [`RrsStrategy::SPACE`].
+            pub fn space(&self) -> Option<Space> {
+                match self { $(Self::$name(_) => <$name as RrsStrategy>::SPACE),* }
+            }
+
             /// May it end every path below some threshold for ever, so that the picture is biased?
             pub const fn is_biased(&self) -> bool {
                 matches!(self, Self::Threshold(_))
@@ -114,7 +163,19 @@ strategies! {
     /// Albedo.
     Albedo, "albedo", "albedo[:product]: albedo of the vertex, or of all vertices so far multiplied";
     /// Throughput times albedo.
-    Classic, "classic", "classic[:START]: throughput x albedo from the START-th bounce (5), absolute";
+    Classic, "classic", "classic[:START[:relative]]: throughput x albedo from the START-th bounce (5), absolute or over the pixel";
+    /// Go with the winners.
+    Winners, "winners", "winners[:VR:VV]: throughput x albedo x sqrt(VR + VV / (shininess + 1)^2)";
+    /// Factors per pixel and path length.
+    BolinMeyer, "bolin-meyer", "most efficient factor per pixel block and path length, learned";
+    /// Adjoint-driven roulette.
+    Adrr, "adrr", "adjoint-driven roulette: expected contribution over the pixel, weight window, learned";
+    /// Adjoint-driven roulette and splitting.
+    Adrrs, "adrrs", "adjoint-driven roulette and splitting, learned";
+    /// Efficiency-aware roulette.
+    Ear, "ear", "ear[:plain]: efficiency-aware roulette, learned; plain trusts its statistics at once";
+    /// Efficiency-aware roulette and splitting.
+    Ears, "ears", "ears[:plain]: efficiency-aware roulette and splitting, learned; plain trusts its statistics at once";
     /// Constant.
     Fixed, "fixed", "fixed:S: the constant factor S at every vertex, 0.05 to 20";
 }

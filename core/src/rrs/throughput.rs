@@ -6,41 +6,8 @@
 //! | `low`, `high` | factor | 0.05 <= low <= high <= 20 | 0.05, 0.95 |
 //! | `start` | path segments from the camera | >= 1 | 1 |
 
-use super::{MAX_FACTOR, MIN_FACTOR, RrsStrategy, Vertices8};
-use croupier_simd::{F32x8, U32x8, Vec3x8};
-
-/// How a colour becomes a number.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Norm {
-    /// Largest of r, g, b.
-    #[default]
-    Max,
-    /// Rec. 709 luminance.
-    Luminance,
-    /// Mean of r, g, b.
-    Mean,
-}
-
-impl Norm {
-    /// The norm of each lane.
-    #[inline(always)]
-    pub fn of(self, c: Vec3x8) -> F32x8 {
-        match self {
-            Self::Max => c.max_component(),
-            Self::Luminance => c.luminance(),
-            Self::Mean => c.mean(),
-        }
-    }
-
-    fn parse(text: &str) -> Option<Self> {
-        match text {
-            "" | "max" => Some(Self::Max),
-            "luminance" => Some(Self::Luminance),
-            "mean" => Some(Self::Mean),
-            _ => None,
-        }
-    }
-}
+use super::{MAX_FACTOR, MIN_FACTOR, Norm, RrsStrategy, Vertices8};
+use croupier_simd::{F32x8, U32x8};
 
 /// clamp(norm(throughput), low, high) from depth `start`, 1 before.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -48,6 +48,18 @@ pub struct Counters {
     pub ring_capped: u64,
     /// Lanes whose factor was cut to 1 because their camera sample had used up its split budget.
     pub budget_capped: u64,
+    /// Shadow rays that roulette spared.
+    pub shadow_kills: u64,
+    /// Paths that ended.
+    pub paths: u64,
+    /// Sum of the segments of those paths, shared ones counted for each.
+    pub path_segments: u64,
+    /// Samples whose estimates were learned from.
+    pub samples_logged: u64,
+    /// Samples of bins that had enough in this iteration.
+    pub samples_refused: u64,
+    /// Samples without a ledger record because the slab was full: they, and those they are part of, were not learned from.
+    pub ledger_full: u64,
     /// Contributions or weights that were not finite and were not added.
     pub non_finite: u64,
     /// Film index of the pixel of the first of them, plus 1; 0 if there is none.
@@ -81,6 +93,12 @@ impl Counters {
         self.splits += o.splits;
         self.ring_capped += o.ring_capped;
         self.budget_capped += o.budget_capped;
+        self.shadow_kills += o.shadow_kills;
+        self.paths += o.paths;
+        self.path_segments += o.path_segments;
+        self.samples_logged += o.samples_logged;
+        self.samples_refused += o.samples_refused;
+        self.ledger_full += o.ledger_full;
         self.non_finite += o.non_finite;
         if self.first_non_finite == 0 {
             self.first_non_finite = o.first_non_finite;

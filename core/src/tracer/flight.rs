@@ -25,6 +25,8 @@ pub(crate) struct Flight8 {
     pub alone: Mask8,
     /// Root slots.
     pub root: U32x8,
+    /// Ledger records of the samples that they are.
+    pub ledger: U32x8,
     /// Random keys of the vertices to come.
     pub key: Key8,
     /// Path segments including this one.

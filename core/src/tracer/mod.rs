@@ -7,6 +7,7 @@
 
 mod counters;
 mod flight;
+mod ledger;
 mod occlude;
 mod refill;
 mod root;
@@ -21,7 +22,8 @@ mod vertex;
 pub use counters::{Counters, Utilisation};
 pub use shard::{Budget, Progress, Shard, ShardError};
 
-use crate::film::{PixelAov, PixelStats};
+use crate::film::{PixelAov, PixelSums};
+use crate::learn::cache::{CacheSize, Training};
 use crate::memory::Measure;
 use crate::settings::Settings;
 use crate::tiles::{TILE_PIXELS, Tiles};
@@ -34,15 +36,22 @@ fn roots_capacity(settings: &Settings) -> usize {
     settings.ring as usize + 16
 }
 
+/// Records of samples in flight, if anything is learned from them.
+fn ledger_capacity(settings: &Settings) -> usize {
+    if settings.strategy.space().is_some() { settings.learning.ledger as usize } else { 0 }
+}
+
 /// Pixel slots of one shard.
 fn pixel_slots(tiles: &Tiles) -> usize {
     tiles.most_tiles() * TILE_PIXELS as usize
 }
 
 /// Bytes of a shard's block; [`Shard::new`] carves in the same order.
-pub(crate) fn shard_measure(settings: &Settings, tiles: &Tiles) -> Measure {
+pub(crate) fn shard_measure(settings: &Settings, cache: Option<CacheSize>, tiles: &Tiles) -> Measure {
     let pixels = pixel_slots(tiles);
     let m = vertex::Pool::measure(Measure::new(), settings.ring as usize);
     let m = root::Roots::measure(m, roots_capacity(settings));
-    m.add::<PixelStats>(pixels).add::<PixelAov>(if settings.aovs { pixels } else { 0 })
+    let m = ledger::Ledger::measure(m, ledger_capacity(settings));
+    let m = cache.map_or(m, |size| Training::measure(m, size));
+    m.add::<PixelSums>(pixels).add::<PixelAov>(if settings.aovs { pixels } else { 0 })
 }

@@ -1,8 +1,9 @@
 //! Stage `occlude`: shadow rays to light samples.
 
+use super::scatter::LitSamples;
 use super::shard::Shard;
-use super::vertex::Vertex8;
 use crate::accel::{self, Intersector, Ray8};
+use crate::learn::COST_SHADOW;
 use crate::light::LightSample8;
 use crate::profile::Profile;
 use crate::session::Session;
@@ -13,10 +14,11 @@ impl Shard<'_> {
     pub(super) fn occlude<P: Profile, I: Intersector>(
         &mut self,
         session: &Session<'_, '_, P, I>,
-        v: &Vertex8,
+        s: &LitSamples<'_>,
         l: &LightSample8,
         mask: Mask8,
     ) -> Mask8 {
+        let v = s.vertex;
         let finite = accel::shadow_ray(v.p, v.ng, v.error, l.point, l.normal, l.point_error);
         let far_o = accel::offset(v.p, v.ng, v.error, l.wi);
         let ray = Ray8 {
@@ -27,7 +29,7 @@ impl Shard<'_> {
         };
         self.counters.occlude.count(mask.count());
         self.counters.shadow_rays += u64::from(mask.count());
-        self.charge(mask, v.root);
+        self.charge(mask, v.root, s.ledger, COST_SHADOW);
         mask.and_not(session.intersector().occluded(&ray, mask))
     }
 }

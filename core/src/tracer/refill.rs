@@ -2,6 +2,7 @@
 //! are samples of one pixel or of neighbouring pixels, so primary packets are coherent.
 
 use super::flight::Flight8;
+use super::ledger::NO_RECORD;
 use super::shard::Shard;
 use crate::accel::{Intersector, Ray8};
 use crate::camera;
@@ -72,14 +73,20 @@ impl Shard<'_> {
         let first_sample = session.iteration().first_sample;
         let tiles = self.plan.tiles;
         let (mut x, mut y, mut pixel, mut sample, mut root) = ([0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8]);
+        let mut ledger = [NO_RECORD; 8];
         let mut lanes = 0;
         while lanes < 8 {
             let Some((p, slot, s)) = self.cursor.next(&tiles, self.index) else { break };
-            let Some(r) = self.roots.open(slot) else { break };
+            let film = tiles.film_index(p) as u32;
+            let Some(r) = self.roots.open(slot, film, session.knowledge().importance(film)) else { break };
             [x[lanes], y[lanes]] = p;
-            pixel[lanes] = tiles.film_index(p) as u32;
+            pixel[lanes] = film;
             sample[lanes] = first_sample.wrapping_add(s);
             root[lanes] = r;
+            if self.ledger.is_on() {
+                ledger[lanes] = self.ledger.open(NO_RECORD);
+                self.counters.ledger_full += u64::from(ledger[lanes] == NO_RECORD);
+            }
             lanes += 1;
         }
         if lanes == 0 {
@@ -103,6 +110,7 @@ impl Shard<'_> {
             pdf: F32x8::ONE,
             alone: Mask8::all_lanes(),
             root: U32x8::new(root),
+            ledger: U32x8::new(ledger),
             key: key.child(U32x8::splat(0)),
             depth: U32x8::splat(1),
             albedo_product: F32x8::ONE,

@@ -17,6 +17,10 @@ pub(crate) struct Root {
     pub rays: u32,
     /// Samples that its splits have added.
     pub splits: u32,
+    /// Film index of the pixel.
+    pub film: u32,
+    /// What a squared error of this pixel's rgb counts in the error of the picture.
+    pub importance: [f32; 3],
 }
 
 /// A fixed slab of roots.
@@ -42,10 +46,10 @@ impl<'m> Roots<'m> {
     }
 
     /// A new root with one open lane. `None` cannot happen while roots outnumber vertices by two packets.
-    pub(crate) fn open(&mut self, pixel: u32) -> Option<u32> {
+    pub(crate) fn open(&mut self, pixel: u32, film: u32, importance: [f32; 3]) -> Option<u32> {
         self.free_len = self.free_len.checked_sub(1)?;
         let slot = self.free[self.free_len];
-        self.slots[slot as usize] = Root { pixel, open: 1, ..Zeroable::zeroed() };
+        self.slots[slot as usize] = Root { pixel, film, importance, open: 1, ..Zeroable::zeroed() };
         Some(slot)
     }
 

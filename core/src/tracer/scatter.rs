@@ -2,21 +2,33 @@
 //! (EARS' atomic sample), combined by multiple importance sampling.
 
 use super::flight::Flight8;
+use super::ledger::NO_RECORD;
+use super::settle::Found8;
 use super::shard::Shard;
 use super::vertex::{Batch, CLASSES, Vertex8};
 use crate::accel::{self, Intersector, Ray8};
 use crate::bsdf::{self, Bsdf, Eval8, Inputs8, Sample8, Visitor};
 use crate::light::{self, LightSample8, power_heuristic};
 use crate::profile::Profile;
+use crate::learn::COST_SHADOW;
 use crate::rng::Key8;
+use crate::rrs::MIN_FACTOR;
 use crate::scene::Scene;
 use crate::scene::blob::MaterialKind;
 use crate::session::Session;
 use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
 
-/// Random numbers of a sample: block 0 scatters, block 1 samples lights.
+/// Random numbers of a sample: block 0 scatters, block 1 samples lights, block 2 plays for shadow rays.
 const SCATTER_BLOCK: u32 = 0;
 const LIGHT_BLOCK: u32 = 1;
+const SHADOW_BLOCK: u32 = 2;
+
+/// Samples of vertices that light samples are drawn for.
+pub(super) struct LitSamples<'a> {
+    pub vertex: &'a Vertex8,
+    pub ledger: U32x8,
+    pub key: Key8,
+}
 
 /// What one class's kernel does to a packet.
 struct Scatter<'a, 's> {
@@ -83,6 +95,7 @@ impl Shard<'_> {
         self.counters.scatter.count(batch.lanes as u32);
         self.counters.vertex_samples += batch.lanes as u64;
 
+        let ledger = self.open_records(&batch);
         let key = v.key.child(batch.sample);
         let [u0, u1, u2, _] = key.uniforms(SCATTER_BLOCK);
         let lit = active & v.depth.lt(U32x8::splat(session.max_depth()));
@@ -95,7 +108,7 @@ impl Shard<'_> {
         let kernel = Scatter { scene, vertex: v, active, light: light.map(|l| l.wi), u: [u0, u1, u2] };
         let out = bsdf::dispatch_in(P::EFFECTS, kind, kernel)?;
         if let Some(l) = light {
-            self.light_contribution(session, v, &l, &out.light, lit & l.valid);
+            self.light_contribution(session, &LitSamples { vertex: v, ledger, key }, &l, &out.light, lit & l.valid);
         }
 
         let s = &out.sample;
@@ -108,9 +121,7 @@ impl Shard<'_> {
             self.count_non_finite(root[i]);
         }
         let flying = flying.and_not(broken);
-        for i in active.and_not(flying).lanes() {
-            self.close(root[i]);
-        }
+        self.close_lanes(active.and_not(flying), v.root, ledger, v.depth);
         Some(Flight8 {
             active: flying,
             ray: Ray8 { o: accel::offset(v.p, v.ng, v.error, wi), d: wi, tmin: F32x8::ZERO, tmax: F32x8::INFINITY },
@@ -121,35 +132,90 @@ impl Shard<'_> {
             pdf: s.pdf,
             alone: s.delta,
             root: v.root,
+            ledger,
             key: key.child(U32x8::splat(0)),
             depth: v.depth + U32x8::splat(1),
             albedo_product: v.albedo_product,
         })
     }
 
-    /// Takes samples of a class and books them on their roots: a lane each, less the vertex if it is drained.
+    /// Takes samples of a class and books them on their roots and ledger records: a lane each, less the vertex if it is
+    /// drained.
     fn take(&mut self, class: usize) -> Option<Batch> {
-        let roots = &mut self.roots;
-        self.pool.take(class, |v, lanes, drained| roots.get(v.root()).open += lanes - u32::from(drained))
+        let (roots, ledger) = (&mut self.roots, &mut self.ledger);
+        self.pool.take(class, |v, lanes, drained| {
+            roots.get(v.root()).open += lanes - u32::from(drained);
+            ledger.draw(v.ledger(), lanes, drained);
+        })
+    }
+
+    /// A ledger record for each sample of a packet, as long as there are any.
+    fn open_records(&mut self, batch: &Batch) -> U32x8 {
+        let mut out = [NO_RECORD; 8];
+        if self.ledger.is_on() {
+            let parents = batch.vertex.ledger.to_array();
+            for (record, &parent) in out.iter_mut().zip(&parents).take(batch.lanes) {
+                if parent == NO_RECORD {
+                    continue;
+                }
+                *record = self.ledger.open(parent);
+                if *record == NO_RECORD {
+                    self.counters.ledger_full += 1;
+                    self.ledger.spoil(parent);
+                    self.settle_record(parent);
+                }
+            }
+        }
+        U32x8::new(out)
     }
 
     /// Adds the light samples' radiance where nothing is in the way.
     fn light_contribution<P: Profile, I: Intersector>(
         &mut self,
         session: &Session<'_, '_, P, I>,
-        v: &Vertex8,
+        s: &LitSamples<'_>,
         l: &LightSample8,
         f: &Eval8,
         mask: Mask8,
     ) {
-        let weight = l.delta.select(F32x8::ONE, power_heuristic(l.pdf, f.pdf));
-        let radiance = v.beta * f.f * l.radiance * (weight / l.pdf);
-        let mask = mask & (radiance.any_positive() | !radiance.is_finite());
+        let v = s.vertex;
+        let weight = l.delta.select(F32x8::ONE, power_heuristic(l.pdf, f.pdf)) / l.pdf;
+        let radiance = v.beta * f.f * l.radiance * weight;
+        let mut found = Found8 { pixel: radiance, local: f.f * l.radiance * weight };
+        let mut mask = mask & (radiance.any_positive() | !radiance.is_finite());
+        if mask.any() && self.plan.settings().shadow_roulette {
+            mask = self.shadow_roulette(session, s, &mut found, mask);
+        }
         if mask.none() {
             return;
         }
-        let clear = self.occlude(session, v, l, mask);
-        self.gather(clear, v.root, radiance);
+        let clear = self.occlude(session, s, l, mask);
+        self.gather(clear, v.root, s.ledger, &found);
+    }
+
+    /// Plays roulette for shadow rays: a light sample is a sample of known value and the cost of one ray, so the factor that
+    /// is best for it is that of EARS (eq. 32) with the square of its contribution as second moment (Veach 1997, section
+    /// 10.4.1, "efficiency-optimised Russian roulette", with the same idea of a threshold). The lanes that go on.
+    fn shadow_roulette<P: Profile, I: Intersector>(
+        &mut self,
+        session: &Session<'_, '_, P, I>,
+        s: &LitSamples<'_>,
+        found: &mut Found8,
+        mask: Mask8,
+    ) -> Mask8 {
+        let ratio = session.knowledge().cost_over_variance();
+        if ratio <= 0.0 {
+            return mask;
+        }
+        let error = (found.pixel * found.pixel).dot(self.importance(s.vertex.root, mask));
+        let p = (error * F32x8::splat(ratio / COST_SHADOW)).sqrt();
+        let p = p.is_finite().select(p, F32x8::ONE).clamp(MIN_FACTOR, 1.0);
+        let [u, ..] = s.key.uniforms(SHADOW_BLOCK);
+        let on = mask & (u.lt(p) | p.ge(F32x8::ONE));
+        self.counters.shadow_kills += u64::from(mask.count() - on.count());
+        found.pixel = found.pixel / p;
+        found.local = found.local / p;
+        on
     }
 }
 

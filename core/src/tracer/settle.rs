@@ -1,14 +1,23 @@
-//! Stage `settle`: radiance goes to its root, finished roots go to the film.
+//! Stage `settle`: radiance goes to its root and its ledger record, finished samples to the statistics, finished roots to the
+//! film.
 
 use super::shard::Shard;
-use croupier_simd::{Mask8, U32x8, Vec3x8};
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+
+/// Radiance found by eight samples.
+pub(super) struct Found8 {
+    /// What it counts in the pixel: prefix weight included.
+    pub pixel: Vec3x8,
+    /// What it counts in the sample's own estimate: no prefix weight.
+    pub local: Vec3x8,
+}
 
 impl Shard<'_> {
-    /// Adds radiance to the roots of the lanes in `mask`. What is not finite is counted, not added.
+    /// Adds radiance to the roots and ledger records of the lanes in `mask`. What is not finite is counted, not added.
     #[inline]
-    pub(super) fn gather(&mut self, mask: Mask8, root: U32x8, radiance: Vec3x8) {
-        let mask =
-            mask & radiance.abs().max_component().gt(croupier_simd::F32x8::ZERO) | mask.and_not(radiance.is_finite());
+    pub(super) fn gather(&mut self, mask: Mask8, root: U32x8, ledger: U32x8, found: &Found8) {
+        let radiance = found.pixel;
+        let mask = mask & radiance.abs().max_component().gt(F32x8::ZERO) | mask.and_not(radiance.is_finite());
         if mask.none() {
             return;
         }
@@ -24,33 +33,79 @@ impl Shard<'_> {
         for i in mask.and_not(good).lanes() {
             self.count_non_finite(root[i]);
         }
+        if self.ledger.is_on() {
+            let x = found.local;
+            let (r, g, b) = (x.x.to_array(), x.y.to_array(), x.z.to_array());
+            let ledger = ledger.to_array();
+            for i in good.lanes() {
+                self.ledger.gather(ledger[i], [r[i], g[i], b[i]]);
+            }
+            for i in mask.and_not(good).lanes() {
+                self.ledger.spoil(ledger[i]);
+            }
+        }
     }
 
     /// Counts a value that was not finite and remembers the first pixel.
     pub(super) fn count_non_finite(&mut self, root: u32) {
         self.counters.non_finite += 1;
         if self.counters.first_non_finite == 0 {
-            let slot = self.roots.get(root).pixel;
-            self.counters.first_non_finite = self.film_index(slot).map_or(0, |i| i as u64 + 1);
+            self.counters.first_non_finite = u64::from(self.roots.get(root).film) + 1;
         }
     }
 
-    /// Charges one ray to the root of each lane in `mask`.
+    /// Charges one ray of relative `cost` to the root and the ledger record of each lane in `mask`.
     #[inline]
-    pub(super) fn charge(&mut self, mask: Mask8, root: U32x8) {
+    pub(super) fn charge(&mut self, mask: Mask8, root: U32x8, ledger: U32x8, cost: f32) {
         let root = root.to_array();
         for i in mask.lanes() {
             self.roots.get(root[i]).rays += 1;
         }
+        if self.ledger.is_on() {
+            let ledger = ledger.to_array();
+            for i in mask.lanes() {
+                self.ledger.charge(ledger[i], cost);
+            }
+        }
     }
 
-    /// Closes a lane or a drained vertex of `root`; a finished camera sample goes to its pixel.
+    /// Ends the paths of the lanes in `mask`.
+    pub(super) fn close_lanes(&mut self, mask: Mask8, root: U32x8, ledger: U32x8, depth: U32x8) {
+        let (root, ledger, depth) = (root.to_array(), ledger.to_array(), depth.to_array());
+        for i in mask.lanes() {
+            self.close(root[i], ledger[i], depth[i]);
+        }
+    }
+
+    /// Closes a lane or a drained vertex of a ledger record and logs what that finishes.
     #[inline]
-    pub(super) fn close(&mut self, root: u32) {
+    pub(super) fn settle_record(&mut self, record: u32) {
+        let (training, counters) = (&mut self.training, &mut self.counters);
+        self.ledger.close(record, |f| {
+            counters.samples_logged += 1;
+            let Some(t) = training else { return };
+            if !t.log(f.bin, f.value, f.cost) {
+                counters.samples_refused += 1;
+            } else if let Some(d) = f.pair {
+                t.log_pair(f.bin, d);
+            }
+        });
+    }
+
+    /// Ends a path of `depth` segments: closes a lane or a drained vertex of `root` and `ledger`. A finished camera sample
+    /// goes to its pixel.
+    #[inline]
+    pub(super) fn close(&mut self, root: u32, ledger: u32, depth: u32) {
+        self.counters.paths += 1;
+        self.counters.path_segments += u64::from(depth);
+        self.settle_record(ledger);
         if let Some(done) = self.roots.close(root) {
             self.counters.camera_samples += 1;
             if let Some(p) = self.pixels.get_mut(done.pixel as usize) {
                 p.add(done.radiance, done.rays);
+            }
+            if let Some(a) = self.aovs.get_mut(done.pixel as usize) {
+                a.paths += 1.0 + f64::from(done.splits);
             }
         }
     }

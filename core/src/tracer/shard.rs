@@ -2,11 +2,13 @@
 
 use super::counters::Counters;
 use super::refill::Cursor;
+use super::ledger::Ledger;
 use super::root::Roots;
 use super::vertex::{Pool, RESERVE};
-use super::{pixel_slots, roots_capacity};
+use super::{ledger_capacity, pixel_slots, roots_capacity};
 use crate::accel::Intersector;
-use crate::film::{PixelAov, PixelStats};
+use crate::film::{PixelAov, PixelSums};
+use crate::learn::cache::Training;
 use crate::memory::{Carver, MemoryError};
 use crate::profile::Profile;
 use crate::session::Session;
@@ -67,7 +69,9 @@ pub struct Shard<'m> {
     pub(super) cursor: Cursor,
     pub(super) pool: Pool<'m>,
     pub(super) roots: Roots<'m>,
-    pub(super) pixels: &'m mut [PixelStats],
+    pub(super) ledger: Ledger<'m>,
+    pub(crate) training: Option<Training<'m>>,
+    pub(super) pixels: &'m mut [PixelSums],
     pub(super) aovs: &'m mut [PixelAov],
     /// Numbers of the combs, one per packet.
     comb: Pcg32,
@@ -91,6 +95,8 @@ impl<'m> Shard<'m> {
             cursor: Cursor::finished(),
             pool: Pool::carve(&mut c, s.ring as usize).map_err(memory)?,
             roots: Roots::carve(&mut c, roots_capacity(s)).map_err(memory)?,
+            ledger: Ledger::carve(&mut c, ledger_capacity(s)).map_err(memory)?,
+            training: plan.cache.map(|size| Training::carve(&mut c, size)).transpose().map_err(memory)?,
             pixels: c.take(pixels).map_err(memory)?,
             aovs: c.take(if s.aovs { pixels } else { 0 }).map_err(memory)?,
             comb: Pcg32::seed_from_u64(0),
@@ -134,7 +140,10 @@ impl<'m> Shard<'m> {
         self.iteration = iteration.number;
         self.cursor = Cursor::new(&self.plan.tiles, self.index, iteration.samples);
         self.counters = Counters::default();
-        self.pixels.fill(PixelStats::default());
+        self.pixels.fill(PixelSums::default());
+        if let Some(t) = &mut self.training {
+            t.clear(session.knowledge().used_bins());
+        }
         self.aovs.fill(PixelAov::default());
         let seed = self.plan.settings().seed
             ^ (iteration.number << 20 | u64::from(self.index)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -166,15 +175,6 @@ impl<'m> Shard<'m> {
         self.comb.next_u32()
     }
 
-    /// Film index of a pixel slot.
-    pub(super) fn film_index(&self, slot: u32) -> Option<usize> {
-        let mut tile = self.plan.tiles.next_of(self.index, 0)?;
-        for _ in 0..slot / TILE_PIXELS {
-            tile = self.plan.tiles.next_of(self.index, tile + 1)?;
-        }
-        self.plan.tiles.pixel(tile, slot % TILE_PIXELS).map(|p| self.plan.tiles.film_index(p))
-    }
-
     /// What it was made for.
     pub(crate) fn settings(&self) -> &Settings {
         self.plan.settings()
@@ -186,7 +186,7 @@ impl<'m> Shard<'m> {
     }
 
     /// Calls `f(film index, sums, auxiliary sums)` for each of its pixels.
-    pub(crate) fn for_each_pixel(&self, mut f: impl FnMut(usize, &PixelStats, Option<&PixelAov>)) {
+    pub(crate) fn for_each_pixel(&self, mut f: impl FnMut(usize, &PixelSums, Option<&PixelAov>)) {
         let tiles = &self.plan.tiles;
         let mut next = tiles.next_of(self.index, 0);
         let mut slot = 0;

@@ -2,6 +2,7 @@
 
 use super::flight::Flight8;
 use super::roulette::Arrival8;
+use super::settle::Found8;
 use super::shard::Shard;
 use super::vertex::Vertex8;
 use crate::accel::{self, Hit8, Intersector};
@@ -33,9 +34,10 @@ impl Shard<'_> {
             let radiance = light::environment_radiance(scene, f.ray.d, escaped);
             let pdf = light::environment_pdf(scene, session.selector(), f.from, f.normal, f.ray.d, escaped);
             let weight = f.alone.select(F32x8::ONE, power_heuristic(f.pdf, pdf));
-            self.gather(escaped, f.root, f.beta * radiance * weight);
+            let found = Found8 { pixel: f.beta * radiance * weight, local: f.weight * radiance * weight };
+            self.gather(escaped, f.root, f.ledger, &found);
         }
-        self.close_lanes(escaped, f.root);
+        self.close_lanes(escaped, f.root, f.ledger, f.depth);
     }
 
     /// Lanes that hit a triangle.
@@ -57,14 +59,14 @@ impl Shard<'_> {
         let mut going = mask & f.depth.lt(U32x8::splat(session.max_depth()));
         let wants_aov = !self.aovs.is_empty() && first.any();
         if going.none() && !wants_aov {
-            return self.close_lanes(mask, f.root);
+            return self.close_lanes(mask, f.root, f.ledger, f.depth);
         }
         let s = shade::<P>(scene, hit, wo, point.ng);
         if wants_aov {
             self.record_first_hit(first, f, hit, &s);
         }
         going &= s.scatters;
-        self.close_lanes(mask.and_not(going), f.root);
+        self.close_lanes(mask.and_not(going), f.root, f.ledger, f.depth);
         if going.none() {
             return;
         }
@@ -81,6 +83,7 @@ impl Shard<'_> {
             key: f.key,
             depth: f.depth,
             albedo_product: f.albedo_product,
+            ledger: f.ledger,
             count: U32x8::splat(0),
             next: U32x8::splat(0),
         };
@@ -115,7 +118,8 @@ impl Shard<'_> {
         } else {
             F32x8::ONE
         };
-        self.gather(mask, f.root, f.beta * radiance * weight);
+        let found = Found8 { pixel: f.beta * radiance * weight, local: f.weight * radiance * weight };
+        self.gather(mask, f.root, f.ledger, &found);
     }
 
     fn record_first_hit(&mut self, first: Mask8, f: &Flight8, hit: &Hit8, s: &Shading8) {
@@ -135,13 +139,6 @@ impl Shard<'_> {
             }
             aov.depth += f64::from(hit.t.lane(i));
             aov.hits += 1.0;
-        }
-    }
-
-    pub(super) fn close_lanes(&mut self, mask: Mask8, root: U32x8) {
-        let root = root.to_array();
-        for i in mask.lanes() {
-            self.close(root[i]);
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::flight::Flight8;
 use super::shard::Shard;
 use crate::accel::{Hit8, Intersector};
+use crate::learn::COST_BOUNCE;
 use crate::profile::Profile;
 use crate::session::Session;
 
@@ -28,7 +29,7 @@ impl Shard<'_> {
         if f.depth.lane(f.active.lanes().next().unwrap_or(0)) > 1 {
             self.counters.scatter_rays += u64::from(n);
         }
-        self.charge(f.active, f.root);
+        self.charge(f.active, f.root, f.ledger, COST_BOUNCE);
         let mut hit = session.intersector().closest(&f.ray, f.active);
         hit.hit &= f.active;
         hit

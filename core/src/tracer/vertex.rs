@@ -43,6 +43,8 @@ pub(crate) struct Vertex8 {
     pub depth: U32x8,
     /// Product of the albedos of the vertices before this one, mean over rgb.
     pub albedo_product: F32x8,
+    /// Ledger record of the sample that led here.
+    pub ledger: U32x8,
     /// Samples left.
     pub count: U32x8,
     /// Number of the next sample.
@@ -51,6 +53,7 @@ pub(crate) struct Vertex8 {
 
 /// Row and column of the words that are read or changed while a vertex waits.
 const ROOT: (usize, usize) = (1, 6);
+const LEDGER: (usize, usize) = (3, 1);
 const COUNT: (usize, usize) = (3, 2);
 const NEXT: (usize, usize) = (3, 3);
 
@@ -61,6 +64,10 @@ impl Vertex {
 
     pub(crate) fn root(&self) -> u32 {
         self.rows[ROOT.0][ROOT.1].to_bits()
+    }
+
+    pub(crate) fn ledger(&self) -> u32 {
+        self.rows[LEDGER.0][LEDGER.1].to_bits()
     }
 
     /// Takes `m` of its samples; returns the number of the first.
@@ -89,7 +96,7 @@ impl Vertex8 {
                 f(self.key.lo),
                 f(self.key.hi),
             ],
-            [self.albedo_product, z, f(self.count), f(self.next), z, z, z, z],
+            [self.albedo_product, f(self.ledger), f(self.count), f(self.next), z, z, z, z],
         ]
     }
 
@@ -108,6 +115,7 @@ impl Vertex8 {
             reflectance: Vec3x8::new(d[3], d[4], d[5]),
             key: Key8 { lo: d[6].to_bits(), hi: d[7].to_bits() },
             albedo_product: e[0],
+            ledger: e[1].to_bits(),
             count: e[2].to_bits(),
             next: e[3].to_bits(),
         }
@@ -365,10 +373,11 @@ mod tests {
             albedo_product: f(25),
             count: u(26),
             next: u(27),
+            ledger: u(28),
         };
         let records = v.to_records();
         for (i, r) in records.iter().enumerate() {
-            assert_eq!((r.count(), r.root()), (26_000 + i as u32, 21_000 + i as u32));
+            assert_eq!((r.count(), r.root(), r.ledger()), (26_000 + i as u32, 21_000 + i as u32, 28_000 + i as u32));
         }
         let back = Vertex8::from_records(core::array::from_fn(|i| &records[7 - i]));
         for i in 0..8 {
@@ -377,6 +386,7 @@ mod tests {
             assert_eq!((back.key.lo.lane(i), back.key.hi.lane(i)), (v.key.lo.lane(7 - i), v.key.hi.lane(7 - i)));
             assert_eq!(back.albedo_product.lane(i), v.albedo_product.lane(7 - i));
             assert_eq!((back.count.lane(i), back.next.lane(i)), (v.count.lane(7 - i), v.next.lane(7 - i)));
+            assert_eq!(back.ledger.lane(i), v.ledger.lane(7 - i));
         }
     }
 }

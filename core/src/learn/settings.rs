@@ -1,0 +1,75 @@
+//! What the caller chooses about learning.
+
+use super::knowledge::Estimate;
+use crate::rrs::{Learned8, Norm};
+use croupier_simd::{F32x8, Vec3x8};
+
+/// Which error is to be small.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Objective {
+    /// Squared error over the squared pixel (plus 0.01): relMSE, eq. 28 of EARS.
+    #[default]
+    Relative,
+    /// Squared error.
+    Absolute,
+}
+
+/// The known value that stands in for what roulette skips (Szecsi et al. 2003).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Constant {
+    /// 0: plain roulette.
+    #[default]
+    Off,
+    /// The cached mean of reflected radiance, shrunk towards 0 where few samples stand behind it. Needs a strategy that
+    /// learns from the scene.
+    Cached,
+    /// This radiance in all channels.
+    Number(f32),
+}
+
+/// Samples at which the cached mean counts half.
+const CONSTANT_TRUST: f32 = 64.0;
+
+impl Constant {
+    /// The value per lane; `None` if it is 0 everywhere.
+    pub(crate) fn of(self, learned: &Learned8) -> Option<Vec3x8> {
+        match self {
+            Self::Off => None,
+            Self::Cached => Some(learned.mean * (learned.count / (learned.count + F32x8::splat(CONSTANT_TRUST)))),
+            Self::Number(x) => Some(Vec3x8::splat(x, x, x)),
+        }
+    }
+}
+
+/// Choices of the strategies that learn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Learning {
+    /// Bytes of all statistics of the scene: the session's and those of every shard.
+    pub cache_bytes: usize,
+    /// Samples in flight per shard that can be learned from.
+    pub ledger: u32,
+    /// Samples in a leaf of the octree at which it is divided (EARS: 40,000).
+    pub split_count: f32,
+    /// Part of the statistics that an iteration hands on to the next, in [0, 1].
+    pub carry: f32,
+    /// How the estimate of the pixels is made.
+    pub estimate: Estimate,
+    /// Which error is to be small.
+    pub objective: Objective,
+    /// How the errors of the channels become one.
+    pub norm: Norm,
+}
+
+impl Default for Learning {
+    fn default() -> Self {
+        Self {
+            cache_bytes: 24 << 20,
+            ledger: 2048,
+            split_count: 10_000.0,
+            carry: 0.75,
+            estimate: Estimate::Denoised,
+            objective: Objective::Relative,
+            norm: Norm::Mean,
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! Adjoint-driven roulette and splitting (Vorba and Krivanek 2016): a path keeps the weight at which it is expected to
+//! contribute one pixel's worth. What lies in a window around that is left alone.
+//!
+//! | parameter | unit | value |
+//! |---|---|---|
+//! | [`LOWER`] | expected contribution over the pixel | 1/3 |
+//! | [`UPPER`] | the same | 5/3 (a window of ratio 5 around 1) |
+
+use super::{Classic, RrsStrategy, Space, Vertices8};
+use croupier_simd::F32x8;
+
+/// Lower end of the window.
+const LOWER: f32 = 1.0 / 3.0;
+/// Upper end.
+const UPPER: f32 = 5.0 / 3.0;
+/// Samples of a bin at which its mean counts as much as the rule that needs none.
+const TRUST: f32 = 32.0;
+
+/// The weight window's factor; that of `classic` where nothing is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Adrrs;
+
+impl Adrrs {
+    pub(super) fn parse(options: &str) -> Option<Self> {
+        options.is_empty().then_some(Self)
+    }
+}
+
+/// The factor that brings an expected contribution into the window.
+#[inline(always)]
+pub(super) fn window(v: F32x8) -> F32x8 {
+    let (low, high) = (F32x8::splat(LOWER), F32x8::splat(UPPER));
+    let s = v.lt(low).select(v / low, F32x8::ONE);
+    v.gt(high).select(v / high, s)
+}
+
+/// [`window`], grown out of `classic` with the samples that stand behind it.
+#[inline(always)]
+pub(super) fn guarded(v: &Vertices8) -> F32x8 {
+    let l = &v.learned;
+    let s = window(l.contribution(v.beta));
+    let t = l.trust(TRUST);
+    Classic::default().factor(v) * (F32x8::ONE - t) + s * t
+}
+
+impl RrsStrategy for Adrrs {
+    const NEEDS_ALBEDO: bool = true;
+    const SPACE: Option<Space> = Some(Space::Scene);
+
+    #[inline(always)]
+    fn factor(&self, v: &Vertices8) -> F32x8 {
+        guarded(v)
+    }
+}

@@ -1,0 +1,107 @@
+//! What strategies may know from earlier iterations.
+
+use croupier_simd::{F32x8, Vec3x8};
+
+/// How a colour becomes a number.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Norm {
+    /// Largest of r, g, b.
+    #[default]
+    Max,
+    /// Rec. 709 luminance.
+    Luminance,
+    /// Mean of r, g, b.
+    Mean,
+}
+
+impl Norm {
+    /// The norm of each lane.
+    #[inline(always)]
+    pub fn of(self, c: Vec3x8) -> F32x8 {
+        match self {
+            Self::Max => c.max_component(),
+            Self::Luminance => c.luminance(),
+            Self::Mean => c.mean(),
+        }
+    }
+
+    pub(super) fn parse(text: &str) -> Option<Self> {
+        match text {
+            "" | "max" => Some(Self::Max),
+            "luminance" => Some(Self::Luminance),
+            "mean" => Some(Self::Mean),
+            _ => None,
+        }
+    }
+}
+
+/// Over what local statistics are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Space {
+    /// Cells of the scene and directions.
+    Scene,
+    /// Blocks of the picture and path lengths.
+    Image,
+}
+
+/// Statistics that were frozen before the iteration began, one vertex per lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Learned8 {
+    /// What a squared error of the pixel's rgb counts in the error of the picture: 1 / (I^2 + 0.01) for the relative
+    /// objective with I the estimate of the pixel, 1 for the absolute one.
+    pub importance: Vec3x8,
+    /// How the errors of the channels become one.
+    pub norm: Norm,
+    /// Mean cost of a camera sample over its mean error (eqs. 33, 34); 0 while unknown.
+    pub cost_over_variance: F32x8,
+    /// Mean of one sample's reflected radiance (eq. 36).
+    pub mean: Vec3x8,
+    /// Mean of its square (eq. 35), freed of the constant that stands in for skipped samples.
+    pub moment: Vec3x8,
+    /// Its variance at a point (eq. 37).
+    pub variance: Vec3x8,
+    /// Mean cost of one sample (eq. 38).
+    pub cost: F32x8,
+    /// Samples behind these; 0 means that nothing is known.
+    pub count: F32x8,
+}
+
+impl Learned8 {
+    /// Nothing known: errors count absolutely.
+    pub const NONE: Self = Self {
+        importance: Vec3x8::ONE,
+        norm: Norm::Mean,
+        cost_over_variance: F32x8::ZERO,
+        mean: Vec3x8::ZERO,
+        moment: Vec3x8::ZERO,
+        variance: Vec3x8::ZERO,
+        cost: F32x8::ONE,
+        count: F32x8::ZERO,
+    };
+
+    /// The factor that is best for samples whose square is expected to be `r`: eq. 32 for prefix weight `beta`.
+    #[inline(always)]
+    pub fn efficient(&self, beta: Vec3x8, r: Vec3x8) -> F32x8 {
+        let error = self.norm.of(beta * beta * self.importance * r);
+        (error * self.cost_over_variance / self.cost).sqrt()
+    }
+
+    /// The expected contribution of a vertex in units of its pixel, mean over the channels.
+    #[inline(always)]
+    pub fn contribution(&self, beta: Vec3x8) -> F32x8 {
+        (beta * self.mean * self.root_importance()).mean()
+    }
+
+    /// Per channel: 1 over the pixel for the relative objective, 1 for the absolute.
+    #[inline(always)]
+    pub fn root_importance(&self) -> Vec3x8 {
+        let i = self.importance;
+        Vec3x8::new(i.x.sqrt(), i.y.sqrt(), i.z.sqrt())
+    }
+
+    /// Confidence in [0, 1): half at `samples`.
+    #[inline(always)]
+    pub fn trust(&self, samples: f32) -> F32x8 {
+        self.count / (self.count + F32x8::splat(samples))
+    }
+}
