@@ -10,22 +10,24 @@ const LO: [f32; 3] = BOUNDS[0];
 const HI: [f32; 3] = BOUNDS[1];
 const ALL: fn() -> Mask8 = Mask8::all_lanes;
 
-/// Leaves that the trees of the placement tests have at least.
-const MANY: u32 = 1500;
-
 /// Every bin stands for one leaf of the oracle and one direction bin, and the other way round; places inside, outside
 /// and with numbers that are not finite; inactive lanes. Killed by: axes swapped in the octant, the wrong root, a level
 /// left out, no clamping, `u32::MAX` missing.
 #[test]
 fn find_agrees_with_an_oracle() {
-    let (mut blocks, mut rng) = (Blocks::leaves(2000, 2), SplitMix(1));
+    // too small for a grid, a coarse one, a finer one
+    [(400, 300), (2000, 1500), (9000, 1500)].into_iter().for_each(|(room, least)| agrees_with_an_oracle(room, least));
+}
+
+fn agrees_with_an_oracle(room: usize, least: u32) {
+    let (mut blocks, mut rng) = (Blocks::leaves(room, 2), SplitMix(1));
     let (mut cache, mut shards) = blocks.carve(LO, HI);
     (0..5).for_each(|_| iterate(&mut cache, &mut shards, 60_000, 300.0, &mut rng));
-    assert!(cache.leaves() >= MANY, "{}", cache.leaves());
+    assert!(cache.leaves() >= least, "{}", cache.leaves());
     let oracle = Oracle::new(&saved(&cache));
     assert_eq!(oracle.leaves.len(), cache.leaves() as usize);
     let (mut place_of, mut bin_of, mut leaves) = (HashMap::new(), HashMap::new(), HashSet::new());
-    for turn in 0..60_000 {
+    for turn in 0..30_000 {
         let vertices: [_; 8] = std::array::from_fn(|_| {
             let (p, d) = vertex(&mut rng);
             let anywhere = std::array::from_fn(|a| rng.range(LO[a] as f64 - 1.0, HI[a] as f64 + 1.0) as f32);
