@@ -2,6 +2,7 @@
 
 pub mod blob;
 pub mod bsdf;
+pub mod cache;
 pub mod geometry;
 pub mod jacobian;
 pub mod light_oracle;

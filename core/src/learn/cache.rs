@@ -83,7 +83,9 @@ impl<'m> Cache<'m> {
     }
 
     pub(crate) fn measure(m: Measure, size: CacheSize) -> Measure {
-        Tree::measure(m, Tree::nodes_for(size.splits)).add::<BinSums>(size.bins()).add::<Frozen>(size.bins())
+        Tree::measure(m, Tree::nodes_for(size.splits), size.leaves())
+            .add::<BinSums>(size.bins())
+            .add::<Frozen>(size.bins())
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, size: CacheSize, lo: [f32; 3], hi: [f32; 3]) -> Result<Self, MemoryError> {
@@ -195,6 +197,7 @@ impl<'m> Cache<'m> {
 
     /// Computes what look-ups read.
     pub(super) fn refresh(&mut self) {
+        self.tree.refresh();
         let used = self.leaves() as usize * BINS;
         let sums = self.sums.chunks_exact(BINS);
         let frozen = self.frozen.chunks_exact_mut(BINS);

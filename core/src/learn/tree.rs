@@ -4,6 +4,9 @@
 //! of its eight children, which lie together. Places are numbers of cells on a grid of 2^16 per axis in a cube around
 //! the bounds; bit `15 - d` of the three numbers picks the child at depth `d`. So a descent compares no floats, and eight
 //! lanes go down in lockstep with their loads overlapping.
+//!
+//! The first levels of a large tree are also kept as one table, a coarse grid, where a descent starts: a jittered look-up
+//! needs two descents.
 
 use super::bins::BINS;
 use crate::memory::{Carver, Measure, MemoryError};
@@ -34,6 +37,9 @@ pub(super) enum Node {
 #[derive(Debug)]
 pub(super) struct Tree<'m> {
     nodes: &'m mut [u32],
+    /// Words of the nodes at depth `grid_bits`, or of leaves above it, by cell; one grid per root.
+    grid: &'m mut [u32],
+    grid_bits: u32,
     used: u32,
     leaves: u32,
     max_leaves: u32,
@@ -47,8 +53,8 @@ impl<'m> Tree<'m> {
         FIRST_CHILD + 8 * splits
     }
 
-    pub(super) fn measure(m: Measure, nodes: u32) -> Measure {
-        m.add::<u32>(nodes as usize)
+    pub(super) fn measure(m: Measure, nodes: u32, max_leaves: u32) -> Measure {
+        m.add::<u32>(nodes as usize).add::<u32>(grid_len(max_leaves))
     }
 
     pub(super) fn carve(
@@ -60,8 +66,16 @@ impl<'m> Tree<'m> {
     ) -> Result<Self, MemoryError> {
         let cube = cube(lo, hi);
         let [.., edge] = cube;
-        let mut tree =
-            Self { nodes: c.take(nodes as usize)?, used: 0, leaves: 0, max_leaves, cube, scale: CELLS / edge };
+        let mut tree = Self {
+            nodes: c.take(nodes as usize)?,
+            grid: c.take(grid_len(max_leaves))?,
+            grid_bits: grid_bits(max_leaves),
+            used: 0,
+            leaves: 0,
+            max_leaves,
+            cube,
+            scale: CELLS / edge,
+        };
         tree.reset();
         Ok(tree)
     }
@@ -70,6 +84,22 @@ impl<'m> Tree<'m> {
     pub(super) fn reset(&mut self) {
         self.nodes.iter_mut().zip(0..ROOTS).for_each(|(n, root)| *n = LEAF | root);
         (self.used, self.leaves) = (FIRST_CHILD, ROOTS);
+        self.refresh();
+    }
+
+    /// Fills the grid. Until then look-ups give the leaves' old numbers, which are still theirs or a child's.
+    pub(super) fn refresh(&mut self) {
+        let bits = self.grid_bits;
+        for (i, word) in (0u32..).zip(self.grid.iter_mut()) {
+            let at = |n: u32| self.nodes.get(n as usize).copied().unwrap_or(LEAF);
+            let cell = [i, i >> bits, i >> (2 * bits)];
+            *word = at(i >> (3 * bits));
+            for bit in (0..bits).rev() {
+                if *word & LEAF == 0 {
+                    *word = at(*word + cell.iter().rev().fold(0, |o, c| o << 1 | (c >> bit & 1)));
+                }
+            }
+        }
     }
 
     pub(super) fn leaves(&self) -> u32 {
@@ -132,21 +162,23 @@ impl<'m> Tree<'m> {
     #[inline(always)]
     fn descend(&self, root: U32x8, place: [F32x8; 3]) -> U32x8 {
         let [x, y, z] = place.map(|c| c.to_i32().to_u32());
-        let load = |index: U32x8| {
-            let index = index.to_array();
-            U32x8::new(index.map(|i| self.nodes.get(i as usize).copied().unwrap_or(LEAF)))
+        let load = |table: &[u32], index: U32x8| {
+            U32x8::new(index.to_array().map(|i| table.get(i as usize).copied().unwrap_or(LEAF)))
         };
-        let mut index = root;
-        let mut word = load(index);
-        for bit in (0..MAX_DEPTH).rev() {
+        let bits = self.grid_bits;
+        let above = MAX_DEPTH - bits;
+        let mut word =
+            load(self.grid, x >> above | (y >> above) << bits | (z >> above) << (2 * bits) | root << (3 * bits));
+        for bit in (0..above).rev() {
             let leaf = F32x8::from_bits(word).is_sign_negative();
             if leaf.all() {
                 break;
             }
             let one = U32x8::splat(1);
             let octant = (x >> bit & one) | (y >> bit & one) << 1 | (z >> bit & one) << 2;
-            index = U32x8::select(leaf, index, word + octant);
-            word = load(index);
+            // lanes that have arrived load the first node, so that no bounds check is ever mispredicted
+            let next = load(self.nodes, U32x8::select(leaf, U32x8::splat(0), word + octant));
+            word = U32x8::select(leaf, word, next);
         }
         word
     }
@@ -167,6 +199,19 @@ impl<'m> Tree<'m> {
         }
         (word & U32x8::splat(NUMBER)) * U32x8::splat(BINS as u32)
     }
+}
+
+/// Levels that the grid stands for: none in small trees, whose memory it would take.
+fn grid_bits(max_leaves: u32) -> u32 {
+    match max_leaves {
+        0..512 => 0,
+        512..8192 => 3,
+        _ => 4,
+    }
+}
+
+fn grid_len(max_leaves: u32) -> usize {
+    (ROOTS as usize) << (3 * grid_bits(max_leaves))
 }
 
 /// Smallest corner and edge of a cube around the bounds; the unit cube's where those are not finite.

@@ -1,0 +1,212 @@
+//! The statistics cache seen from outside: memory for it, data for it, and an independent reader of its saved bytes.
+
+use crate::stats::SplitMix;
+use bytemuck::{Pod, Zeroable};
+use croupier::learn::cache::{Cache, CacheSize, Local8, Training};
+use croupier::scene::blob::content_hash;
+use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(64))]
+struct Line([u8; 64]);
+
+/// Memory for the shared side and a training side each.
+pub struct Blocks {
+    size: CacheSize,
+    shared: Vec<Line>,
+    shards: Vec<Vec<Line>>,
+}
+
+impl Blocks {
+    /// For a number of leaves or a little more.
+    pub fn leaves(leaves: usize, shards: usize) -> Self {
+        let size = CacheSize::within(leaves * (2310 + 768 * shards) + 4096, shards as u32).expect("room for a cache");
+        Self::new(size, shards)
+    }
+
+    /// Not zeroed: the cache must not rely on it.
+    pub fn new(size: CacheSize, shards: usize) -> Self {
+        let lines = |bytes: usize| vec![Line([0xa5; 64]); bytes / 64];
+        let shard = Training::layout(size).unwrap().size;
+        Self {
+            size,
+            shared: lines(Cache::layout(size).unwrap().size),
+            shards: (0..shards).map(|_| lines(shard)).collect(),
+        }
+    }
+
+    /// Carves all of it; the bounds are `lo` to `hi`.
+    pub fn carve(&mut self, lo: [f32; 3], hi: [f32; 3]) -> (Cache<'_>, Vec<Training<'_>>) {
+        let cache = Cache::new(self.size, lo, hi, bytemuck::cast_slice_mut(&mut self.shared)).unwrap();
+        let training = |b| Training::new(self.size, bytemuck::cast_slice_mut(b)).unwrap();
+        (cache, self.shards.iter_mut().map(|b: &mut Vec<Line>| training(b)).collect())
+    }
+}
+
+/// Bounds of most tests: not a cube, not at the origin.
+pub const BOUNDS: [[f32; 3]; 2] = [[-1.0, 2.0, -3.0], [3.0, 4.5, 0.25]];
+
+/// A place near the surface of a ball in [`BOUNDS`] and a direction: what vertices look like.
+pub fn vertex(rng: &mut SplitMix) -> ([f32; 3], [f32; 3]) {
+    let n = rng.direction();
+    let c = [1.0, 3.25, -1.5];
+    (core::array::from_fn(|a| (c[a] + 1.1 * n[a] + rng.range(-0.01, 0.01)) as f32), n.map(|x| x as f32))
+}
+
+/// The bin of one vertex.
+pub fn find(cache: &Cache<'_>, matte: bool, p: [f32; 3], d: [f32; 3]) -> u32 {
+    let [p, d] = [p, d].map(|v| Vec3x8::splat(v[0], v[1], v[2]));
+    cache.find(Mask8::splat(matte), p, d, Mask8::all_lanes()).lane(5)
+}
+
+/// What is known of the bins `8 k` to `8 k + 7`.
+pub fn locals(cache: &Cache<'_>) -> impl Iterator<Item = Local8> {
+    let local = |k: u32| cache.local(U32x8::from_fn(|i| 8 * k + i as u32), Mask8::all_lanes());
+    (0..cache.bins() / 8).map(local)
+}
+
+/// Panics unless all of `l` is as documented.
+pub fn assert_sane(l: &Local8) {
+    let mut ok = l.cost.is_finite() & l.cost.ge(F32x8::ZERO) & l.count.is_finite() & l.count.ge(F32x8::ZERO);
+    for (m, q, v) in [
+        (l.mean.x, l.moment.x, l.variance.x),
+        (l.mean.y, l.moment.y, l.variance.y),
+        (l.mean.z, l.moment.z, l.variance.z),
+    ] {
+        ok = ok & m.ge(F32x8::ZERO) & q.is_finite() & q.ge(m * m) & v.ge(F32x8::ZERO) & v.le(q);
+    }
+    assert!(ok.all(), "{l:?}");
+}
+
+/// Runs an iteration of `n` vertices per shard: values in multiples of 2^-10, so that small sums are exact.
+pub fn iterate(cache: &mut Cache<'_>, shards: &mut [Training<'_>], n: usize, split: f64, rng: &mut SplitMix) {
+    for t in &mut *shards {
+        t.clear(cache.bins());
+        for _ in 0..n {
+            let (p, d) = vertex(rng);
+            let bin = find(cache, rng.bits() & 1 == 0, p, d);
+            let x = [(); 3].map(|()| (rng.bits() >> 58) as f32 / 1024.0);
+            assert!(t.log(bin, x, (rng.bits() >> 61) as f32));
+            assert!(t.log_pair(bin, x));
+        }
+    }
+    cache.begin_merge(1.0);
+    shards.iter().for_each(|t| cache.absorb(t));
+    cache.freeze(split);
+}
+
+/// The cache's bytes.
+pub fn saved(cache: &Cache<'_>) -> Vec<u8> {
+    let mut bytes = vec![0x5a; cache.saved_len()];
+    assert_eq!(cache.save(&mut bytes), Ok(bytes.len()));
+    bytes
+}
+
+/// Makes the stored hash that of the bytes.
+pub fn rehash(bytes: &mut [u8]) {
+    let h = content_hash(&bytes[16..]);
+    bytes[8..16].copy_from_slice(&h.to_le_bytes());
+}
+
+/// Where the sums start in saved bytes.
+pub fn sums_at(bytes: &[u8]) -> usize {
+    let nodes = u32::from_le_bytes(bytes[20..24].try_into().unwrap()) as usize;
+    64 + nodes.div_ceil(8) * 8
+}
+
+/// A node of the oracle.
+enum Node {
+    Inner(Vec<usize>),
+    Leaf(usize),
+}
+
+/// What saved bytes mean, in f64.
+pub struct Oracle {
+    nodes: Vec<Node>,
+    roots: [usize; 2],
+    lo: [f64; 3],
+    edge: f64,
+    /// Per leaf and bin: count, pairs, cost, sum (3), squared sum (3), pair sum (3).
+    pub leaves: Vec<[[f64; 12]; 16]>,
+}
+
+/// A leaf of the oracle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// Its number in the order of the bytes.
+    pub leaf: usize,
+    /// Its edge, world units.
+    pub edge: f64,
+}
+
+impl Oracle {
+    /// Reads saved bytes.
+    pub fn new(bytes: &[u8]) -> Self {
+        let f = |i: usize| f64::from(f32::from_le_bytes(bytes[28 + 4 * i..32 + 4 * i].try_into().unwrap()));
+        let mut o = Self { nodes: vec![], roots: [0; 2], lo: [f(0), f(1), f(2)], edge: f(3), leaves: vec![] };
+        let (mut shape, mut sums) = (bytes[64..].iter(), bytes[sums_at(bytes)..].chunks_exact(8));
+        o.roots = [0, 1].map(|_| o.read(&mut shape, &mut sums));
+        assert!(sums.next().is_none());
+        o
+    }
+
+    fn read<'b>(
+        &mut self,
+        shape: &mut impl Iterator<Item = &'b u8>,
+        sums: &mut impl Iterator<Item = &'b [u8]>,
+    ) -> usize {
+        let node = if *shape.next().unwrap() == 1 {
+            Node::Inner((0..8).map(|_| self.read(shape, sums)).collect())
+        } else {
+            let mut number = || f64::from_le_bytes(sums.next().unwrap().try_into().unwrap());
+            self.leaves.push([(); 16].map(|()| [(); 12].map(|()| number())));
+            Node::Leaf(self.leaves.len() - 1)
+        };
+        self.nodes.push(node);
+        self.nodes.len() - 1
+    }
+
+    /// Is the place so near to a border of the finest grid that f32 may take the other side?
+    pub fn ambiguous(&self, p: [f64; 3]) -> bool {
+        (0..3).any(|a| {
+            let cell = (p[a] - self.lo[a]) / self.edge * 65_536.0;
+            (cell - cell.round()).abs() < 0.06
+        })
+    }
+
+    /// The leaf around a place, the nearest one for places outside.
+    pub fn cell(&self, matte: bool, p: [f64; 3]) -> Cell {
+        let (mut lo, mut edge) = (self.lo, self.edge);
+        let mut node = self.roots[usize::from(!matte)];
+        while let Node::Inner(children) = &self.nodes[node] {
+            edge *= 0.5;
+            let mut child = 0;
+            for a in 0..3 {
+                if p[a] >= lo[a] + edge {
+                    child |= 1 << a;
+                    lo[a] += edge;
+                }
+            }
+            node = children[child];
+        }
+        let Node::Leaf(leaf) = self.nodes[node] else { unreachable!() };
+        Cell { leaf, edge }
+    }
+
+    /// Moves a place into the cube.
+    pub fn clamp(&self, p: [f64; 3]) -> [f64; 3] {
+        core::array::from_fn(|a| p[a].clamp(self.lo[a], self.lo[a] + self.edge * (1.0 - 1e-7)))
+    }
+
+    /// One number summed over everything.
+    pub fn total(&self, field: usize) -> f64 {
+        self.leaves.iter().flatten().map(|b| b[field]).sum()
+    }
+}
+
+/// Height (-1 to 1) and azimuth (0 to 2 pi) of a direction on the turned sphere that the bins are cut from.
+pub fn height_and_azimuth(d: [f64; 3]) -> [f64; 2] {
+    let dot = |r: [f64; 3]| (r[0] * d[0] + r[1] * d[1] + r[2] * d[2]) / 3.0;
+    let (height, x, y) = (dot([2.0, -1.0, 2.0]), dot([2.0, 2.0, -1.0]), dot([-1.0, 2.0, 2.0]));
+    [height, y.atan2(x).rem_euclid(std::f64::consts::TAU)]
+}

@@ -1,0 +1,348 @@
+//! The statistics cache: where a vertex belongs, what is summed, how the tree grows, what is looked up.
+
+use croupier::learn::cache::{BIN_LIMIT, CacheSize, MAX_VALUE};
+use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier_tests::cache::*;
+use croupier_tests::stats::{FAMILY_ALPHA, SplitMix, chi_square, sidak};
+use std::collections::{HashMap, HashSet};
+
+const LO: [f32; 3] = BOUNDS[0];
+const HI: [f32; 3] = BOUNDS[1];
+const ALL: fn() -> Mask8 = Mask8::all_lanes;
+
+/// Every bin stands for one leaf of the oracle and one direction bin, and the other way round; places inside, outside
+/// and with numbers that are not finite; inactive lanes. Killed by: axes swapped in the octant, the wrong root, a level
+/// left out, no clamping, `u32::MAX` missing.
+#[test]
+fn find_agrees_with_an_oracle() {
+    // too small for a grid, a coarse one, a finer one
+    [(400, 300), (2000, 1500), (9000, 1500)].into_iter().for_each(|(room, least)| agrees_with_an_oracle(room, least));
+}
+
+fn agrees_with_an_oracle(room: usize, least: u32) {
+    let (mut blocks, mut rng) = (Blocks::leaves(room, 2), SplitMix(1));
+    let (mut cache, mut shards) = blocks.carve(LO, HI);
+    (0..5).for_each(|_| iterate(&mut cache, &mut shards, 60_000, 300.0, &mut rng));
+    assert!(cache.leaves() >= least, "{}", cache.leaves());
+    let oracle = Oracle::new(&saved(&cache));
+    assert_eq!(oracle.leaves.len(), cache.leaves() as usize);
+    let (mut place_of, mut bin_of, mut leaves) = (HashMap::new(), HashMap::new(), HashSet::new());
+    for turn in 0..30_000 {
+        let vertices: [_; 8] = std::array::from_fn(|_| {
+            let (p, d) = vertex(&mut rng);
+            let anywhere = std::array::from_fn(|a| rng.range(LO[a] as f64 - 1.0, HI[a] as f64 + 1.0) as f32);
+            (rng.bits() & 1 == 0, if turn % 2 == 0 { p } else { anywhere }, d)
+        });
+        let active = Mask8::from_bits(rng.bits() as u32);
+        let matte = Mask8::from_bits((0..8).map(|i| u32::from(vertices[i].0) << i).sum());
+        let bins = cache.find(matte, Vec3x8::from_fn(|i| vertices[i].1), Vec3x8::from_fn(|i| vertices[i].2), active);
+        for (i, (matte, p, d)) in vertices.into_iter().enumerate() {
+            let (bin, p) = (bins.lane(i), oracle.clamp(p.map(f64::from)));
+            if !active.lane(i) {
+                assert_eq!(bin, u32::MAX);
+                continue;
+            }
+            let [height, azimuth] = height_and_azimuth(d.map(f64::from));
+            let [h, a] = [(height + 1.0) * 2.0, azimuth / std::f64::consts::FRAC_PI_2];
+            if oracle.ambiguous(p) || [h, a].iter().any(|x| (x - x.round()).abs() < 1e-5) {
+                continue;
+            }
+            let leaf = oracle.cell(matte, p).leaf;
+            let place = (leaf, h as u32, a as u32);
+            assert_eq!(*place_of.entry(bin).or_insert(place), place, "bin {bin}");
+            assert_eq!(*bin_of.entry(place).or_insert(bin), bin, "{place:?}");
+            assert!(bin < cache.bins());
+            leaves.insert(leaf);
+        }
+    }
+    assert!(leaves.len() as u32 > cache.leaves() / 2, "{} of {} leaves seen", leaves.len(), cache.leaves());
+    let (nan, inf) = (f32::NAN, f32::INFINITY);
+    for (p, same) in [([nan, inf, -inf], [-9.0, 9.0, -9.0]), ([f32::MAX, f32::MIN, nan], [9.0, -9.0, -9.0])] {
+        assert_eq!(find(&cache, true, p, [0.0, 0.0, 1.0]), find(&cache, true, same, [0.0, 0.0, 1.0]));
+    }
+    assert!(find(&cache, false, [0.0; 3], [nan; 3]) < cache.bins());
+}
+
+/// 4e6 uniform directions. Moving a border of a slab by 0.005 of the height (1 % of a bin's area) gives a non-central
+/// chi-square of 200, missed with a probability below 1e-7. Killed by: uneven slabs, quadrants about another axis.
+#[test]
+fn direction_bins_have_equal_area() {
+    let (mut blocks, mut rng) = (Blocks::leaves(2, 1), SplitMix(2));
+    let (cache, _) = blocks.carve(LO, HI);
+    let mut observed = [0u64; 16];
+    for _ in 0..500_000 {
+        let d = Vec3x8::from_fn(|_| rng.direction().map(|x| x as f32));
+        cache.find(ALL(), Vec3x8::ZERO, d, ALL()).to_array().iter().for_each(|b| observed[*b as usize] += 1);
+    }
+    let p = chi_square(&observed, &[250_000.0; 16], 5.0).p;
+    assert!(p > sidak(FAMILY_ALPHA, 1), "p = {p}: {observed:?}");
+    // Normals that are parallel to an axis, and those a little off, share a bin with no other axis.
+    let axes: Vec<_> = (0..6)
+        .map(|k| {
+            let axis: [f32; 3] = std::array::from_fn(|a| if a == k / 2 { [1.0, -1.0][k % 2] } else { 0.0 });
+            let bin = find(&cache, true, [0.0; 3], axis);
+            for _ in 0..100 {
+                let near = axis.map(|x| x + rng.range(-0.05, 0.05) as f32);
+                assert_eq!(find(&cache, true, [0.0; 3], near), bin);
+            }
+            bin
+        })
+        .collect();
+    assert_eq!(axes.iter().collect::<HashSet<_>>().len(), 6);
+}
+
+/// The jittered look-up is that of a place moved by `jitter - 0.5` of the leaf's edge, as the oracle moves it. Killed
+/// by: moving by a whole edge, by the edge of another depth, jitter of one axis used for another.
+#[test]
+fn jitter_stays_within_half_a_leaf() {
+    let (mut blocks, mut rng) = (Blocks::leaves(2000, 2), SplitMix(3));
+    let (mut cache, mut shards) = blocks.carve(LO, HI);
+    (0..5).for_each(|_| iterate(&mut cache, &mut shards, 60_000, 300.0, &mut rng));
+    let oracle = Oracle::new(&saved(&cache));
+    let (mut leaf_of, mut seen, mut moved_away) = (HashMap::new(), 0, 0);
+    for _ in 0..100_000 {
+        let ((p, d), u) = (vertex(&mut rng), [(); 3].map(|()| rng.f32()));
+        let q = p.map(f64::from);
+        let own = oracle.cell(false, q);
+        let moved = oracle.clamp(std::array::from_fn(|a| q[a] + (f64::from(u[a]) - 0.5) * own.edge));
+        if oracle.ambiguous(q) || oracle.ambiguous(moved) {
+            continue;
+        }
+        let [p8, d8] = [p, d].map(|v| Vec3x8::splat(v[0], v[1], v[2]));
+        let bin = cache.find_jittered(Mask8::NONE, p8, d8, u.map(F32x8::splat), ALL()).lane(2);
+        let leaf = oracle.cell(false, moved).leaf;
+        assert_eq!(*leaf_of.entry(bin / 16).or_insert(leaf), leaf);
+        seen += 1;
+        moved_away += u32::from(leaf != own.leaf);
+        // half is no movement
+        let still = cache.find_jittered(Mask8::NONE, p8, d8, [F32x8::splat(0.5); 3], ALL()).lane(2);
+        assert_eq!(still, find(&cache, false, p, d));
+    }
+    // each axis leaves the cell with probability 1/4
+    let share = f64::from(moved_away) / f64::from(seen);
+    assert!(seen > 30_000 && (share - 37.0 / 64.0).abs() < 0.02, "{share} of {seen}");
+}
+
+/// Sums of several shards and iterations, discounted, against f64. Killed by: a field left out or added to another, a
+/// discount applied twice or to the new samples, `clear` that keeps something.
+#[test]
+fn sums_equal_an_oracle() {
+    let (mut blocks, mut rng) = (Blocks::leaves(9, 3), SplitMix(4));
+    let (mut cache, mut shards) = blocks.carve(LO, HI);
+    let mut expected = vec![[0.0f64; 12]; 32];
+    for keep in [1.0, 0.5, 0.75] {
+        expected.iter_mut().flatten().for_each(|x| *x *= keep);
+        for t in &mut shards {
+            t.clear(cache.bins());
+            for _ in 0..5000 {
+                let bin = (rng.bits() % 32) as usize;
+                let [x, pair] = [(); 2].map(|()| [(); 3].map(|()| (10.0 * rng.f32()).powi(3)));
+                let cost = 20.0 * rng.f32();
+                assert!(t.log(bin as u32, x, cost) && t.log_pair(bin as u32, pair));
+                let e = &mut expected[bin];
+                e[0] += 1.0;
+                e[1] += 1.0;
+                e[2] += f64::from(cost);
+                for c in 0..3 {
+                    let x = f64::from(x[c]);
+                    e[3 + c] += x;
+                    e[6 + c] += x * x;
+                    e[9 + c] += f64::from(pair[c]);
+                }
+            }
+        }
+        cache.begin_merge(keep);
+        shards.iter().for_each(|t| cache.absorb(t));
+    }
+    let oracle = Oracle::new(&saved(&cache));
+    for (found, expected) in oracle.leaves.iter().flatten().zip(&expected) {
+        // Some 160 positive terms in a row: each addition and square rounds by 2^-24.
+        for (f, e) in found.iter().zip(expected) {
+            assert!((f - e).abs() <= 250.0 * 2f64.powi(-24) * e, "{f} {e}");
+        }
+        assert_eq!(found[..2], expected[..2]);
+    }
+}
+
+/// A bin takes [`BIN_LIMIT`] samples an iteration and no more; 16,384 such iterations, 1.07e9 samples, keep their mean
+/// to 1e-12. The f32 sums of one iteration are within 2^-8, their rigorous bound; at 0.1 each they are off by far less.
+/// Killed by: f32 session sums, another limit, a limit that looks at values.
+#[test]
+fn a_billion_samples_keep_their_mean() {
+    let mut blocks = Blocks::leaves(2, 1);
+    let (mut cache, mut shards) = blocks.carve(LO, HI);
+    let t = &mut shards[0];
+    t.clear(cache.bins());
+    let mut rng = SplitMix(5);
+    let mut exact = 0.0;
+    for _ in 0..BIN_LIMIT {
+        let x = (4.0 * rng.f32()).powi(4);
+        exact += f64::from(x);
+        assert!(t.log(7, [0.1, x, 1.0], 3.0) && t.log_pair(7, [x; 3]));
+    }
+    assert!(!t.log(7, [1.0; 3], 1.0) && !t.log_pair(7, [1.0; 3]));
+    assert!(t.log(8, [1.0; 3], 1.0) && t.log_pair(8, [1.0; 3]));
+    cache.absorb(t);
+    let once = Oracle::new(&saved(&cache)).leaves[0][7];
+    assert_eq!(once[0], f64::from(BIN_LIMIT));
+    assert!((once[3] / (0.1f64 * 65_536.0) - 1.0).abs() < 2f64.powi(-8), "{}", once[3] / 6553.6);
+    assert!((once[4] / exact - 1.0).abs() < 1e-4, "{}", once[4] / exact);
+    (1..16_384).for_each(|_| cache.absorb(t));
+    let all = Oracle::new(&saved(&cache)).leaves[0][7];
+    assert!(all[0] == 2f64.powi(30) && all[1] == 2f64.powi(30));
+    for (a, o) in all.iter().zip(&once) {
+        assert!((a / all[0] / (o / once[0]) - 1.0).abs() < 1e-12, "{a} {o}");
+    }
+    // What is not finite is not taken, what is too large or negative is cut off.
+    t.clear(cache.bins());
+    for x in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        assert!(!t.log(3, [0.0, x, 0.0], 1.0) && !t.log(3, [0.0; 3], x) && !t.log_pair(3, [x, 0.0, 0.0]));
+    }
+    assert!(!t.log(cache.bins(), [1.0; 3], 1.0) && !t.log(u32::MAX, [1.0; 3], 1.0) && !t.log_pair(u32::MAX, [1.0; 3]));
+    (0..BIN_LIMIT).for_each(|_| assert!(t.log(3, [f32::MAX, -5.0, 2.0], f32::MAX) && t.log_pair(3, [f32::MAX; 3])));
+    cache.absorb(t);
+    cache.freeze(f64::INFINITY);
+    locals(&cache).for_each(|l| assert_sane(&l));
+    let l = cache.local(U32x8::splat(3), ALL());
+    let ratio = l.mean.lane(0).map(|x| x / MAX_VALUE);
+    assert!(ratio[0] > 0.99 && ratio[1] < 1e-3, "{ratio:?}");
+}
+
+/// Children hold exactly an eighth of their parent each, down to the level where that is few enough. Killed by: new
+/// leaves that start empty, a share of a quarter, splitting once only.
+#[test]
+fn children_inherit_their_parents_sums() {
+    let (mut blocks, mut rng) = (Blocks::leaves(200, 1), SplitMix(6));
+    let (mut cache, mut shards) = blocks.carve(LO, HI);
+    iterate(&mut cache, &mut shards, 4000, f64::INFINITY, &mut rng);
+    assert_eq!((cache.leaves(), cache.nodes()), (2, 2));
+    let before = Oracle::new(&saved(&cache));
+    let means: Vec<_> = locals(&cache).collect();
+    // 2000 a root: 250 a child, 31 a grandchild
+    cache.freeze(100.0);
+    assert_eq!((cache.leaves(), cache.nodes()), (128, 146));
+    assert_eq!(cache.splits_refused(), 0);
+    let after = Oracle::new(&saved(&cache));
+    for (i, leaf) in after.leaves.iter().enumerate() {
+        for (b, p) in leaf.iter().zip(&before.leaves[i / 64]) {
+            assert_eq!(*b, p.map(|x| x / 64.0));
+        }
+    }
+    for (k, l) in locals(&cache).enumerate() {
+        // the first leaves of each tree keep the numbers of their roots
+        let m = &means[k % 4];
+        if k < 4 {
+            assert!(((l.mean.x - m.mean.x).abs() / m.mean.x).max_lane() < 0.5);
+            assert!(((l.count - m.count / 64.0).abs()).max_lane() <= 8.01);
+        }
+        assert_sane(&l);
+    }
+}
+
+/// Killed by: writing beyond the leaves, counting nothing, splitting in the order of numbers instead of size.
+#[test]
+fn a_full_arena_refuses_and_counts() {
+    let (mut blocks, mut rng) = (Blocks::leaves(60, 1), SplitMix(7));
+    let (mut cache, mut shards) = blocks.carve(LO, HI);
+    for _ in 0..4 {
+        iterate(&mut cache, &mut shards, 40_000, 50.0, &mut rng);
+    }
+    let room = cache.size().leaves();
+    assert!(room > 50 && cache.splits_refused() > 0, "{room}");
+    assert_eq!(cache.leaves(), room);
+    let oracle = Oracle::new(&saved(&cache));
+    assert_eq!((oracle.total(0), oracle.total(1)), (160_000.0, 160_000.0));
+    let counts = oracle.leaves.iter().map(|l| l.iter().map(|b| b[0]).sum::<f64>());
+    // Both trees got half of the samples, so no leaf keeps those of a whole root.
+    assert!(counts.fold(0.0, f64::max) < 40_000.0);
+    locals(&cache).for_each(|l| assert_sane(&l));
+    let refused = cache.splits_refused();
+    cache.freeze(f64::INFINITY);
+    cache.freeze(f64::NAN);
+    assert_eq!(cache.splits_refused(), refused);
+}
+
+/// Bins are shrunk towards their leaf; leaves without samples say so; pairs take over the variance. Killed by: no
+/// shrinkage, a count that leaves out the confidence, pair sums ignored, a moment below the mean's square.
+#[test]
+fn what_is_looked_up() {
+    let mut blocks = Blocks::leaves(2, 1);
+    let (mut cache, mut shards) = blocks.carve(LO, HI);
+    let t = &mut shards[0];
+    t.clear(cache.bins());
+    // Bin 0: 0 and 2 in turns. Bin 1: always 3, pairs say 0.25. Nothing else in the first leaf, nothing in the second.
+    for i in 0..4000u32 {
+        t.log(0, [2.0 * (i % 2) as f32; 3], 5.0);
+        t.log(1, [3.0; 3], 7.0);
+        t.log_pair(1, [0.25; 3]);
+    }
+    cache.absorb(t);
+    cache.freeze(f64::INFINITY);
+    let l = cache.local(U32x8::new([0, 1, 2, 15, 16, 31, u32::MAX, 1]), Mask8::from_bits(0x7f));
+    let near = |found: [f32; 3], expected: f32| found.iter().all(|x| (x - expected).abs() <= 0.02 * expected);
+    for (lane, mean, moment, cost, count) in
+        [(0, 1.0, 2.0, 5.0, 4008.0), (1, 3.0, 9.0, 7.0, 4008.0), (2, 2.0, 5.5, 6.0, 8.0), (3, 2.0, 5.5, 6.0, 8.0)]
+    {
+        let found = [l.mean.lane(lane), l.moment.lane(lane), l.variance.lane(lane)];
+        assert!(near(found[0], mean) && near(found[1], moment), "{lane} {found:?}");
+        assert!(near([l.cost.lane(lane); 3], cost) && l.count.lane(lane) == count);
+    }
+    // Bin 0 has no pairs of its own: eight of its leaf's beside the sixteen that its spread counts for.
+    assert!(near(l.variance.lane(0), (8.0 * 0.25 + 16.0) / 24.0), "{:?}", l.variance.lane(0));
+    assert!(near(l.variance.lane(1), 0.25));
+    for lane in 4..8 {
+        assert_eq!((l.mean.lane(lane), l.moment.lane(lane), l.variance.lane(lane)), ([0.0; 3], [0.0; 3], [0.0; 3]));
+        assert_eq!((l.cost.lane(lane), l.count.lane(lane)), (0.0, 0.0));
+    }
+}
+
+/// Absorbed in shard order, the bits do not depend on which shard worked first; in another order they may. Killed by:
+/// sums shared between shards, state that survives `clear`.
+#[test]
+fn the_order_of_work_does_not_matter() {
+    let run = |order: [usize; 4]| {
+        let mut blocks = Blocks::leaves(30, 4);
+        let (mut cache, mut shards) = blocks.carve(LO, HI);
+        for round in 0..3 {
+            for s in order {
+                let mut rng = SplitMix(100 * round + s as u64);
+                shards[s].clear(cache.bins());
+                for _ in 0..3000 {
+                    let (p, d) = vertex(&mut rng);
+                    let bin = find(&cache, true, p, d);
+                    shards[s].log(bin, [(); 3].map(|()| rng.f32()), rng.f32());
+                }
+            }
+            cache.begin_merge(0.9);
+            shards.iter().for_each(|t| cache.absorb(t));
+            cache.freeze(500.0);
+        }
+        saved(&cache)
+    };
+    let bytes = run([0, 1, 2, 3]);
+    assert!(bytes.len() > 20_000);
+    assert_eq!(bytes, run([3, 1, 0, 2]));
+}
+
+/// Killed by: bytes counted too low, the second tree or the training sides forgotten, a size that could be larger.
+#[test]
+fn memory_starts_at_32_kib() {
+    for (bytes, shards) in [(32 << 10, 1), (48 << 10, 2), (64 << 10, 3), (24 << 20, 8)] {
+        let size = CacheSize::within(bytes, shards).unwrap();
+        assert!(size.bytes(shards).unwrap() <= bytes && size.leaves() >= 9);
+        assert!(size.bytes(shards).unwrap() + 7 * (1536 + 768 * (1 + shards as usize)) + 32 + 256 > bytes);
+        let mut blocks = Blocks::new(size, shards as usize);
+        let (mut cache, mut training) = blocks.carve(LO, HI);
+        iterate(&mut cache, &mut training, 2000, 100.0, &mut SplitMix(8));
+        assert!(cache.leaves() >= 9 && cache.leaves() <= size.leaves());
+    }
+    assert!(CacheSize::within(5000, 1).is_none() && CacheSize::within(6500, 1).is_some());
+    assert!(CacheSize::within(usize::MAX, u32::MAX).is_some());
+    // Bounds that are no box still give a cache.
+    for [lo, hi] in [[[0.0; 3]; 2], [[f32::NAN; 3]; 2], [[f32::MIN; 3], [f32::MAX; 3]], [[1e30; 3], [-1e30; 3]]] {
+        let mut blocks = Blocks::leaves(30, 1);
+        let (mut cache, mut training) = blocks.carve(lo, hi);
+        iterate(&mut cache, &mut training, 2000, 100.0, &mut SplitMix(9));
+        assert!(cache.leaves() > 9);
+    }
+}
