@@ -12,6 +12,7 @@
 //! | [`rrs`] | how many samples a vertex gets | where it is |
 //! | `tracer` | packets, queues, stages | files, threads, clocks |
 //! | [`film`] | sums per pixel and their error | paths |
+//! | [`denoise`] | pictures and their errors | paths, films but for one copy |
 //!
 //! A host asks how much memory is needed, hands it over, and steps the shards from as many threads as it likes:
 //!
@@ -42,6 +43,7 @@
 pub mod accel;
 pub mod bsdf;
 pub mod camera;
+pub mod denoise;
 pub mod film;
 pub mod light;
 mod memory;
