@@ -13,6 +13,7 @@
 //! | [`learn`] | statistics by place and direction | how paths are traced |
 //! | `tracer` | packets, queues, stages | files, threads, clocks |
 //! | [`film`] | sums per pixel and their error | paths |
+//! | [`denoise`] | pictures and their errors | paths, films but for one copy |
 //!
 //! A host asks how much memory is needed, hands it over, and steps the shards from as many threads as it likes:
 //!
