@@ -98,6 +98,20 @@ impl BinSums {
         }
     }
 
+    /// Adds `samples` samples, and as many pairs, that are what `prior` has on average.
+    pub(super) fn shrink(&mut self, prior: &Self, samples: f64) {
+        if prior.count > 0.0 {
+            let (pairs, pair) = (self.pairs, self.pair);
+            self.add(prior, samples / prior.count);
+            (self.pairs, self.pair) = (pairs, pair);
+        }
+        if prior.pairs > 0.0 {
+            let share = samples / prior.pairs;
+            self.pairs += samples;
+            self.pair.iter_mut().zip(prior.pair).for_each(|(a, b)| *a += share * b);
+        }
+    }
+
     pub(super) fn absorb(&mut self, r: &Record) {
         self.count += f64::from(r.count);
         self.pairs += f64::from(r.pairs);
@@ -130,38 +144,38 @@ impl Frozen {
     pub(super) const ZERO: Self =
         Self { mean: [0.0; 3], cost: 0.0, moment: [0.0; 3], count: 0.0, variance: [0.0; 3], reserved: 0.0 };
 
-    /// Of a bin in a leaf with the sums `leaf`. The bin is shrunk towards its leaf, whose mean counts for as many samples
-    /// as other bins have, at most [`LEAF_SAMPLES`].
-    fn of(bin: &BinSums, leaf: &BinSums) -> Self {
-        let others = |all: f64, own: f64| (all - own).clamp(0.0, LEAF_SAMPLES);
-        let (w, wp) = (others(leaf.count, bin.count), others(leaf.pairs, bin.pairs));
-        let (n, pairs) = (bin.count + w, bin.pairs + wp);
-        let per_sample = w / leaf.count;
-        let per_pair = if wp > 0.0 { wp / leaf.pairs } else { 0.0 };
+    /// What is known of one sample with the sums `s`.
+    fn of(s: &BinSums) -> Self {
         let mut f = Self::ZERO;
-        f.cost = saturate((bin.cost + per_sample * leaf.cost) / n, MAX_VALUE);
-        f.count = saturate(n, MAX_VALUE);
-        let sums = bin.sum.iter().zip(&leaf.sum).zip(bin.sqr.iter().zip(&leaf.sqr));
-        let sums = sums.zip(bin.pair.iter().zip(&leaf.pair));
+        let n = s.count.max(1e-300);
+        f.cost = saturate(s.cost / n, MAX_VALUE);
+        f.count = saturate(s.count, MAX_VALUE);
+        let sums = s.sum.iter().zip(&s.sqr).zip(&s.pair);
         let out = f.mean.iter_mut().zip(&mut f.moment).zip(&mut f.variance);
-        for (((mean, moment), variance), (((s, ls), (q, lq)), (p, lp))) in out.zip(sums) {
-            let (m, m2) = ((s + per_sample * ls) / n, (q + per_sample * lq) / n);
+        for (((mean, moment), variance), ((s1, s2), p)) in out.zip(sums) {
+            let (m, m2) = (s1 / n, s2 / n);
             *mean = saturate(m, MAX_VALUE);
             *moment = saturate(m2, MAX_SQUARE).max(*mean * *mean);
             let spread = (m2 - m * m).max(0.0);
-            let v = (p + per_pair * lp + SPREAD_PAIRS * spread) / (pairs + SPREAD_PAIRS);
+            let v = (p + SPREAD_PAIRS * spread) / (s.pairs + SPREAD_PAIRS);
             *variance = saturate(v, MAX_SQUARE).min(*moment);
         }
         f
     }
 }
 
-/// What look-ups read of one leaf. One without samples says so with `count` 0.
-pub(super) fn freeze_leaf(sums: &[BinSums], frozen: &mut [Frozen]) {
+/// What look-ups read of one leaf, whose surroundings have the sums `prior`. One without samples says so with `count` 0.
+pub(super) fn freeze_leaf(sums: &[BinSums], frozen: &mut [Frozen], prior: &BinSums, samples: f64) {
     let mut leaf = BinSums::ZERO;
     sums.iter().for_each(|b| leaf.add(b, 1.0));
+    let known = leaf.count > 0.0;
+    leaf.shrink(prior, samples);
     for (f, b) in frozen.iter_mut().zip(sums) {
-        *f = if leaf.count > 0.0 { Frozen::of(b, &leaf) } else { Frozen::ZERO };
+        let mut b = *b;
+        let own = b.count;
+        b.shrink(&leaf, samples);
+        *f = if known { Frozen::of(&b) } else { Frozen::ZERO };
+        f.count = saturate(own, MAX_VALUE);
     }
 }
 

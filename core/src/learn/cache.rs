@@ -67,6 +67,7 @@ pub struct Cache<'m> {
     splits_refused: u64,
     /// Leaves of a cache without a tree.
     flat: Option<u32>,
+    pub(crate) prior_samples: f64,
 }
 
 impl<'m> Cache<'m> {
@@ -90,7 +91,7 @@ impl<'m> Cache<'m> {
 
     pub(crate) fn carve(c: &mut Carver<'m>, size: CacheSize, lo: [f32; 3], hi: [f32; 3]) -> Result<Self, MemoryError> {
         let tree = Tree::carve(c, Tree::nodes_for(size.splits), size.leaves(), lo, hi)?;
-        Ok(Self { tree, sums: c.take(size.bins())?, frozen: c.take(size.bins())?, size, splits_refused: 0, flat: None })
+        Ok(Self { tree, sums: c.take(size.bins())?, frozen: c.take(size.bins())?, size, splits_refused: 0, flat: None, prior_samples: 8.0 })
     }
 
     /// The bins of eight vertices, `u32::MAX` in inactive lanes. `dir` is a unit vector in world space: the shading
@@ -195,13 +196,39 @@ impl<'m> Cache<'m> {
         true
     }
 
-    /// Computes what look-ups read.
+    /// Computes what look-ups read: every node is shrunk towards its parent, so that rare bright samples, which a cell has
+    /// not met yet but its surroundings have, are reckoned with.
     pub(super) fn refresh(&mut self) {
         self.tree.refresh();
-        let used = self.leaves() as usize * BINS;
-        let sums = self.sums.chunks_exact(BINS);
-        let frozen = self.frozen.chunks_exact_mut(BINS);
-        sums.zip(frozen).take(used / BINS).for_each(|(s, f)| freeze_leaf(s, f));
+        if let Some(leaves) = self.flat {
+            let prior = BinSums::ZERO;
+            (0..leaves).for_each(|number| self.freeze_one(number, &prior, 0.0));
+        } else {
+            (0..ROOTS).for_each(|root| self.freeze_below(root, &BinSums::ZERO));
+        }
+    }
+
+    fn freeze_below(&mut self, index: u32, prior: &BinSums) {
+        match self.tree.node(index) {
+            Node::Leaf { number, .. } => self.freeze_one(number, prior, self.prior_samples),
+            Node::Inner { child } => {
+                let mut all = BinSums::ZERO;
+                self.tree.visit(index, &mut |n| {
+                    if let Node::Leaf { number, .. } = n {
+                        self.leaf(number).iter().for_each(|b| all.add(b, 1.0));
+                    }
+                });
+                all.shrink(prior, self.prior_samples);
+                (child..child + 8).for_each(|c| self.freeze_below(c, &all));
+            }
+        }
+    }
+
+    fn freeze_one(&mut self, number: u32, prior: &BinSums, samples: f64) {
+        let bins = number as usize * BINS..(number as usize + 1) * BINS;
+        if let (Some(s), Some(f)) = (self.sums.get(bins.clone()), self.frozen.get_mut(bins)) {
+            freeze_leaf(s, f, prior, samples);
+        }
     }
 
     /// Forgets everything, the tree included.

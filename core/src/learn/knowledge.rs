@@ -211,6 +211,7 @@ impl<'m> Knowledge<'m> {
         Learned8 {
             importance,
             norm: self.learning.norm,
+            knobs: self.learning.knobs,
             cost_over_variance: F32x8::splat(self.cost_over_variance()),
             ..Learned8::NONE
         }
@@ -355,9 +356,10 @@ impl<'m> Knowledge<'m> {
     /// Ends an iteration: adds what the shards learned of the scene.
     pub(crate) fn learn_scene<'a, 'b: 'a>(&mut self, shards: impl Iterator<Item = &'a Training<'b>>) {
         if let Some(cache) = &mut self.cache {
-            cache.begin_merge(f64::from(self.learning.carry));
+            cache.prior_samples = f64::from(self.learning.knobs[4]);
+            cache.begin_merge(f64::from(self.learning.knobs[0]));
             shards.for_each(|t| cache.absorb(t));
-            cache.freeze(f64::from(self.learning.split_count));
+            cache.freeze(f64::from(self.learning.knobs[5]));
         }
     }
 

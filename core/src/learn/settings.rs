@@ -58,6 +58,8 @@ pub struct Learning {
     pub objective: Objective,
     /// How the errors of the channels become one.
     pub norm: Norm,
+    /// Experiments.
+    pub knobs: [f32; 8],
 }
 
 impl Default for Learning {
@@ -70,6 +72,7 @@ impl Default for Learning {
             estimate: Estimate::Denoised,
             objective: Objective::Relative,
             norm: Norm::Mean,
+            knobs: [0.75, 32.0, 256.0, 0.0, 8.0, 10000.0, 20.0, 0.0],
         }
     }
 }

@@ -58,8 +58,15 @@ pub(super) fn grown(v: &Vertices8, s: F32x8, plain: bool) -> F32x8 {
     let log = |x: F32x8| x.clamp(MIN_FACTOR, MAX_FACTOR).ln();
     let blend = |a: F32x8, b: F32x8, t: F32x8| a + (b - a) * t;
     let window = adrrs::window(l.contribution(v.beta));
-    let learned = blend(log(window), log(s), l.trust(TRUST_MOMENT));
-    known.select(blend(log(classic), learned, l.trust(TRUST_MEAN)).exp(), classic)
+    let learned = blend(log(window), log(s), l.trust(l.knobs[2]));
+    let s = known.select(blend(log(classic), learned, l.trust(l.knobs[1])).exp(), classic);
+    let s = s.min(F32x8::splat(l.knobs[6]));
+    if l.knobs[3] > 0.0 {
+        let g = (v.beta * v.albedo).max_component() * F32x8::splat(1.0 / l.knobs[3]);
+        s.max(g.min(F32x8::ONE))
+    } else {
+        s
+    }
 }
 
 impl RrsStrategy for Ears {
