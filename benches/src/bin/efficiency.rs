@@ -6,7 +6,8 @@
 //! is relMSE against the scene's reference, without the worst 0.01 % of the pixels, and in a second, robust figure
 //! without the worst 0.1 %: small pictures keep fireflies in the first. relMSE falls as 1 / cost, so that their product
 //! hardly depends on when the render ended, until it comes near the noise of the reference, which every relMSE contains.
-//! That noise has a column; it is subtracted only on demand.
+//! That noise has a column; it is subtracted only on demand. Where a few bright samples carry the error, leaving pixels
+//! out flatters the render with fewer samples, which has met fewer of them: compare such rows at equal samples.
 //!
 //! Figures are medians over the seeds, with the interval of [`Median`]. Speed-ups are ratios of the products of two
 //! strategies with the same seed, then their median; over all scenes, the geometric mean of these ratios per seed, then
