@@ -1,5 +1,6 @@
-//! What the benchmarks share: scenes with their references, CPU time, medians.
+//! What the benchmarks share: scenes with their references, CPU time, watched renders, medians.
 
 pub mod clock;
+pub mod measure;
 pub mod stats;
 pub mod subject;

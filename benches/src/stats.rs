@@ -16,8 +16,11 @@ pub struct Median {
 impl Median {
     /// Of independent values, with the narrowest pair of order statistics, equally far from both ends, that holds the true
     /// median with at least 95 %; of fewer than six values none does, and it is their range ([`coverage`]). This holds for
-    /// every distribution, and errors of renders have long tails. `None` of nothing.
+    /// every distribution, and errors of renders have long tails. `None` of nothing, or if a value is NaN.
     pub fn of(values: &[f64]) -> Option<Self> {
+        if values.iter().any(|x| x.is_nan()) {
+            return None;
+        }
         let mut v = values.to_vec();
         v.sort_by(f64::total_cmp);
         let (n, k) = (v.len(), left_out(v.len()));

@@ -75,6 +75,9 @@ fn the_worst_ten_thousandth_is_discarded() {
     let expected = (100.0 + (n - 1.0) * 3.0 * 0.01) / 1.01 / 3.0 / n;
     assert_eq!(e.discarded, 2);
     assert!((e.value / expected - 1.0).abs() < 1e-5, "{e:?} {expected}");
+    let three = relmse_without(&x, &reference, 1.2e-4).unwrap();
+    assert_eq!(three.discarded, 3);
+    assert!((three.value / (0.01 / 1.01) - 1.0).abs() < 1e-4, "{three:?}");
     let all = relmse(&x, &reference, true).unwrap();
     assert_eq!(all.discarded, 0);
     let expected = (1e6 + 2e4 + 100.0 + (n - 1.0) * 3.0 * 0.01) / 1.01 / 3.0 / 25_000.0;

@@ -1,35 +1,34 @@
-//! What a roulette strategy is worth: error times cost, per scene and strategy, and how much less of both it takes than
-//! the baselines.
+//! What a roulette strategy is worth: error times cost, per scene and strategy, and how much less of it than with the
+//! baselines.
 //!
-//! Every (scene, seed, strategy) is one render with one thread. It ends after a wall-clock time; what counts as its cost
-//! is the CPU time of its two threads, everything inside: setting up, learning, estimating errors. Its error is relMSE
-//! against the scene's reference, without the worst 0.01 % of pixels
-//! ([`croupier_host::compare::relmse`]), and in a second, robust figure without the worst 0.1 %. The error of a render
-//! falls as 1 / cost, so that relMSE x core-seconds does not depend on when it ended, until it comes near the noise of
-//! the reference, which every relMSE contains: it has a column and is subtracted nowhere.
+//! Every (scene, seed, strategy) is one render with one thread ([`croupier_benches::measure`]). It ends after a wall-clock
+//! time; its cost is the CPU time of its threads, everything inside: setting up, learning, estimating errors. Its error
+//! is relMSE against the scene's reference, without the worst 0.01 % of the pixels, and in a second, robust figure
+//! without the worst 0.1 %: small pictures keep fireflies in the first. relMSE falls as 1 / cost, so that their product
+//! hardly depends on when the render ended, until it comes near the noise of the reference, which every relMSE contains.
+//! That noise has a column; it is subtracted only on demand. Where a few bright samples carry the error, leaving pixels
+//! out flatters the render with fewer samples, which has met fewer of them: compare such rows at equal samples.
 //!
-//! Figures are medians over the seeds, with the interval of [`Median`]. Speed-ups are ratios of relMSE x cost of two
-//! strategies with the same seed, then their median; over all scenes, the geometric mean of those ratios per seed, then
+//! Figures are medians over the seeds, with the interval of [`Median`]. Speed-ups are ratios of the products of two
+//! strategies with the same seed, then their median; over all scenes, the geometric mean of these ratios per seed, then
 //! its median. Renders of one seed follow each other, in another order for each seed, so that what else the machine does
-//! hits all strategies.
+//! hits all strategies. A time to an error is read from the errors after the iterations ([`time_to`]).
 //!
-//! `--equal-samples N` renders N samples per pixel and takes rays as the cost. Its figures are the same on every machine.
+//! `--equal-samples N` renders N samples per pixel and takes rays as the cost: its tables are the same on every machine.
+//!
+//! [`time_to`]: croupier_benches::stats::time_to
 
 use clap::Parser;
-use croupier::{Film, Scene, Settings, Strategy};
-use croupier_benches::clock::cpu_seconds;
-use croupier_benches::stats::{Median, coverage, digits, geometric_mean, time_to};
+use croupier::Strategy;
+use croupier_benches::measure::{Run, Snapshot, render};
+use croupier_benches::stats::{Median, coverage, digits, geometric_mean};
 use croupier_benches::subject::Subject;
-use croupier_host::compare::{CompareError, relmse, relmse_without};
-use croupier_host::drive::{Options, drive_scene};
-use croupier_host::image::Rgb;
-use croupier_host::render::{Observer, Progress, Target};
+use croupier_host::render::Target;
 use serde_json::{Value, json};
 use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 const SCENES: [&str; 7] = ["kitchen", "bathroom", "living_room", "pool", "water_caustic", "cbox", "veach_mis"];
 /// Those of them that the core knows.
@@ -37,8 +36,8 @@ const STRATEGIES: [&str; 5] = ["classic", "throughput", "adrrs", "ear", "ears"];
 const BASELINES: [&str; 2] = ["classic", "adrrs"];
 /// Errors to which times are stated.
 const LEVELS: [f64; 3] = [0.1, 0.03, 0.01];
-/// Pixels that the robust error leaves out.
-const ROBUST: f64 = 1e-3;
+/// Errors below this many times the reference's noise are worth a remark.
+const CLEAR_OF_NOISE: f64 = 10.0;
 
 #[derive(Parser)]
 #[command(about = "Table of error times cost of roulette strategies")]
@@ -67,6 +66,9 @@ struct Args {
     /// Samples per pixel of each render, instead of a time.
     #[arg(long, value_name = "N", conflicts_with = "seconds", value_parser = clap::value_parser!(u32).range(1..))]
     equal_samples: Option<u32>,
+    /// Subtract the expected share of the reference's noise from every error; what is not above it counts as unknown.
+    #[arg(long)]
+    subtract_noise: bool,
     /// Fewer seeds and seconds.
     #[arg(long)]
     quick: bool,
@@ -83,155 +85,30 @@ impl Args {
         self.seeds.unwrap_or(if self.quick { 3 } else { 8 })
     }
 
+    fn seconds(&self) -> f64 {
+        self.seconds.unwrap_or(if self.quick { 5.0 } else { 30.0 })
+    }
+
     fn target(&self) -> Target {
-        let seconds = self.seconds.unwrap_or(if self.quick { 5.0 } else { 30.0 });
-        self.equal_samples.map_or(Target::Seconds(seconds), Target::Spp)
+        self.equal_samples.map_or(Target::Seconds(self.seconds()), Target::Spp)
     }
 
     fn strategies(&self) -> Result<Vec<String>, String> {
-        if self.strategies.is_empty() {
-            let names: Vec<&str> =
-                if self.all { Strategy::TABLE.iter().map(|t| t.0).collect() } else { STRATEGIES.to_vec() };
-            return Ok(names.into_iter().filter(|s| Strategy::parse(s).is_ok()).map(String::from).collect());
-        }
-        let known = |s: &String| Strategy::parse(s).map(|_| s.clone()).map_err(|e| format!("{s}: {e}"));
-        self.strategies.iter().map(known).collect()
+        let parse = |s: &str| Strategy::parse(s).map(|_| s.to_string()).map_err(|e| format!("{s}: {e}"));
+        let names: Vec<&str> = match (self.all, self.strategies.is_empty()) {
+            (false, false) => return self.strategies.iter().map(|s| parse(s)).collect(),
+            (false, true) => STRATEGIES.to_vec(),
+            (true, _) => Strategy::TABLE.iter().map(|t| t.0).collect(),
+        };
+        let left_out = |e: &String| eprintln!("left out: {e}");
+        Ok(names.into_iter().filter_map(|s| parse(s).inspect_err(left_out).ok()).collect())
     }
-}
-
-/// The picture after an iteration.
-#[derive(Clone, Copy)]
-struct Snapshot {
-    core_seconds: f64,
-    wall_seconds: f64,
-    samples: u64,
-    rays: u64,
-    error: f64,
-    robust: f64,
-}
-
-impl Snapshot {
-    fn json(&self) -> Value {
-        json!({
-            "core_seconds": self.core_seconds, "wall_seconds": self.wall_seconds, "samples": self.samples,
-            "rays": self.rays, "relmse": self.error, "relmse_robust": self.robust,
-        })
-    }
-}
-
-/// Takes the snapshots of a render, beside its clock.
-struct Watch<'a> {
-    reference: &'a Rgb,
-    /// CPU time of the calling thread at the start.
-    start: Option<f64>,
-    state: Mutex<State>,
-}
-
-#[derive(Default)]
-struct State {
-    /// CPU time of the thread that traces.
-    tracer: Option<f64>,
-    /// CPU time of the calling thread that went into snapshots.
-    paused: f64,
-    snapshots: Vec<Result<Snapshot, CompareError>>,
-}
-
-impl<'a> Watch<'a> {
-    fn start(reference: &'a Rgb) -> Self {
-        Self { reference, start: cpu_seconds(), state: Mutex::default() }
-    }
-
-    fn errors(&self, film: &Film<'_>) -> Result<[f64; 2], CompareError> {
-        let [width, height] = film.size().map(|s| s as usize);
-        let pixels = film.pixels().iter().map(|p| p.mean().map(|x| x as f32)).collect();
-        let image = Rgb { width, height, pixels };
-        let [error, robust] =
-            [relmse(&image, self.reference, false)?, relmse_without(&image, self.reference, ROBUST)?].map(|e| e.value);
-        Ok([error, robust])
-    }
-}
-
-impl Observer for Watch<'_> {
-    fn progress(&self, _: &Progress) {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner).tracer = cpu_seconds();
-    }
-
-    fn stop(&self) -> bool {
-        false
-    }
-
-    fn iteration(&self, film: &Film<'_>, seconds: f64) {
-        let now = cpu_seconds();
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let cpu = self.start.zip(now).zip(state.tracer).map(|((a, b), tracer)| b - a - state.paused + tracer);
-        let sum = |f: fn(&croupier::film::PixelStats) -> u64| film.pixels().iter().map(f).sum::<u64>();
-        state.snapshots.push(self.errors(film).map(|[error, robust]| Snapshot {
-            core_seconds: cpu.unwrap_or(seconds),
-            wall_seconds: seconds,
-            samples: sum(|p| p.samples),
-            rays: sum(|p| p.rays),
-            error,
-            robust,
-        }));
-        state.paused += cpu_seconds().zip(now).map_or(0.0, |(b, a)| b - a);
-    }
-}
-
-/// A finished render.
-struct Run {
-    seed: u64,
-    pixels: f64,
-    /// After each iteration.
-    snapshots: Vec<Snapshot>,
-    end: Snapshot,
-    /// Cost is rays per pixel, not core-seconds.
-    by_rays: bool,
-}
-
-impl Run {
-    fn cost(&self) -> f64 {
-        if self.by_rays { self.end.rays as f64 / self.pixels } else { self.end.core_seconds }
-    }
-
-    fn spp(&self) -> f64 {
-        self.end.samples as f64 / self.pixels
-    }
-
-    /// Error x cost; in rays that is relative variance of a sample x its rays.
-    fn product(&self) -> f64 {
-        self.end.error * self.cost()
-    }
-
-    fn robust_product(&self) -> f64 {
-        self.end.robust * self.cost()
-    }
-
-    fn time_to(&self, level: f64) -> Option<f64> {
-        time_to(&self.snapshots.iter().map(|s| (s.core_seconds, s.error)).collect::<Vec<_>>(), level)
-    }
-}
-
-fn render(subject: &Subject, strategy: &str, seed: u64, target: Target) -> Result<Run, Box<dyn Error>> {
-    let scene = Scene::from_bytes(&subject.baked.bytes)?;
-    let settings = Settings {
-        size: [subject.image.width as u32, subject.image.height as u32],
-        seed,
-        shards: 16,
-        strategy: Strategy::parse(strategy)?,
-        ..Settings::for_scene(&scene)
-    };
-    let watch = Watch::start(&subject.image);
-    drive_scene(scene, &Options { settings, target, threads: 1 }, &watch)?;
-    let snapshots = watch.state.into_inner().unwrap_or_else(PoisonError::into_inner).snapshots;
-    let snapshots = snapshots.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let end = *snapshots.last().ok_or("a render without an iteration")?;
-    let pixels = subject.image.pixels.len() as f64;
-    Ok(Run { seed, pixels, snapshots, end, by_rays: matches!(target, Target::Spp(_)) })
 }
 
 /// All renders of a scene: by strategy, then by seed.
 struct Group {
     scene: String,
+    /// What the reference's noise adds to relMSE.
     noise: f64,
     runs: Vec<Vec<Run>>,
 }
@@ -239,6 +116,7 @@ struct Group {
 impl Group {
     fn render(subject: &Subject, strategies: &[String], args: &Args) -> Result<Self, String> {
         let (n, seeds) = (strategies.len(), args.seeds() as usize);
+        let noise = if args.subtract_noise { subject.reference_noise() } else { 0.0 };
         let next = AtomicUsize::new(0);
         let work = || -> Result<Vec<(usize, Run)>, String> {
             let mut done = Vec::new();
@@ -248,16 +126,12 @@ impl Group {
                 if i >= seeds {
                     return Ok(done);
                 }
-                let name = format!("{}, {}", subject.name, strategies[s]);
                 let seed = args.first_seed.wrapping_add(i as u64);
-                let run =
-                    render(subject, &strategies[s], seed, args.target()).map_err(|e| format!("{name}, {seed}: {e}"))?;
-                let (e, spp) = (run.end, digits(run.spp()));
-                eprintln!(
-                    "{name}, seed {seed}: {spp} spp, {:.2} core-s, relMSE {}",
-                    e.core_seconds,
-                    digits(run.end.error)
-                );
+                let name = format!("{}, {}, seed {seed}", subject.name, strategies[s]);
+                let run = render(subject, &strategies[s], seed, args.target(), noise);
+                let run = run.map_err(|e| format!("{name}: {e}"))?;
+                let [spp, seconds, error] = [run.spp(), run.end.core_seconds, run.end.error].map(digits);
+                eprintln!("{name}: {spp} spp, {seconds} core-s, relMSE {error}");
                 done.push((s, run));
             }
         };
@@ -273,20 +147,32 @@ impl Group {
         Ok(Self { scene: subject.name.clone(), noise: subject.reference_noise(), runs })
     }
 
+    fn median(&self, strategy: usize, f: impl Fn(&Run) -> f64) -> Option<Median> {
+        Median::of(&self.runs[strategy].iter().map(f).collect::<Vec<_>>())
+    }
+
     /// Speed-up of a strategy over another, seed by seed.
-    fn ratios(&self, strategy: usize, baseline: usize, product: fn(&Run) -> f64) -> Vec<f64> {
-        self.runs[baseline].iter().zip(&self.runs[strategy]).map(|(b, s)| product(b) / product(s)).collect()
+    fn ratios(&self, strategy: usize, baseline: usize, product: Product) -> Vec<f64> {
+        let pairs = self.runs[baseline].iter().zip(&self.runs[strategy]);
+        pairs.map(|(b, s)| product.of(b) / product.of(s)).collect()
     }
 }
 
-/// The table's text for a median, `-` for none.
-fn cell(median: Option<Median>) -> String {
-    median.map_or("-".into(), |m| m.to_string())
+/// Error times cost.
+#[derive(Clone, Copy)]
+struct Product {
+    /// In rays per pixel, not core-seconds: relative variance of a sample x its rays.
+    by_rays: bool,
+    robust: bool,
 }
 
-/// Speed-ups are read with their unit.
-fn times(median: Option<Median>) -> String {
-    median.map_or("-".into(), |m| format!("{:.2}x [{:.2}, {:.2}]", m.median, m.low, m.high))
+impl Product {
+    /// NaN if the error is not above the noise.
+    fn of(self, run: &Run) -> f64 {
+        let error = if self.robust { run.end.robust } else { run.end.error };
+        let cost = if self.by_rays { run.end.rays as f64 / run.pixels as f64 } else { run.end.core_seconds };
+        if error > 0.0 { error * cost } else { f64::NAN }
+    }
 }
 
 struct Report<'a> {
@@ -296,127 +182,154 @@ struct Report<'a> {
 }
 
 impl Report<'_> {
-    fn head(&self) -> String {
-        let what = match self.args.target() {
-            Target::Spp(n) => format!("{n} samples per pixel each"),
-            Target::Seconds(s) => format!("{} s each", digits(s)),
-            _ => String::new(),
-        };
-        let n = self.args.seeds();
-        format!(
-            "# Error times cost\n\nMade by `cargo run --release -p croupier-benches --bin efficiency`; what the figures \
-             are is said in `benches/src/bin/efficiency.rs`.\n{n} seeds, {what}. Intervals hold the true median with \
-             {:.0} %.",
-            100.0 * coverage(n as usize)
-        )
+    fn product(&self, robust: bool) -> Product {
+        Product { by_rays: self.args.equal_samples.is_some(), robust }
     }
 
     fn baselines(&self) -> [Option<usize>; 2] {
         BASELINES.map(|b| self.strategies.iter().position(|s| s == b))
     }
 
+    /// Speed-ups over the baselines, with the plain error and with the robust one.
+    fn over(&self, f: impl Fn(usize, Product) -> Vec<f64>) -> [Option<Median>; 4] {
+        let [a, b] = self.baselines();
+        [(a, false), (b, false), (a, true), (b, true)].map(|(b, robust)| Median::of(&f(b?, self.product(robust))))
+    }
+
+    fn in_scene(&self, g: &Group, strategy: usize) -> [Option<Median>; 4] {
+        self.over(|baseline, product| g.ratios(strategy, baseline, product))
+    }
+
+    /// Geometric means over the scenes.
+    fn in_all(&self, strategy: usize) -> [Option<Median>; 4] {
+        self.over(|baseline, product| {
+            let scenes: Vec<Vec<f64>> = self.groups.iter().map(|g| g.ratios(strategy, baseline, product)).collect();
+            let of_seed = |i| geometric_mean(&scenes.iter().map(|s| s[i]).collect::<Vec<_>>());
+            (0..self.args.seeds() as usize).map(of_seed).collect()
+        })
+    }
+
+    fn head(&self) -> String {
+        let what = self.args.equal_samples.map_or_else(
+            || format!("{} s, one thread", digits(self.args.seconds())),
+            |n| format!("{n} samples per pixel"),
+        );
+        let noise = if self.args.subtract_noise { "the reference's noise is subtracted" } else { "nothing subtracted" };
+        let n = self.args.seeds();
+        format!(
+            "# Error times cost\n\n\
+             Made by `cargo run --release -p croupier-benches --bin efficiency`; what the figures are is said in\n\
+             `benches/src/bin/efficiency.rs`. {n} seeds, {what}; {noise}.\nMedians [intervals] over the seeds: the \
+             chance that the true median lies inside is {:.0} %. A star: without the worst 0.1 % of\nthe pixels, else \
+             without 0.01 %.",
+            100.0 * coverage(n as usize)
+        )
+    }
+
     fn table(&self, g: &Group) -> String {
         let by_rays = self.args.equal_samples.is_some();
-        let mut columns = vec!["strategy", "spp", "rays/sample"];
-        let cost = if by_rays {
-            columns.extend([
-                "variance per sample",
-                "without worst 0.1 %",
-                "reference noise x spp",
-                "1 / (variance x rays)",
-            ]);
-            ["over classic", "over adrrs"].as_slice()
+        let columns = if by_rays {
+            "strategy | spp | rays/sample | V: variance of a sample | V* | reference noise x spp | 1 / (V x rays) | \
+             over classic | over adrrs | over classic* | over adrrs*"
         } else {
-            columns.extend(["Mrays/s", "relMSE", "without worst 0.1 %", "reference noise", "relMSE x core-s"]);
-            ["over classic", "over adrrs", "s to 0.1", "s to 0.03", "s to 0.01"].as_slice()
+            "strategy | spp | rays/sample | Mrays/s | relMSE | relMSE* | reference noise | relMSE x core-s | \
+             over classic | over adrrs | over classic* | over adrrs* | s to 0.1 | s to 0.03 | s to 0.01"
         };
-        columns.extend(cost);
-        let mut text = format!("\n## {}\n\n| {} |\n|{}\n", g.scene, columns.join(" | "), "---|".repeat(columns.len()));
+        let mut text = format!("\n## {}\n\n{}", g.scene, table_head(columns));
+        let mut noisy = false;
         for (s, name) in self.strategies.iter().enumerate() {
-            let of = |f: &dyn Fn(&Run) -> f64| Median::of(&g.runs[s].iter().map(f).collect::<Vec<_>>());
-            let middle = |f: &dyn Fn(&Run) -> f64| of(f).map_or("-".into(), |m| digits(m.median));
-            let mut cells = vec![name.clone(), middle(&Run::spp)];
-            cells.push(middle(&|r| r.end.rays as f64 / r.end.samples as f64));
+            let middle = |f: &dyn Fn(&Run) -> f64| known(g.median(s, f), |m| digits(m.median));
+            let with_interval = |f: &dyn Fn(&Run) -> f64| known(g.median(s, f), |m| m.to_string());
+            let product = |r: &Run| self.product(false).of(r);
+            let mut cells = vec![marked(name), middle(&Run::spp), middle(&Run::rays_per_sample)];
             if by_rays {
-                cells.push(cell(of(&|r| r.end.error * r.spp())));
-                cells.push(cell(of(&|r| r.end.robust * r.spp())));
-                cells.push(middle(&|r| g.noise * r.spp()));
-                cells.push(cell(of(&|r| 1.0 / r.product())));
+                cells.extend([
+                    with_interval(&|r| r.end.error * r.spp()),
+                    with_interval(&|r| r.end.robust * r.spp()),
+                    middle(&|r| g.noise * r.spp()),
+                    with_interval(&|r| 1.0 / product(r)),
+                ]);
             } else {
-                cells.push(middle(&|r| r.end.rays as f64 * 1e-6 / r.end.core_seconds));
-                cells.push(cell(of(&|r| r.end.error)));
-                cells.push(middle(&|r| r.end.robust));
-                cells.push(digits(g.noise));
-                cells.push(cell(of(&Run::product)));
+                cells.extend([
+                    middle(&|r| r.end.rays as f64 * 1e-6 / r.end.core_seconds),
+                    with_interval(&|r| r.end.error),
+                    with_interval(&|r| r.end.robust),
+                    digits(g.noise),
+                    with_interval(&product),
+                ]);
             }
-            let over = |b: usize| Median::of(&g.ratios(s, b, Run::product));
-            cells.extend(self.baselines().map(|b| times(b.and_then(over))));
+            cells.extend(self.in_scene(g, s).map(speed_up));
             if !by_rays {
                 // a seed that did not get there took longer than any that did
-                let time = |level| of(&|r| r.time_to(level).unwrap_or(f64::INFINITY)).map(|m| m.median);
-                let reached = |t: Option<f64>| t.filter(|t| t.is_finite()).map_or("-".into(), digits);
+                let time = |level| g.median(s, |r| r.seconds_to(level).unwrap_or(f64::INFINITY));
+                let reached = |t: Option<Median>| known(t.filter(|t| t.median.is_finite()), |t| digits(t.median));
                 cells.extend(LEVELS.map(|level| reached(time(level))));
             }
             text += &format!("| {} |\n", cells.join(" | "));
+            noisy |= g.median(s, |r| r.end.error).is_some_and(|m| m.median < CLEAR_OF_NOISE * g.noise);
+        }
+        if noisy && !self.args.subtract_noise {
+            text += "\nSome errors are less than ten times the reference's noise, which they contain: speed-ups are \
+                     pulled to 1, and\nlower errors cannot be reached. See `--subtract-noise`.\n";
         }
         text
     }
 
-    /// Speed-up over a baseline, geometric mean over the scenes.
-    fn mean(&self, strategy: usize, baseline: usize, product: fn(&Run) -> f64) -> Option<Median> {
-        let scenes: Vec<Vec<f64>> = self.groups.iter().map(|g| g.ratios(strategy, baseline, product)).collect();
-        let of_seed = |i| geometric_mean(&scenes.iter().map(|s| s[i]).collect::<Vec<_>>());
-        Median::of(&(0..self.args.seeds() as usize).map(of_seed).collect::<Vec<_>>())
-    }
-
-    fn means(&self, strategy: usize) -> [Option<Median>; 4] {
-        let [classic, adrrs] = self.baselines();
-        let mean = |b: Option<usize>, product| b.and_then(|b| self.mean(strategy, b, product));
-        [
-            mean(classic, Run::product),
-            mean(adrrs, Run::product),
-            mean(classic, Run::robust_product),
-            mean(adrrs, Run::robust_product),
-        ]
-    }
-
     fn summary(&self) -> String {
-        let mut text = format!(
-            "\n## Geometric mean over {} scenes\n\n| strategy | over classic | over adrrs | over classic, without worst \
-             0.1 % | over adrrs, without worst 0.1 % |\n|---|---|---|---|---|\n",
-            self.groups.len()
-        );
+        let columns = "strategy | over classic | over adrrs | over classic* | over adrrs*";
+        let mut text = format!("\n## Geometric mean over the scenes ({})\n\n", self.groups.len());
+        text += &table_head(columns);
         for (s, name) in self.strategies.iter().enumerate() {
-            text += &format!("| {name} | {} |\n", self.means(s).map(times).join(" | "));
+            text += &format!("| {} | {} |\n", marked(name), self.in_all(s).map(speed_up).join(" | "));
         }
         text
     }
 
     fn json(&self) -> Value {
+        let medians = |m: [Option<Median>; 4]| m.map(|m| m.map(|m| [m.median, m.low, m.high]));
         let run = |r: &Run| {
             json!({
-                "seed": r.seed, "spp": r.spp(), "end": r.end.json(), "product": r.product(),
-                "product_robust": r.robust_product(), "seconds_to": LEVELS.map(|l| r.time_to(l)),
+                "seed": r.seed, "spp": r.spp(), "end": r.end.json(), "product": self.product(false).of(r),
+                "product_robust": self.product(true).of(r), "seconds_to": LEVELS.map(|l| r.seconds_to(l)),
                 "snapshots": r.snapshots.iter().map(Snapshot::json).collect::<Vec<_>>(),
             })
         };
-        let median = |m: Option<Median>| m.map(|m| [m.median, m.low, m.high]);
         let row = |g: &Group, s: usize| {
-            let over = |b: usize| median(Median::of(&g.ratios(s, b, Run::product)));
-            json!({
-                "strategy": self.strategies[s], "runs": g.runs[s].iter().map(run).collect::<Vec<_>>(),
-                "over": self.baselines().map(|b| b.and_then(over)),
-            })
+            let runs = g.runs[s].iter().map(run).collect::<Vec<_>>();
+            json!({ "strategy": self.strategies[s], "over": medians(self.in_scene(g, s)), "runs": runs })
         };
-        let rows = |g: &Group| (0..self.strategies.len()).map(|s| row(g, s)).collect::<Vec<_>>();
+        let strategies = 0..self.strategies.len();
+        let rows = |g: &Group| strategies.clone().map(|s| row(g, s)).collect::<Vec<_>>();
         let group = |g: &Group| json!({ "scene": g.scene, "reference_noise": g.noise, "strategies": rows(g) });
-        let mean = |s: usize| json!({ "strategy": self.strategies[s], "over": self.means(s).map(median) });
+        let mean = |s: usize| json!({ "strategy": self.strategies[s], "over": medians(self.in_all(s)) });
         json!({
-            "equal_samples": self.args.equal_samples, "seeds": self.args.seeds(), "coverage": coverage(self.args.seeds() as usize),
-            "baselines": BASELINES, "levels": LEVELS, "scenes": self.groups.iter().map(group).collect::<Vec<_>>(),
-            "geometric_means": (0..self.strategies.len()).map(mean).collect::<Vec<_>>(),
+            "seeds": self.args.seeds(), "coverage": coverage(self.args.seeds() as usize),
+            "seconds": self.args.equal_samples.is_none().then(|| self.args.seconds()),
+            "equal_samples": self.args.equal_samples, "subtract_noise": self.args.subtract_noise,
+            "over": ["classic", "adrrs", "classic, robust", "adrrs, robust"], "levels": LEVELS,
+            "scenes": self.groups.iter().map(group).collect::<Vec<_>>(),
+            "geometric_means": strategies.clone().map(mean).collect::<Vec<_>>(),
         })
     }
+}
+
+fn table_head(columns: &str) -> String {
+    format!("| {columns} |\n|{}\n", "---|".repeat(columns.matches('|').count() + 1))
+}
+
+/// A strategy's name. What ends paths for ever is quick, and its relMSE hides that while noise is larger.
+fn marked(strategy: &str) -> String {
+    let biased = Strategy::parse(strategy).is_ok_and(|s| s.is_biased());
+    format!("{strategy}{}", if biased { " (biased)" } else { "" })
+}
+
+/// A cell of a table; `-` if there is nothing to say.
+fn known(m: Option<Median>, text: impl Fn(Median) -> String) -> String {
+    m.map_or("-".into(), text)
+}
+
+fn speed_up(m: Option<Median>) -> String {
+    known(m, |m| format!("{:.2}x [{:.2}, {:.2}]", m.median, m.low, m.high))
 }
 
 fn run(args: &Args) -> Result<(), Box<dyn Error>> {

@@ -1,0 +1,146 @@
+//! One render, watched: its error against the reference and its cost after every iteration.
+
+use crate::clock::cpu_seconds;
+use crate::stats::time_to;
+use crate::subject::Subject;
+use croupier::film::PixelStats;
+use croupier::{Film, Scene, Settings, Strategy};
+use croupier_host::compare::{CompareError, relmse, relmse_without};
+use croupier_host::drive::{Options, drive_scene};
+use croupier_host::image::Rgb;
+use croupier_host::render::{Observer, Progress, Target};
+use serde_json::{Value, json};
+use std::error::Error;
+use std::sync::{Mutex, PoisonError};
+
+/// Pixels that the robust error leaves out.
+pub const ROBUST: f64 = 1e-3;
+
+/// The picture after an iteration.
+#[derive(Clone, Copy, Debug)]
+pub struct Snapshot {
+    /// CPU time so far of the threads that render; wall time where the platform does not tell.
+    pub core_seconds: f64,
+    /// Wall time so far.
+    pub wall_seconds: f64,
+    /// Camera samples so far.
+    pub samples: u64,
+    /// Rays so far.
+    pub rays: u64,
+    /// relMSE without the worst 0.01 % of the pixels.
+    pub error: f64,
+    /// relMSE without the worst part [`ROBUST`].
+    pub robust: f64,
+}
+
+impl Snapshot {
+    /// All figures.
+    pub fn json(&self) -> Value {
+        json!({
+            "core_seconds": self.core_seconds, "wall_seconds": self.wall_seconds, "samples": self.samples,
+            "rays": self.rays, "relmse": self.error, "relmse_robust": self.robust,
+        })
+    }
+}
+
+/// A finished render.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Its seed.
+    pub seed: u64,
+    /// Pixels of the picture.
+    pub pixels: usize,
+    /// After each iteration.
+    pub snapshots: Vec<Snapshot>,
+    /// The last of them.
+    pub end: Snapshot,
+}
+
+impl Run {
+    /// Camera samples per pixel.
+    pub fn spp(&self) -> f64 {
+        self.end.samples as f64 / self.pixels as f64
+    }
+
+    /// Rays per camera sample.
+    pub fn rays_per_sample(&self) -> f64 {
+        self.end.rays as f64 / self.end.samples as f64
+    }
+
+    /// Core-seconds until relMSE came down to `level`; `None` if it did not.
+    pub fn seconds_to(&self, level: f64) -> Option<f64> {
+        time_to(&self.snapshots.iter().map(|s| (s.core_seconds, s.error)).collect::<Vec<_>>(), level)
+    }
+}
+
+/// Renders with one thread. `noise` is subtracted from every error.
+pub fn render(subject: &Subject, strategy: &str, seed: u64, target: Target, noise: f64) -> Result<Run, Box<dyn Error>> {
+    let scene = Scene::from_bytes(&subject.baked.bytes)?;
+    let settings = Settings {
+        size: [subject.image.width as u32, subject.image.height as u32],
+        seed,
+        shards: 16,
+        strategy: Strategy::parse(strategy)?,
+        ..Settings::for_scene(&scene)
+    };
+    let watch = Watch { reference: &subject.image, noise, start: cpu_seconds(), state: Mutex::default() };
+    drive_scene(scene, &Options { settings, target, threads: 1 }, &watch)?;
+    let snapshots = watch.state.into_inner().unwrap_or_else(PoisonError::into_inner).snapshots;
+    let snapshots = snapshots.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let end = *snapshots.last().ok_or("a render without an iteration")?;
+    Ok(Run { seed, pixels: subject.image.pixels.len(), snapshots, end })
+}
+
+/// Takes the snapshots.
+struct Watch<'a> {
+    reference: &'a Rgb,
+    noise: f64,
+    /// CPU time of the calling thread at the start.
+    start: Option<f64>,
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
+    /// CPU time of the thread that traces: it lives as long as the render.
+    tracer: Option<f64>,
+    /// CPU time of the calling thread that went into snapshots.
+    paused: f64,
+    snapshots: Vec<Result<Snapshot, CompareError>>,
+}
+
+impl Watch<'_> {
+    fn snapshot(&self, film: &Film<'_>, core_seconds: f64, wall_seconds: f64) -> Result<Snapshot, CompareError> {
+        let [width, height] = film.size().map(|s| s as usize);
+        let pixels = film.pixels().iter().map(|p| p.mean().map(|x| x as f32)).collect();
+        let image = Rgb { width, height, pixels };
+        let sum = |f: fn(&PixelStats) -> u64| film.pixels().iter().map(f).sum::<u64>();
+        Ok(Snapshot {
+            core_seconds,
+            wall_seconds,
+            samples: sum(|p| p.samples),
+            rays: sum(|p| p.rays),
+            error: relmse(&image, self.reference, false)?.value - self.noise,
+            robust: relmse_without(&image, self.reference, ROBUST)?.value - self.noise,
+        })
+    }
+}
+
+impl Observer for Watch<'_> {
+    fn progress(&self, _: &Progress) {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).tracer = cpu_seconds();
+    }
+
+    fn stop(&self) -> bool {
+        false
+    }
+
+    fn iteration(&self, film: &Film<'_>, seconds: f64) {
+        let now = cpu_seconds();
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let cpu = self.start.zip(now).zip(state.tracer).map(|((a, b), tracer)| b - a - state.paused + tracer);
+        let snapshot = self.snapshot(film, cpu.unwrap_or(seconds), seconds);
+        state.snapshots.push(snapshot);
+        state.paused += cpu_seconds().zip(now).map_or(0.0, |(b, a)| b - a);
+    }
+}

@@ -1,0 +1,50 @@
+//! What an observer of a render is shown, and what it costs the render.
+
+use croupier::{Film, Scene, Settings};
+use croupier_host::bake::{BakeOptions, bake};
+use croupier_host::builtin;
+use croupier_host::drive::{Options, Unobserved, drive};
+use croupier_host::render::{Observer, Progress, Target};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+/// Notes what each iteration shows, and dawdles.
+#[derive(Default)]
+struct Slow {
+    seen: Mutex<Vec<(u64, f64, f64)>>,
+    pause: Duration,
+}
+
+impl Observer for Slow {
+    fn progress(&self, _: &Progress) {}
+
+    fn stop(&self) -> bool {
+        false
+    }
+
+    fn iteration(&self, film: &Film<'_>, seconds: f64) {
+        let sum = film.pixels().iter().map(|p| p.mean()[0]).sum();
+        self.seen.lock().unwrap().push((film.pixels()[0].samples, sum, seconds));
+        std::thread::sleep(self.pause);
+    }
+}
+
+/// Killed by: showing the film before its shards are merged, counting the observer's time, leaving out the last iteration.
+#[test]
+fn iterations_are_shown_outside_the_clock() {
+    let scene = bake(&builtin::cornell_box(), &BakeOptions::default(), |_, _| ()).unwrap();
+    let settings =
+        Settings { size: [8, 8], shards: 3, ..Settings::for_scene(&Scene::from_bytes(&scene.bytes).unwrap()) };
+    let options = Options { settings, target: Target::Spp(9), threads: 1 };
+    let observer = Slow { pause: Duration::from_millis(300), ..Slow::default() };
+    let start = Instant::now();
+    let rendered = drive(&scene.bytes, &options, &observer).unwrap();
+    let elapsed = start.elapsed();
+
+    let seen = observer.seen.into_inner().unwrap();
+    assert_eq!(seen.iter().map(|s| s.0).collect::<Vec<_>>(), [1, 2, 4, 8, 9]);
+    assert_eq!(seen[4].1, rendered.pixels.iter().map(|p| p.mean()[0]).sum::<f64>());
+    assert!(seen.windows(2).all(|w| w[0].2 <= w[1].2) && seen[4].2 <= rendered.seconds, "{seen:?}");
+    assert!(rendered.seconds + 5.0 * observer.pause.as_secs_f64() <= elapsed.as_secs_f64(), "{}", rendered.seconds);
+    assert_eq!(rendered.hash(), drive(&scene.bytes, &options, &Unobserved).unwrap().hash());
+}
