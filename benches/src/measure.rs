@@ -81,10 +81,14 @@ pub fn render(subject: &Subject, strategy: &str, seed: u64, target: Target, nois
         seed,
         shards: 16,
         strategy: Strategy::parse(strategy)?,
+        learning: knobs(),
+        aovs: true,
         ..Settings::for_scene(&scene)
     };
     let watch = Watch { reference: &subject.image, noise, start: cpu_seconds(), state: Mutex::default() };
-    drive_scene(scene, &Options { settings, target, threads: 1 }, &watch)?;
+    let truth = std::env::var_os("TRUTH").is_some();
+    let estimate = truth.then_some(&*subject.image.pixels);
+    drive_scene(scene, &Options { settings, target, threads: 1, estimate }, &watch)?;
     let snapshots = watch.state.into_inner().unwrap_or_else(PoisonError::into_inner).snapshots;
     let snapshots = snapshots.into_iter().collect::<Result<Vec<_>, _>>()?;
     let end = *snapshots.last().ok_or("a render without an iteration")?;
@@ -143,4 +147,14 @@ impl Observer for Watch<'_> {
         state.snapshots.push(snapshot);
         state.paused += cpu_seconds().zip(now).map_or(0.0, |(b, a)| b - a);
     }
+}
+
+fn knobs() -> croupier::learn::Learning {
+    let mut l = croupier::learn::Learning::default();
+    for (k, x) in l.knobs.iter_mut().zip(std::env::var("KNOBS").unwrap_or_default().split(',')) {
+        if let Ok(x) = x.parse() {
+            *k = x;
+        }
+    }
+    l
 }

@@ -64,6 +64,6 @@ pub use film::{ErrorEstimate, Film};
 pub use memory::{BLOCK_ALIGN, Layout, MemoryError};
 pub use rrs::Strategy;
 pub use scene::{Effects, Scene, SceneError};
-pub use session::{Iteration, Session, SessionError};
+pub use session::{Iteration, Phase, Session, SessionError};
 pub use settings::{HARD_STOP, MIN_RING, Plan, Settings, SettingsError};
 pub use tracer::{BYTES_PER_PATH, Budget, Counters, Progress, Shard, ShardError, Utilisation};

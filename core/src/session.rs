@@ -81,6 +81,17 @@ pub struct Iteration {
     pub samples: u32,
 }
 
+/// What the end of an iteration consists of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// The shards' pixels are in the film.
+    Merged,
+    /// The pixels are estimated (denoised).
+    Estimated,
+    /// The scene's statistics are merged, their tree is rebuilt.
+    Learned,
+}
+
 /// The shared side of a render: scene, intersector and film.
 #[derive(Debug)]
 pub struct Session<'s, 'm, P: Profile, I: Intersector> {
@@ -130,6 +141,7 @@ impl<'s, 'm, P: Profile, I: Intersector> Session<'s, 'm, P, I> {
         let i = self.iteration;
         self.iteration =
             Iteration { number: i.number + 1, first_sample: i.first_sample.wrapping_add(i.samples), samples };
+        self.knowledge.begin(samples, &self.film);
         self.running = true;
     }
 
@@ -138,6 +150,15 @@ impl<'s, 'm, P: Profile, I: Intersector> Session<'s, 'm, P, I> {
     pub fn end_iteration<'a, 'b: 'a>(
         &mut self,
         shards: impl IntoIterator<Item = &'a Shard<'b>> + Clone,
+    ) -> Result<(), SessionError> {
+        self.end_iteration_in_phases(shards, |_| ())
+    }
+
+    /// [`Self::end_iteration`] for hosts with a clock: `passed` is called after each phase.
+    pub fn end_iteration_in_phases<'a, 'b: 'a>(
+        &mut self,
+        shards: impl IntoIterator<Item = &'a Shard<'b>> + Clone,
+        mut passed: impl FnMut(Phase),
     ) -> Result<(), SessionError> {
         if !self.running {
             return Err(SessionError::NoIteration);
@@ -166,11 +187,17 @@ impl<'s, 'm, P: Profile, I: Intersector> Session<'s, 'm, P, I> {
         };
         let weight = self.knowledge.weigh(&counters, visit);
         for s in shards.clone() {
-            s.for_each_pixel(|i, sums, aov| self.film.merge(i, sums, aov, weight));
+            s.for_each_pixel(|i, sums, aov| {
+                let w = self.knowledge.weight_of(i, weight);
+                self.film.merge(i, sums, aov, w);
+            });
         }
         self.counters.merge(&counters);
+        passed(Phase::Merged);
         self.knowledge.learn_picture(&self.film, &counters, visit);
+        passed(Phase::Estimated);
         self.knowledge.learn_scene(shards.into_iter().filter_map(|s| s.training.as_ref()));
+        passed(Phase::Learned);
         self.running = false;
         Ok(())
     }

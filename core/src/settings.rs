@@ -35,6 +35,9 @@ pub struct Settings {
     pub split_budget: u32,
     /// Also gather albedo, normal, depth and factors.
     pub aovs: bool,
+    /// Give pixels with much error more samples, others fewer, from the second iteration on. Every pixel gets one at
+    /// least, and iterations are weighted as a whole, so that no pixel's mean hangs on its own noise.
+    pub adaptive: bool,
     /// Play roulette for shadow rays too, with the most efficient factor.
     pub shadow_roulette: bool,
     /// What stands in for samples that roulette skips.
@@ -55,6 +58,7 @@ impl Settings {
             ring: 512,
             split_budget: 4096,
             aovs: false,
+            adaptive: false,
             shadow_roulette: false,
             constant: Constant::Off,
             learning: Learning::default(),

@@ -72,6 +72,8 @@ fn log(cache: &Cache<'_>, t: &mut Training<'_>, packets: &[Packet]) {
     let bins: Vec<_> = packets.iter().map(|k| cache.find(k.matte, k.p, k.d, Mask8::all_lanes()).to_array()).collect();
     let x = packets.iter().map(|k| k.jitter.map(|j| j.lane(0)));
     let samples: Vec<_> = bins.iter().zip(x).collect();
+    t.clear(cache.bins());
+    assert!(samples.iter().all(|(bins, x)| bins.iter().all(|b| t.log(*b, *x, 2.0))), "a sample was refused");
     let ns = time(8 * PACKETS, || {
         t.clear(cache.bins());
         for (bins, x) in &samples {

@@ -26,7 +26,7 @@ pub struct CacheSize {
 
 impl CacheSize {
     /// The largest cache whose shared side and `shards` training sides fit in `bytes` together; `None` if none does.
-    /// The smallest, two leaves that never split, takes 5 KiB and 1.5 KiB more for each shard.
+    /// The smallest, two leaves that never split, takes 4736 bytes and 1536 more for each shard.
     pub fn within(bytes: usize, shards: u32) -> Option<Self> {
         let fits = |splits: u32| Self { splits }.bytes(shards).is_some_and(|b| b <= bytes);
         if !fits(0) {
@@ -278,7 +278,7 @@ impl<'m> Cache<'m> {
         self.size
     }
 
-    /// Leaves that were too large but found no room, summed over all calls of [`Self::freeze`] and [`Self::merge`].
+    /// Splits that found no room: leaves too large at a [`Self::freeze`], inner nodes of what was merged.
     pub fn splits_refused(&self) -> u64 {
         self.splits_refused
     }

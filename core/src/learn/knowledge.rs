@@ -4,7 +4,7 @@ use super::cache::{Cache, CacheSize, Training};
 use super::settings::{Learning, Objective};
 use super::{COST_BOUNCE, COST_CAMERA, COST_SHADOW};
 use crate::denoise::{self, Noisy};
-use crate::film::{Film, PixelSums, REL_MSE_EPSILON, kth_largest};
+use crate::film::{Film, PixelSums, REL_MSE_EPSILON, SqrtNewton, kth_largest};
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::rrs::{Learned8, Norm};
 use crate::scene::Scene;
@@ -20,9 +20,12 @@ const DEPTHS: u32 = 16;
 /// section 5.2: 0.001 %).
 const OUTLIERS: f64 = 1e-5;
 
-/// Share of the pixels left out where pictures of iterations are weighed against each other: a weight must not depend on
-/// the rare bright samples that it weighs.
-const WEIGHING_OUTLIERS: f64 = 1e-2;
+/// Iterations count at most this much more than their work says.
+const LARGEST_GAIN: f64 = 10.0;
+
+/// Fewest and most samples of a pixel over the mean.
+const LEAST_SHARE: f64 = 0.25;
+const MOST_SHARE: f64 = 8.0;
 
 /// How the estimate of the pixels is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -43,8 +46,6 @@ pub struct PictureStatistics {
     pub outliers: f64,
     /// Mean counted cost (eq. 33).
     pub cost: f64,
-    /// The variance without the worst 1 % of the pixels, by which the iteration's picture is weighted.
-    pub robust: f64,
 }
 
 /// Everything learned, frozen while an iteration runs.
@@ -60,13 +61,17 @@ pub(crate) struct Knowledge<'m> {
     /// Colour, variance, albedo and normal planes of the denoiser's input.
     planes: [&'m mut [f32]; 12],
     scratch: &'m mut [f32],
+    /// Camera samples per pixel of each tile in this iteration; empty without adaptive sampling.
+    counts: &'m mut [u32],
+    /// Mean of `counts` over the pixels that was asked for.
+    samples: u32,
     /// The picture per camera sample: of the last iteration, and blended over the iterations.
     last: PictureStatistics,
     blended: PictureStatistics,
     /// What `blended` weighs.
     weight: f64,
-    /// Robust variance of the first iteration; the unit of picture weights.
-    first: f64,
+    /// Cost and variance of the first iteration.
+    first: [f64; 2],
     /// An estimate of the pixels exists.
     estimated: bool,
     /// The host provides the estimate.
@@ -76,7 +81,7 @@ pub(crate) struct Knowledge<'m> {
 
 /// Does anything need the statistics of the picture?
 fn needs_image(s: &Settings) -> bool {
-    s.strategy.needs_image() || s.shadow_roulette
+    s.strategy.needs_image() || s.shadow_roulette || s.adaptive
 }
 
 fn estimates(s: &Settings) -> usize {
@@ -84,8 +89,13 @@ fn estimates(s: &Settings) -> usize {
     match s.learning.estimate {
         _ if !needs_image(s) => 0,
         Estimate::Denoised => w as usize * h as usize,
-        Estimate::Blocks => w.div_ceil(TILE) as usize * h.div_ceil(TILE) as usize,
+        Estimate::Blocks => tiles(s),
     }
+}
+
+fn tiles(s: &Settings) -> usize {
+    let [w, h] = s.size.map(|n| n.div_ceil(TILE) as usize);
+    w * h
 }
 
 /// Values per denoiser plane and in its scratch.
@@ -102,7 +112,8 @@ impl<'m> Knowledge<'m> {
         let m = cache.map_or(m, |size| Cache::measure(m, size));
         let m = (0..3).fold(m, |m, _| m.add::<f32>(estimates(s)));
         let [plane, scratch] = planes(s);
-        (0..12).fold(m, |m, _| m.add::<f32>(plane)).add::<f32>(scratch)
+        let m = (0..12).fold(m, |m, _| m.add::<f32>(plane)).add::<f32>(scratch);
+        m.add::<u32>(if s.adaptive { tiles(s) } else { 0 })
     }
 
     pub(crate) fn carve(
@@ -121,10 +132,12 @@ impl<'m> Knowledge<'m> {
             estimate: core::array::from_fn(|_| Default::default()),
             planes: core::array::from_fn(|_| Default::default()),
             scratch: &mut [],
+            counts: &mut [],
+            samples: 1,
             last: PictureStatistics::default(),
             blended: PictureStatistics::default(),
             weight: 0.0,
-            first: 0.0,
+            first: [0.0; 2],
             estimated: false,
             given: false,
             needed: needs_image(s),
@@ -137,6 +150,7 @@ impl<'m> Knowledge<'m> {
             *p = c.take(plane)?;
         }
         k.scratch = c.take(scratch)?;
+        k.counts = c.take(if s.adaptive { tiles(s) } else { 0 })?;
         if s.strategy.space() == Some(crate::rrs::Space::Image) {
             let blocks = s.size[0].div_ceil(k.block) * s.size[1].div_ceil(k.block);
             if let Some(c) = &mut k.cache {
@@ -179,16 +193,89 @@ impl<'m> Knowledge<'m> {
     fn estimate_index(&self, film: u32) -> usize {
         match self.learning.estimate {
             Estimate::Denoised => film as usize,
-            Estimate::Blocks => {
-                let (x, y) = (film % self.size[0] / TILE, film / self.size[0] / TILE);
-                (y * self.size[0].div_ceil(TILE) + x) as usize
+            Estimate::Blocks => self.tile_of(film),
+        }
+    }
+
+    fn tile_of(&self, film: u32) -> usize {
+        let (x, y) = (film % self.size[0] / TILE, film / self.size[0] / TILE);
+        (y * self.size[0].div_ceil(TILE) + x) as usize
+    }
+
+    /// Camera samples of the pixels of a tile in this iteration.
+    pub(crate) fn samples_of_tile(&self, tile: u32) -> u32 {
+        self.counts.get(tile as usize).copied().unwrap_or(self.samples)
+    }
+
+    /// Camera samples of a pixel in this iteration, relative to the mean.
+    fn share(&self, film: u32) -> f64 {
+        match self.counts.get(self.tile_of(film)) {
+            Some(&n) if n > 0 => f64::from(n) / f64::from(self.samples.max(1)),
+            _ => 1.0,
+        }
+    }
+
+    /// Begins an iteration of `samples` camera samples per pixel in the mean: deals them out by the error of each tile
+    /// that one more sample takes away per ray.
+    pub(crate) fn begin(&mut self, samples: u32, film: &Film<'_>) {
+        self.samples = samples;
+        if self.counts.is_empty() {
+            return;
+        }
+        self.counts.fill(samples);
+        if !self.estimated || samples == 0 {
+            return;
+        }
+        let pixels = film.pixels();
+        let wish = |k: &Self, tile: usize| {
+            let columns = k.size[0].div_ceil(TILE);
+            let (x0, y0) = (tile as u32 % columns * TILE, tile as u32 / columns * TILE);
+            let (mut error, mut rays, mut n) = (0.0, 0.0, 0.0);
+            for y in y0..(y0 + TILE).min(k.size[1]) {
+                for x in x0..(x0 + TILE).min(k.size[0]) {
+                    let film = y * k.size[0] + x;
+                    let Some(p) = pixels.get(film as usize) else { continue };
+                    let importance = k.pixel_importance(film);
+                    let variance = p.variance_of_mean();
+                    let e = (0..3).map(|c| variance.get(c).unwrap_or(&0.0) * f64::from(*importance.get(c).unwrap_or(&0.0)));
+                    error += e.sum::<f64>() * p.samples as f64;
+                    rays += p.rays as f64 / p.samples.max(1) as f64;
+                    n += 1.0;
+                }
+            }
+            ((error / f64::max(rays, 1.0)).sqrt_newton(), n)
+        };
+        let (mut sum, mut area) = (0.0, 0.0);
+        for tile in 0..self.counts.len() {
+            let (w, n) = wish(self, tile);
+            sum += w * n;
+            area += n;
+        }
+        if !(sum > 0.0) {
+            return;
+        }
+        for tile in 0..self.counts.len() {
+            let share = (wish(self, tile).0 * area / sum).clamp(LEAST_SHARE, MOST_SHARE);
+            if let Some(c) = self.counts.get_mut(tile) {
+                *c = ((share * f64::from(samples) + 0.5) as u32).max(1);
             }
         }
     }
 
-    /// What a squared error of a pixel counts, per channel.
+    /// What a squared error of a sample of a pixel counts, per channel: less if the pixel has more samples.
     #[inline]
     pub(crate) fn importance(&self, film: u32) -> [f32; 3] {
+        let importance = self.pixel_importance(film);
+        if self.counts.is_empty() {
+            return importance;
+        }
+        let share = self.share(film) as f32;
+        importance.map(|x| x / (share * share))
+    }
+
+    /// What a squared error of a pixel counts, per channel.
+    #[inline]
+    fn pixel_importance(&self, film: u32) -> [f32; 3] {
         if !self.estimated || self.learning.objective == Objective::Absolute {
             return [1.0; 3];
         }
@@ -255,13 +342,25 @@ impl<'m> Knowledge<'m> {
         true
     }
 
+    /// Weight of the samples of one pixel in an iteration of this weight.
+    pub(crate) fn weight_of(&self, film: usize, weight: f64) -> f64 {
+        if self.counts.is_empty() { weight } else { weight / self.share(film as u32) }
+    }
+
     /// Weight of the samples of an iteration whose pixels `visit` shows, measured against the estimate made before it.
     pub(crate) fn weigh(&mut self, counters: &Counters, visit: impl Fn(&mut dyn FnMut(usize, &PixelSums))) -> f64 {
         if !self.needed || !self.estimated {
             return 1.0;
         }
         self.measure_picture(counters, visit);
-        if self.first > 0.0 && self.last.robust > 0.0 { self.first / self.last.robust } else { 1.0 }
+        let [cost, variance] = self.first;
+        let b = &self.blended;
+        if !(cost > 0.0 && b.cost > 0.0 && b.variance > 0.0) {
+            return 1.0;
+        }
+        // efficiency that has not grown is noise: with few samples the variance comes out too small
+        let gain = (variance * cost / (b.variance * b.cost)).clamp(1.0, LARGEST_GAIN);
+        b.cost / cost * gain
     }
 
     fn measure_picture(&mut self, counters: &Counters, visit: impl Fn(&mut dyn FnMut(usize, &PixelSums))) {
@@ -276,7 +375,7 @@ impl<'m> Knowledge<'m> {
         let mut n = 0u64;
         pixels(&mut |_| n += 1);
         let limit = |share: f64| kth_largest((n as f64 * share) as usize + 1, pixels);
-        let (outlier, bright) = (limit(OUTLIERS), limit(WEIGHING_OUTLIERS));
+        let outlier = limit(OUTLIERS);
         let mut s = PictureStatistics::default();
         let mut kept = 0u64;
         pixels(&mut |e| {
@@ -287,14 +386,10 @@ impl<'m> Knowledge<'m> {
             } else {
                 s.outliers += f64::from(e);
             }
-            if e < bright {
-                s.robust += f64::from(e);
-            }
         });
         let n = n.max(1) as f64;
         s.variance /= kept.max(1) as f64;
         s.outliers /= n;
-        s.robust /= n;
         let c = counters;
         let cost = [(c.camera_rays, COST_CAMERA), (c.scatter_rays, COST_BOUNCE), (c.shadow_rays, COST_SHADOW)];
         let work: f64 = cost.iter().map(|&(n, cost)| n as f64 * f64::from(cost)).sum();
@@ -307,21 +402,20 @@ impl<'m> Knowledge<'m> {
             variance: blend(self.blended.variance, s.variance),
             outliers: blend(self.blended.outliers, s.outliers),
             cost: blend(self.blended.cost, s.cost),
-            robust: blend(self.blended.robust, s.robust),
         };
-        if self.first == 0.0 {
-            self.first = s.robust;
+        if self.first[0] == 0.0 {
+            self.first = [s.cost, s.variance];
         }
     }
 
     /// Mean error of a pixel's samples against its estimate, weighted by its importance and normed over the channels.
     fn error_of(&self, film: u32, p: &PixelSums) -> f64 {
         let i = self.estimate_index(film);
-        let (n, importance) = (p.samples as f64, self.importance(film));
+        let (n, importance, share) = (p.samples as f64, self.pixel_importance(film), self.share(film));
         let e: [f64; 3] = core::array::from_fn(|c| {
             let x = f64::from(self.estimate[c].get(i).copied().unwrap_or(0.0));
             let sqr = (p.sum_sqr[c] - 2.0 * x * p.sum[c]) / n + x * x;
-            sqr.max(0.0) * f64::from(importance[c])
+            sqr.max(0.0) * f64::from(importance[c]) / share
         });
         match self.learning.norm {
             Norm::Max => e[0].max(e[1]).max(e[2]),

@@ -24,30 +24,28 @@ pub(super) struct Cursor {
     slot: u32,
     /// Sample within the pixel.
     sample: u32,
-    /// Samples per pixel in this iteration.
-    samples: u32,
 }
 
 impl Cursor {
     pub(super) fn new(tiles: &Tiles, shard: u32, samples: u32) -> Self {
         let tile = if samples == 0 { None } else { tiles.next_of(shard, 0) };
-        Self { tile, base: 0, slot: 0, sample: 0, samples }
+        Self { tile, base: 0, slot: 0, sample: 0 }
     }
 
     pub(super) const fn finished() -> Self {
-        Self { tile: None, base: 0, slot: 0, sample: 0, samples: 0 }
+        Self { tile: None, base: 0, slot: 0, sample: 0 }
     }
 
     pub(super) fn is_finished(&self) -> bool {
         self.tile.is_none()
     }
 
-    /// The next (pixel, pixel slot, sample); a finished cursor gives `None`.
-    fn next(&mut self, tiles: &Tiles, shard: u32) -> Option<([u32; 2], u32, u32)> {
+    /// The next (pixel, pixel slot, sample); a finished cursor gives `None`. `samples` is the number per pixel of a tile.
+    fn next(&mut self, tiles: &Tiles, shard: u32, samples: impl Fn(u32) -> u32) -> Option<([u32; 2], u32, u32)> {
         while let Some(tile) = self.tile {
             let found = tiles.pixel(tile, self.slot).map(|p| (p, self.base + self.slot, self.sample));
             self.sample += 1;
-            if found.is_none() || self.sample == self.samples {
+            if found.is_none() || self.sample >= samples(tile) {
                 self.sample = 0;
                 self.slot += 1;
                 if self.slot == TILE_PIXELS {
@@ -64,19 +62,25 @@ impl Cursor {
     }
 }
 
+/// Samples of a pixel in one iteration with adaptive sampling: numbers of this many bits.
+const ADAPTIVE_BITS: u32 = 20;
+
 impl Shard<'_> {
     /// Up to eight camera rays. `None` when the cursor ran out within empty slots.
     pub(super) fn camera_rays<P: Profile, I: Intersector>(
         &mut self,
         session: &Session<'_, '_, P, I>,
     ) -> Option<Flight8> {
-        let first_sample = session.iteration().first_sample;
+        let iteration = session.iteration();
+        // numbers of one pixel must not come back in another iteration, however many samples it had
+        let adaptive = self.plan.settings().adaptive;
+        let first_sample = if adaptive { (iteration.number as u32) << ADAPTIVE_BITS } else { iteration.first_sample };
         let tiles = self.plan.tiles;
         let (mut x, mut y, mut pixel, mut sample, mut root) = ([0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8]);
         let mut ledger = [NO_RECORD; 8];
         let mut lanes = 0;
         while lanes < 8 {
-            let Some((p, slot, s)) = self.cursor.next(&tiles, self.index) else { break };
+            let Some((p, slot, s)) = self.cursor.next(&tiles, self.index, |t| session.knowledge().samples_of_tile(t)) else { break };
             let film = tiles.film_index(p) as u32;
             let Some(r) = self.roots.open(slot, film, session.knowledge().importance(film)) else { break };
             [x[lanes], y[lanes]] = p;

@@ -23,13 +23,16 @@ const LARGEST_ITERATION: u32 = 64;
 
 /// How to render.
 #[derive(Clone, Copy, Debug)]
-pub struct Options {
+pub struct Options<'a> {
     /// The core's settings.
     pub settings: Settings,
     /// When to stop.
     pub target: Target,
     /// Threads; 0 takes one per core. The picture does not depend on it.
     pub threads: usize,
+    /// Pixels that strategies which learn take for the true ones, instead of the denoised picture: efficiency, not the
+    /// expectation, hangs on them.
+    pub estimate: Option<&'a [[f32; 3]]>,
 }
 
 /// Watches nothing.
@@ -138,12 +141,12 @@ from!(SceneError => Scene, SettingsError => Settings, SessionError => Session, S
       rayon::ThreadPoolBuildError => Threads);
 
 /// Renders a scene blob.
-pub fn drive(scene: &[u8], options: &Options, observer: &dyn Observer) -> Result<Rendered, DriveError> {
+pub fn drive(scene: &[u8], options: &Options<'_>, observer: &dyn Observer) -> Result<Rendered, DriveError> {
     drive_scene(Scene::from_bytes(scene)?, options, observer)
 }
 
 /// Renders a validated scene with the smallest profile that holds its effects.
-pub fn drive_scene(scene: Scene<'_>, options: &Options, observer: &dyn Observer) -> Result<Rendered, DriveError> {
+pub fn drive_scene(scene: Scene<'_>, options: &Options<'_>, observer: &dyn Observer) -> Result<Rendered, DriveError> {
     match AnyProfile::smallest(scene.effects) {
         AnyProfile::Matte => drive_with::<Matte>(scene, options, observer),
         AnyProfile::Full => drive_with::<Full>(scene, options, observer),
@@ -153,7 +156,7 @@ pub fn drive_scene(scene: Scene<'_>, options: &Options, observer: &dyn Observer)
 /// Renders a validated scene with profile `P`.
 pub fn drive_with<P: Profile + Send + Sync>(
     scene: Scene<'_>,
-    options: &Options,
+    options: &Options<'_>,
     observer: &dyn Observer,
 ) -> Result<Rendered, DriveError> {
     let plan = Plan::new(&options.settings)?;
@@ -164,6 +167,9 @@ pub fn drive_with<P: Profile + Send + Sync>(
     let mut shards = Vec::with_capacity(blocks.len());
     for (i, b) in blocks.iter_mut().enumerate() {
         shards.push(Shard::new(&plan, i as u32, b.as_mut())?);
+    }
+    if let Some(rgb) = options.estimate {
+        session.give_estimate(rgb)?;
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build()?;
 
@@ -181,6 +187,9 @@ pub fn drive_with<P: Profile + Send + Sync>(
         let run = Run { session: &session, observer, start, spp, samples, error, rays: AtomicU64::new(0) };
         stopped_early = pool.install(|| run.all(&mut shards));
         session.end_iteration(&shards)?;
+        if std::env::var_os("CR_DEBUG").is_some() {
+            eprintln!("{samples} {:?} leaves {:?}", session.picture_statistics()[0], session.cache().map(|c| (c.leaves(), c.splits_refused())));
+        }
         if stopped_early {
             break;
         }

@@ -158,7 +158,7 @@ fn settings(scene: &Scene<'_>, options: &RenderOptions) -> Result<Settings, Rend
 pub fn render(scene: &[u8], options: &RenderOptions, observer: &dyn Observer) -> Result<RenderResult, RenderError> {
     let scene = Scene::from_bytes(scene)?;
     let settings = settings(&scene, options)?;
-    let o = Options { settings, target: options.target, threads: options.threads };
+    let o = Options { settings, target: options.target, threads: options.threads, estimate: None };
     let rendered = drive_scene(scene, &o, observer)?;
     Ok(RenderResult { picture: picture(&rendered), stats: stats(&rendered), stopped_early: rendered.stopped_early })
 }
