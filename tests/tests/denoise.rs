@@ -74,7 +74,7 @@ fn mse(a: &[Rgb], b: &[Rgb]) -> f64 {
     a.as_flattened().iter().zip(b.as_flattened()).map(square).sum::<f64>() / (3 * a.len()) as f64
 }
 
-/// Killed by: a level left out, the variance not carried from level to level, the correction of the level left out
+/// Killed by: the variance not carried from level to level, the correction of the level left out
 /// (samples this skewed are darkened by 2 %), a margin that takes part.
 #[test]
 fn noise_goes_and_the_mean_stays() {
@@ -97,9 +97,9 @@ fn an_edge_that_noise_does_not_explain_stays() {
     let noisy = truth.clone().noisy(64, 5);
     let out = noisy.denoised();
     for (i, pixel) in out.iter().enumerate() {
-        // One pixel on either side may be mixed, none may cross.
+        // The rest of the noise is allowed, mixing the two sides is not.
         let (x, low) = (i % 64, i % 64 < 31);
-        assert!((pixel[0] < 0.4) == low, "column {x}: {}", pixel[0]);
+        assert!(if low { pixel[0] < 0.3 } else { pixel[0] > 0.6 }, "column {x}: {}", pixel[0]);
     }
     assert!(mse(&noisy.color, &truth.color) > 5.0 * mse(&out, &truth.color));
 }
@@ -122,12 +122,12 @@ fn texture_comes_back_from_the_albedo() {
 /// Two walls under unlike light that differ in nothing but their normal. Killed by: the normal left out of the weight.
 #[test]
 fn normals_separate() {
-    let mut truth = Picture::exact([64, 64], |x, _| if x < 32 { [0.3; 3] } else { [0.6; 3] });
+    let mut truth = Picture::exact([64, 64], |x, _| if x < 32 { [0.3; 3] } else { [0.45; 3] });
     truth.normal = (0..64 * 64).map(|i| if i % 64 < 32 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] }).collect();
     truth.albedo = vec![[0.5; 3]; 64 * 64];
     let out = truth.clone().noisy(4, 9).denoised();
     let column = |x: usize| (0..64).map(|y| f64::from(out[y * 64 + x][0])).sum::<f64>() / 64.0;
-    assert!(column(31) < 0.4 && column(32) > 0.5, "{} {}", column(31), column(32));
+    assert!(column(31) < 0.34 && column(32) > 0.4, "{} {}", column(31), column(32));
 }
 
 /// Killed by: a variance that is never 0, a correction that exact pixels take part in, averaging without the test.
@@ -168,8 +168,8 @@ fn a_lamp_keeps_its_value() {
     }
 }
 
-/// One pixel has seen what the others missed: its energy is shared out, and all of it is still there. Killed by: the
-/// correction of the level left out, fireflies clamped and forgotten, its own variance smoothed away.
+/// One pixel has seen what the others missed: its energy is shared out, and all of it is still there. Killed by: a
+/// level or the correction of the level left out, fireflies clamped and forgotten, its own variance smoothed away.
 #[test]
 fn a_firefly_is_shared_out() {
     let mut noisy = Picture::exact([97, 65], |_, _| [0.1; 3]).noisy(8, 17);
@@ -182,7 +182,7 @@ fn a_firefly_is_shared_out() {
     let ratio = mean(&out) / mean(&noisy.color);
     assert!((ratio - 1.0).abs() < 0.01, "energy changed by a factor {ratio}");
     let largest = out.as_flattened().iter().fold(0.0f32, |a, &b| a.max(b));
-    assert!(largest < energy / 100.0, "brightest pixel still {largest}");
+    assert!(largest < energy / 400.0, "brightest pixel still {largest}");
     // Near it, and not everywhere: the corners know nothing of it.
     assert!(
         f64::from(out[0][0]) < 2.0 * before && f64::from(out[at][0]) > 5.0 * before,
@@ -216,7 +216,7 @@ fn absent_pixels_are_filled() {
     }
 }
 
-/// Features may be anything too. Killed by: features that are not clamped, or not tested for NaN.
+/// Features may be anything too. Killed by: features that are not clamped.
 #[test]
 fn broken_features_do_no_harm() {
     let mut picture = Picture::exact([20, 20], |_, _| [0.5; 3]).noisy(16, 23);
