@@ -90,7 +90,7 @@ fn noise_goes_and_the_mean_stays() {
 }
 
 /// Without an albedo or a normal to tell: the errors alone keep the edge. Killed by: the distance of the colors left out
-/// of the weight, `MEMBERSHIP` three times as large.
+/// of the weight.
 #[test]
 fn an_edge_that_noise_does_not_explain_stays() {
     let truth = Picture::exact([64, 48], |x, _| if x < 31 { [0.1; 3] } else { [1.0; 3] });
@@ -127,7 +127,7 @@ fn normals_separate() {
     truth.albedo = vec![[0.5; 3]; 64 * 64];
     let out = truth.clone().noisy(4, 9).denoised();
     let column = |x: usize| (0..64).map(|y| f64::from(out[y * 64 + x][0])).sum::<f64>() / 64.0;
-    assert!(column(31) < 0.34 && column(32) > 0.4, "{} {}", column(31), column(32));
+    assert!(column(31) < 0.31 && column(32) > 0.44, "{} {}", column(31), column(32));
 }
 
 /// Killed by: a variance that is never 0, a correction that exact pixels take part in, averaging without the test.
@@ -182,7 +182,7 @@ fn a_firefly_is_shared_out() {
     let ratio = mean(&out) / mean(&noisy.color);
     assert!((ratio - 1.0).abs() < 0.01, "energy changed by a factor {ratio}");
     let largest = out.as_flattened().iter().fold(0.0f32, |a, &b| a.max(b));
-    assert!(largest < energy / 400.0, "brightest pixel still {largest}");
+    assert!(largest < energy / 300.0, "brightest pixel still {largest}");
     // Near it, and not everywhere: the corners know nothing of it.
     assert!(
         f64::from(out[0][0]) < 2.0 * before && f64::from(out[at][0]) > 5.0 * before,
