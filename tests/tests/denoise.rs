@@ -127,7 +127,7 @@ fn normals_separate() {
     truth.albedo = vec![[0.5; 3]; 64 * 64];
     let out = truth.clone().noisy(4, 9).denoised();
     let column = |x: usize| (0..64).map(|y| f64::from(out[y * 64 + x][0])).sum::<f64>() / 64.0;
-    assert!(column(31) < 0.31 && column(32) > 0.44, "{} {}", column(31), column(32));
+    assert!(column(31) < 0.31 && column(32) > 0.42, "{} {}", column(31), column(32));
 }
 
 /// Killed by: a variance that is never 0, a correction that exact pixels take part in, averaging without the test.
