@@ -107,7 +107,7 @@ fn an_edge_that_noise_does_not_explain_stays() {
 /// Stripes as wide as a pixel under even light. Killed by: not dividing by the albedo, not multiplying.
 #[test]
 fn texture_comes_back_from_the_albedo() {
-    let paint = |x: usize, y: usize| if (x + y) % 2 == 0 { [0.4, 0.3, 0.8] } else { [0.5, 0.3, 0.6] };
+    let paint = |x: usize, y: usize| if (x + y).is_multiple_of(2) { [0.4, 0.3, 0.8] } else { [0.5, 0.3, 0.6] };
     let mut truth = Picture::exact([80, 40], |x, y| paint(x, y).map(|a| 1.5 * a));
     truth.albedo = (0..80 * 40).map(|i| paint(i % 80, i / 80)).collect();
     truth.normal = vec![[0.0, 0.0, 1.0]; 80 * 40];
