@@ -74,8 +74,7 @@ fn mse(a: &[Rgb], b: &[Rgb]) -> f64 {
     a.as_flattened().iter().zip(b.as_flattened()).map(square).sum::<f64>() / (3 * a.len()) as f64
 }
 
-/// Killed by: the variance not carried from level to level, the correction of the level left out
-/// (samples this skewed are darkened by 2 %), a margin that takes part.
+/// Killed by: the variance not carried from level to level, the correction of the level left out, a margin that takes part.
 #[test]
 fn noise_goes_and_the_mean_stays() {
     for (n, seed) in [(4, 1), (4, 2), (16, 3)] {
