@@ -2,25 +2,14 @@
 
 use croupier::denoise::{DenoiseError, Noisy, Part, Planes, denoise, scratch_len};
 use croupier::film::{PixelAov, PixelStats};
+use croupier_tests::stats::SplitMix;
 
-/// Uniform numbers in [0, 1) (splitmix64).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// A mean of `n` exponentially distributed samples of mean 1, and its estimated variance: few samples carry much.
-    fn estimate(&mut self, n: usize) -> (f64, f64) {
-        let samples: Vec<f64> = (0..n).map(|_| -(1.0 - self.next()).ln()).collect();
-        let mean = samples.iter().sum::<f64>() / n as f64;
-        let square = samples.iter().map(|x| (x - mean).powi(2)).sum::<f64>();
-        (mean, square / (n * (n - 1)) as f64)
-    }
+/// A mean of `n` exponentially distributed samples of mean 1, and its estimated variance: few samples carry much.
+fn estimate(random: &mut SplitMix, n: usize) -> (f64, f64) {
+    let samples: Vec<f64> = (0..n).map(|_| -(1.0 - random.f64()).ln()).collect();
+    let mean = samples.iter().sum::<f64>() / n as f64;
+    let square = samples.iter().map(|x| (x - mean).powi(2)).sum::<f64>();
+    (mean, square / (n * (n - 1)) as f64)
 }
 
 type Rgb = [f32; 3];
@@ -45,9 +34,9 @@ impl Picture {
 
     /// The same picture as `n` samples per pixel would show it, all channels alike.
     fn noisy(mut self, n: usize, seed: u64) -> Self {
-        let mut random = Random(seed);
+        let mut random = SplitMix(seed);
         for (color, variance) in self.color.iter_mut().zip(&mut self.variance) {
-            let (mean, square) = random.estimate(n);
+            let (mean, square) = estimate(&mut random, n);
             *variance = color.map(|x| (f64::from(x).powi(2) * square) as f32);
             *color = color.map(|x| (f64::from(x) * mean) as f32);
         }
@@ -85,8 +74,7 @@ fn mse(a: &[Rgb], b: &[Rgb]) -> f64 {
     a.as_flattened().iter().zip(b.as_flattened()).map(square).sum::<f64>() / (3 * a.len()) as f64
 }
 
-/// Killed by: a level left out, the variance not carried from level to level, the correction of the level left out
-/// (samples this skewed are darkened by 2 %), a margin that takes part.
+/// Killed by: the variance not carried from level to level, the correction of the level left out, a margin that takes part.
 #[test]
 fn noise_goes_and_the_mean_stays() {
     for (n, seed) in [(4, 1), (4, 2), (16, 3)] {
@@ -94,23 +82,23 @@ fn noise_goes_and_the_mean_stays() {
         let noisy = truth.clone().noisy(n, seed);
         let out = noisy.denoised();
         let gain = mse(&noisy.color, &truth.color) / mse(&out, &truth.color);
-        assert!(gain > 20.0, "{n} samples: error only {gain} times smaller");
+        assert!(gain > 15.0, "{n} samples: error only {gain} times smaller");
         let ratio = mean(&out) / mean(&noisy.color);
         assert!((ratio - 1.0).abs() < 1e-4, "{n} samples: mean changed by a factor {ratio}");
     }
 }
 
 /// Without an albedo or a normal to tell: the errors alone keep the edge. Killed by: the distance of the colors left out
-/// of the weight, `MEMBERSHIP` three times as large.
+/// of the weight.
 #[test]
 fn an_edge_that_noise_does_not_explain_stays() {
     let truth = Picture::exact([64, 48], |x, _| if x < 31 { [0.1; 3] } else { [1.0; 3] });
     let noisy = truth.clone().noisy(64, 5);
     let out = noisy.denoised();
     for (i, pixel) in out.iter().enumerate() {
-        // One pixel on either side may be mixed, none may cross.
+        // The rest of the noise is allowed, mixing the two sides is not.
         let (x, low) = (i % 64, i % 64 < 31);
-        assert!((pixel[0] < 0.4) == low, "column {x}: {}", pixel[0]);
+        assert!(if low { pixel[0] < 0.3 } else { pixel[0] > 0.6 }, "column {x}: {}", pixel[0]);
     }
     assert!(mse(&noisy.color, &truth.color) > 5.0 * mse(&out, &truth.color));
 }
@@ -118,7 +106,7 @@ fn an_edge_that_noise_does_not_explain_stays() {
 /// Stripes as wide as a pixel under even light. Killed by: not dividing by the albedo, not multiplying.
 #[test]
 fn texture_comes_back_from_the_albedo() {
-    let paint = |x: usize, y: usize| if (x + y) % 2 == 0 { [0.4, 0.3, 0.8] } else { [0.5, 0.3, 0.6] };
+    let paint = |x: usize, y: usize| if (x + y).is_multiple_of(2) { [0.4, 0.3, 0.8] } else { [0.5, 0.3, 0.6] };
     let mut truth = Picture::exact([80, 40], |x, y| paint(x, y).map(|a| 1.5 * a));
     truth.albedo = (0..80 * 40).map(|i| paint(i % 80, i / 80)).collect();
     truth.normal = vec![[0.0, 0.0, 1.0]; 80 * 40];
@@ -133,19 +121,19 @@ fn texture_comes_back_from_the_albedo() {
 /// Two walls under unlike light that differ in nothing but their normal. Killed by: the normal left out of the weight.
 #[test]
 fn normals_separate() {
-    let mut truth = Picture::exact([64, 64], |x, _| if x < 32 { [0.3; 3] } else { [0.6; 3] });
+    let mut truth = Picture::exact([64, 64], |x, _| if x < 32 { [0.3; 3] } else { [0.45; 3] });
     truth.normal = (0..64 * 64).map(|i| if i % 64 < 32 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] }).collect();
     truth.albedo = vec![[0.5; 3]; 64 * 64];
     let out = truth.clone().noisy(4, 9).denoised();
     let column = |x: usize| (0..64).map(|y| f64::from(out[y * 64 + x][0])).sum::<f64>() / 64.0;
-    assert!(column(31) < 0.4 && column(32) > 0.5, "{} {}", column(31), column(32));
+    assert!(column(31) < 0.31 && column(32) > 0.42, "{} {}", column(31), column(32));
 }
 
 /// Killed by: a variance that is never 0, a correction that exact pixels take part in, averaging without the test.
 #[test]
 fn a_picture_without_noise_comes_back() {
-    let mut random = Random(11);
-    let values: Vec<Rgb> = (0..33 * 21).map(|_| [(); 3].map(|()| (8.0 * random.next()) as f32)).collect();
+    let mut random = SplitMix(11);
+    let values: Vec<Rgb> = (0..33 * 21).map(|_| [(); 3].map(|()| (8.0 * random.f64()) as f32)).collect();
     let mut picture = Picture::exact([33, 21], |x, y| values[y * 33 + x]);
     for features in [false, true] {
         if features {
@@ -158,8 +146,8 @@ fn a_picture_without_noise_comes_back() {
     }
 }
 
-/// An exact lamp in a noisy wall: it neither bleeds nor takes part in the correction of the level. Killed by: the weight
-/// `noisy` of the correction set to 1.
+/// An exact lamp in a noisy wall: it neither bleeds nor takes part in the correction of the level; only its rim knows of
+/// the wall's noise. Killed by: the weight `noisy` of the correction set to 1.
 #[test]
 fn a_lamp_keeps_its_value() {
     let lamp = |x: usize, y: usize| (30..40).contains(&x) && (10..20).contains(&y);
@@ -171,15 +159,16 @@ fn a_lamp_keeps_its_value() {
     }
     for (i, pixel) in noisy.denoised().iter().enumerate() {
         if inside(i) {
-            assert!((pixel[0] - 50.0).abs() < 5e-5, "{}", pixel[0]);
+            let rim = !((31..39).contains(&(i % 70)) && (11..19).contains(&(i / 70)));
+            assert!((pixel[0] - 50.0).abs() < if rim { 5e-2 } else { 5e-5 }, "{}", pixel[0]);
         } else {
             assert!(pixel[0] < 1.0, "the lamp bleeds: {} at {:?}", pixel[0], (i % 70, i / 70));
         }
     }
 }
 
-/// One pixel has seen what the others missed: its energy is shared out, and all of it is still there. Killed by: the
-/// correction of the level left out, fireflies clamped and forgotten, its own variance smoothed away.
+/// One pixel has seen what the others missed: its energy is shared out, and all of it is still there. Killed by: a
+/// level or the correction of the level left out, fireflies clamped and forgotten, its own variance smoothed away.
 #[test]
 fn a_firefly_is_shared_out() {
     let mut noisy = Picture::exact([97, 65], |_, _| [0.1; 3]).noisy(8, 17);
@@ -192,7 +181,7 @@ fn a_firefly_is_shared_out() {
     let ratio = mean(&out) / mean(&noisy.color);
     assert!((ratio - 1.0).abs() < 0.01, "energy changed by a factor {ratio}");
     let largest = out.as_flattened().iter().fold(0.0f32, |a, &b| a.max(b));
-    assert!(largest < energy / 100.0, "brightest pixel still {largest}");
+    assert!(largest < energy / 300.0, "brightest pixel still {largest}");
     // Near it, and not everywhere: the corners know nothing of it.
     assert!(
         f64::from(out[0][0]) < 2.0 * before && f64::from(out[at][0]) > 5.0 * before,
@@ -226,7 +215,7 @@ fn absent_pixels_are_filled() {
     }
 }
 
-/// Features may be anything too. Killed by: features that are not clamped, or not tested for NaN.
+/// Features may be anything too. Killed by: features that are not clamped.
 #[test]
 fn broken_features_do_no_harm() {
     let mut picture = Picture::exact([20, 20], |_, _| [0.5; 3]).noisy(16, 23);
@@ -323,7 +312,7 @@ fn short_slices_are_errors() {
     }
     let error = Planes::carve(size, true, &mut [0.0; 9]).map(|_| ()).unwrap_err();
     assert_eq!(error, DenoiseError { part: Part::Planes, size, needed: 15 * 65, given: 9 });
-    assert_eq!(error.to_string(), "the denoiser's planes for 13x5 pixels needs 975 values, 9 given");
+    assert_eq!(error.to_string(), "plane memory for 13x5 pixels needs 975 values, 9 given");
     // No size is too large to ask for.
     assert_eq!(scratch_len([u32::MAX; 2]), usize::MAX);
     assert!(Planes::carve([u32::MAX; 2], true, &mut []).is_err());

@@ -1,11 +1,11 @@
 //! From scratch memory to the result: the level put right, color multiplied by albedo.
 
 use super::prepare::Pixels;
-use super::{Grid, MARGIN, Noisy, SIGNAL, TINY, load};
+use super::{FEATURES, Grid, MARGIN, Noisy, REACH, SIGNAL, TINY, load};
 use croupier_simd::F32x8;
 
-/// Squared relative error above which a pixel takes part in the correction of the level.
-const NOISY: f32 = 1e-6;
+/// Squared relative reach (`REACH`) above which a pixel takes part in the correction of the level.
+const NOISY: f32 = 1e-2;
 /// Bounds of the correction, as a part of the noisy pixels' radiance.
 const CORRECTION: (f64, f64) = (-0.5, 1.0);
 
@@ -18,23 +18,24 @@ struct Filtered {
 
 impl Filtered {
     #[inline(always)]
-    fn read(grid: Grid, signal: &[f32], x: usize, y: usize) -> Self {
+    fn read(grid: Grid, signal: &[f32], features: &[f32], x: usize, y: usize) -> Self {
         let row = grid.row(signal, SIGNAL, y);
         let e: [F32x8; 3] = core::array::from_fn(|c| load(row, c * grid.stride + x));
-        let variance = load(row, 3 * grid.stride + x);
+        // Not the variance that was filtered: that one seeps into exact pixels.
+        let reach2 = load(grid.row(features, FEATURES, y), REACH * grid.stride + x).sqr();
         let square = e[0].sqr() + e[1].sqr() + e[2].sqr();
-        Self { e, noisy: variance / (variance + square * NOISY + TINY) }
+        Self { e, noisy: reach2 / (reach2 + square * NOISY + TINY) }
     }
 }
 
 /// Writes the result. Per channel, the radiance that the picture lost is added to its noisy pixels in proportion to
-/// theirs; exact pixels, lamps above all, keep their values to the bit.
-pub(super) fn finish(noisy: &Noisy<'_>, grid: Grid, signal: &[f32], out: [&mut [f32]; 3]) {
+/// theirs; exact pixels, lamps above all, take no part.
+pub(super) fn finish(noisy: &Noisy<'_>, grid: Grid, signal: &[f32], features: &[f32], out: [&mut [f32]; 3]) {
     let (mut lost, mut takers) = ([0.0f64; 3], [0.0f64; 3]);
     for y in 0..grid.rows {
         let (mut row_lost, mut row_takers) = ([F32x8::ZERO; 3], [F32x8::ZERO; 3]);
         for x in grid.packets() {
-            let (p, f) = (Pixels::read(noisy, grid, x - MARGIN, y), Filtered::read(grid, signal, x, y));
+            let (p, f) = (Pixels::read(noisy, grid, x - MARGIN, y), Filtered::read(grid, signal, features, x, y));
             for c in 0..3 {
                 // What stayed as it was differs by exactly 0: the sum over lamps does not drown the rest in rounding.
                 row_lost[c] += p.present.zero_unless((p.e[c] - f.e[c]) * p.divisor[c]);
@@ -53,7 +54,7 @@ pub(super) fn finish(noisy: &Noisy<'_>, grid: Grid, signal: &[f32], out: [&mut [
     for y in 0..grid.rows {
         for x in grid.packets() {
             let column = x - MARGIN;
-            let (p, f) = (Pixels::read(noisy, grid, column, y), Filtered::read(grid, signal, x, y));
+            let (p, f) = (Pixels::read(noisy, grid, column, y), Filtered::read(grid, signal, features, x, y));
             for (c, plane) in out.iter_mut().enumerate() {
                 let color = f.e[c] * p.divisor[c] * (1.0 + f.noisy * gain[c]);
                 let lanes = (grid.columns - column).min(8);

@@ -22,7 +22,6 @@ pub struct Planes<'m> {
 
 impl<'m> Planes<'m> {
     /// Values needed; `usize::MAX` if that is not addressable.
-    #[expect(clippy::len_without_is_empty, reason = "what is needed, not what is there")]
     pub fn len(size: [u32; 2], features: bool) -> usize {
         let [columns, rows] = size.map(|n| n as usize);
         columns.saturating_mul(rows).saturating_mul(if features { 15 } else { 9 })

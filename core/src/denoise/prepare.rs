@@ -84,7 +84,8 @@ pub(super) fn prepare(noisy: &Noisy<'_>, grid: Grid, signal: &mut [f32], other: 
             for c in 0..3 {
                 store(e_row, c * s + x, p.e[c]);
                 let n = gather(noisy.normal[c], y * grid.columns + column, 0.0);
-                let n = n.is_finite().zero_unless(n).clamp(-1.0, 1.0) * normal_scale;
+                // A NaN becomes -1: some normal, which only its own pixel is judged by.
+                let n = n.clamp(-1.0, 1.0) * normal_scale;
                 let outside = if c == 0 { NOWHERE } else { 0.0 };
                 store(f_row, c * s + x, inside.select(n, F32x8::splat(outside)));
                 store(f_row, (3 + c) * s + x, p.albedo[c] * albedo_scale);
