@@ -54,9 +54,9 @@ pub fn vertex(rng: &mut SplitMix) -> ([f32; 3], [f32; 3]) {
 }
 
 /// The bin of one vertex.
-pub fn find(cache: &Cache<'_>, matte: bool, p: [f32; 3], d: [f32; 3]) -> u32 {
+pub fn find(cache: &Cache<'_>, kind: u32, p: [f32; 3], d: [f32; 3]) -> u32 {
     let [p, d] = [p, d].map(|v| Vec3x8::splat(v[0], v[1], v[2]));
-    cache.find(Mask8::splat(matte), p, d, Mask8::all_lanes()).lane(5)
+    cache.find(U32x8::splat(kind), p, d, Mask8::all_lanes()).lane(5)
 }
 
 /// What is known of the bins `8 k` to `8 k + 7`.
@@ -84,7 +84,7 @@ pub fn iterate(cache: &mut Cache<'_>, shards: &mut [Training<'_>], n: usize, spl
         t.clear(cache.bins());
         for _ in 0..n {
             let (p, d) = vertex(rng);
-            let bin = find(cache, rng.bits() & 1 == 0, p, d);
+            let bin = find(cache, rng.bits() as u32 & 3, p, d);
             let x = [(); 3].map(|()| (rng.bits() >> 58) as f32 / 1024.0);
             assert!(t.log(bin, x, (rng.bits() >> 61) as f32));
             assert!(t.log_pair(bin, x));
@@ -123,7 +123,7 @@ enum Node {
 /// What saved bytes mean, in f64.
 pub struct Oracle {
     nodes: Vec<Node>,
-    roots: [usize; 2],
+    roots: [usize; 4],
     lo: [f64; 3],
     edge: f64,
     /// Per leaf and bin: count, pairs, cost, sum (3), squared sum (3), pair sum (3).
@@ -143,9 +143,9 @@ impl Oracle {
     /// Reads saved bytes.
     pub fn new(bytes: &[u8]) -> Self {
         let f = |i: usize| f64::from(f32::from_le_bytes(bytes[28 + 4 * i..32 + 4 * i].try_into().unwrap()));
-        let mut o = Self { nodes: vec![], roots: [0; 2], lo: [f(0), f(1), f(2)], edge: f(3), leaves: vec![] };
+        let mut o = Self { nodes: vec![], roots: [0; 4], lo: [f(0), f(1), f(2)], edge: f(3), leaves: vec![] };
         let (mut shape, mut sums) = (bytes[64..].iter(), bytes[sums_at(bytes)..].chunks_exact(8));
-        o.roots = [0, 1].map(|_| o.read(&mut shape, &mut sums));
+        o.roots = [0, 1, 2, 3].map(|_| o.read(&mut shape, &mut sums));
         assert!(sums.next().is_none());
         o
     }
@@ -175,9 +175,9 @@ impl Oracle {
     }
 
     /// The leaf around a place, the nearest one for places outside.
-    pub fn cell(&self, matte: bool, p: [f64; 3]) -> Cell {
+    pub fn cell(&self, kind: u32, p: [f64; 3]) -> Cell {
         let (mut lo, mut edge) = (self.lo, self.edge);
-        let mut node = self.roots[usize::from(!matte)];
+        let mut node = self.roots[kind as usize];
         while let Node::Inner(children) = &self.nodes[node] {
             edge *= 0.5;
             let mut child = 0;

@@ -31,12 +31,12 @@ fn agrees_with_an_oracle(room: usize, least: u32) {
         let vertices: [_; 8] = std::array::from_fn(|_| {
             let (p, d) = vertex(&mut rng);
             let anywhere = std::array::from_fn(|a| rng.range(LO[a] as f64 - 1.0, HI[a] as f64 + 1.0) as f32);
-            (rng.bits() & 1 == 0, if turn % 2 == 0 { p } else { anywhere }, d)
+            (rng.bits() as u32 & 3, if turn % 2 == 0 { p } else { anywhere }, d)
         });
         let active = Mask8::from_bits(rng.bits() as u32);
-        let matte = Mask8::from_bits((0..8).map(|i| u32::from(vertices[i].0) << i).sum());
-        let bins = cache.find(matte, Vec3x8::from_fn(|i| vertices[i].1), Vec3x8::from_fn(|i| vertices[i].2), active);
-        for (i, (matte, p, d)) in vertices.into_iter().enumerate() {
+        let kind = U32x8::from_fn(|i| vertices[i].0);
+        let bins = cache.find(kind, Vec3x8::from_fn(|i| vertices[i].1), Vec3x8::from_fn(|i| vertices[i].2), active);
+        for (i, (kind, p, d)) in vertices.into_iter().enumerate() {
             let (bin, p) = (bins.lane(i), oracle.clamp(p.map(f64::from)));
             if !active.lane(i) {
                 assert_eq!(bin, u32::MAX);
@@ -47,7 +47,7 @@ fn agrees_with_an_oracle(room: usize, least: u32) {
             if oracle.ambiguous(p) || [h, a].iter().any(|x| (x - x.round()).abs() < 1e-5) {
                 continue;
             }
-            let leaf = oracle.cell(matte, p).leaf;
+            let leaf = oracle.cell(kind, p).leaf;
             let place = (leaf, h as u32, a as u32);
             assert_eq!(*place_of.entry(bin).or_insert(place), place, "bin {bin}");
             assert_eq!(*bin_of.entry(place).or_insert(bin), bin, "{place:?}");

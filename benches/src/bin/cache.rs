@@ -18,7 +18,7 @@ struct Packet {
     p: Vec3x8,
     d: Vec3x8,
     jitter: [F32x8; 3],
-    matte: Mask8,
+    kind: U32x8,
 }
 
 fn packets(coherent: bool, rng: &mut SplitMix) -> Vec<Packet> {
@@ -30,7 +30,7 @@ fn packets(coherent: bool, rng: &mut SplitMix) -> Vec<Packet> {
                 p: Vec3x8::from_fn(|i| v[i].0.map(|x| x + 0.002 * rng.f32())),
                 d: Vec3x8::from_fn(|i| v[i].1),
                 jitter: [(); 3].map(|()| F32x8::from_fn(|_| rng.f32())),
-                matte: Mask8::splat(rng.bits() & 1 == 0),
+                kind: U32x8::splat(rng.bits() as u32 & 3),
             }
         })
         .collect()
@@ -57,8 +57,8 @@ fn look_ups(name: &str, cache: &Cache<'_>, packets: &[Packet]) {
         let l = cache.local(bin, all);
         l.mean.x + l.moment.y + l.variance.z + l.cost + l.count
     };
-    let plain = |k: &Packet| cache.find(k.matte, k.p, k.d, all);
-    let moved = |k: &Packet| cache.find_jittered(k.matte, k.p, k.d, k.jitter, all);
+    let plain = |k: &Packet| cache.find(k.kind, k.p, k.d, all);
+    let moved = |k: &Packet| cache.find_jittered(k.kind, k.p, k.d, k.jitter, all);
     let find = time(PACKETS, || packets.iter().for_each(|k| ignore(plain(k))));
     let both = time(PACKETS, || packets.iter().for_each(|k| ignore(local(plain(k)))));
     let find_moved = time(PACKETS, || packets.iter().for_each(|k| ignore(moved(k))));
@@ -69,7 +69,7 @@ fn look_ups(name: &str, cache: &Cache<'_>, packets: &[Packet]) {
 }
 
 fn log(cache: &Cache<'_>, t: &mut Training<'_>, packets: &[Packet]) {
-    let bins: Vec<_> = packets.iter().map(|k| cache.find(k.matte, k.p, k.d, Mask8::all_lanes()).to_array()).collect();
+    let bins: Vec<_> = packets.iter().map(|k| cache.find(k.kind, k.p, k.d, Mask8::all_lanes()).to_array()).collect();
     let x = packets.iter().map(|k| k.jitter.map(|j| j.lane(0)));
     let samples: Vec<_> = bins.iter().zip(x).collect();
     t.clear(cache.bins());

@@ -5,8 +5,8 @@
 //! (rays). Sums also exist of half the squared difference of two samples of the same vertex: their mean is the variance
 //! at a point, whereas `moment - mean^2` has the spread of the mean over the cell in it as well.
 //!
-//! There are two octrees. Matte vertices are keyed by their shading normal, all others by a direction of the caller's
-//! choice. Shards look up in what [`Cache::freeze`] computed and log into their own [`Training`]; between iterations
+//! There are several octrees, for kinds of vertices that should not be mixed, and the direction is the caller's choice: see
+//! [`Kind`]. Shards look up in what [`Cache::freeze`] computed and log into their own [`Training`]; between iterations
 //! those are absorbed in shard order, so the cache is the same whatever the threads did.
 
 pub use super::bins::{BIN_LIMIT, Local8, MAX_VALUE};
@@ -17,6 +17,20 @@ use super::bins::{BINS, BinSums, Frozen, freeze_leaf};
 use super::tree::{MAX_DEPTH, MAX_LEAVES, Node, ROOTS, Tree, direction_bin};
 use crate::memory::{Carver, Layout, Measure, MemoryError};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+
+/// Kinds of vertices, each with an octree of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Kind {
+    /// Matte, keyed by the shading normal.
+    Matte = 0,
+    /// All others, keyed by the direction that decides what they show.
+    Shiny = 1,
+    /// Matte ones that the camera sees. Their values are in units of their pixel.
+    FirstMatte = 2,
+    /// The other ones that the camera sees.
+    FirstShiny = 3,
+}
 
 /// How many nodes and leaves there is room for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,18 +108,18 @@ impl<'m> Cache<'m> {
         Ok(Self { tree, sums: c.take(size.bins())?, frozen: c.take(size.bins())?, size, splits_refused: 0, flat: None, prior_samples: 8.0 })
     }
 
-    /// The bins of eight vertices, `u32::MAX` in inactive lanes. `dir` is a unit vector in world space: the shading
-    /// normal where `matte`. Places outside the bounds belong to the nearest leaf.
+    /// The bins of eight vertices, `u32::MAX` in inactive lanes. `kind` holds [`Kind`]s, `dir` unit vectors in world space.
+    /// Places outside the bounds belong to the nearest leaf.
     #[inline]
-    pub fn find(&self, matte: Mask8, p: Vec3x8, dir: Vec3x8, active: Mask8) -> U32x8 {
-        self.bins_of(self.tree.find(matte, p, None), dir, active)
+    pub fn find(&self, kind: U32x8, p: Vec3x8, dir: Vec3x8, active: Mask8) -> U32x8 {
+        self.bins_of(self.tree.find(kind & U32x8::splat(ROOTS - 1), p, None), dir, active)
     }
 
     /// As [`Self::find`], of places moved by `jitter - 0.5` of the edge of their leaf, `jitter` in [0, 1). So what is
     /// looked up has no visible borders: it is a box filter over the leaves, by sampling.
     #[inline]
-    pub fn find_jittered(&self, matte: Mask8, p: Vec3x8, dir: Vec3x8, jitter: [F32x8; 3], active: Mask8) -> U32x8 {
-        self.bins_of(self.tree.find(matte, p, Some(jitter)), dir, active)
+    pub fn find_jittered(&self, kind: U32x8, p: Vec3x8, dir: Vec3x8, jitter: [F32x8; 3], active: Mask8) -> U32x8 {
+        self.bins_of(self.tree.find(kind & U32x8::splat(ROOTS - 1), p, Some(jitter)), dir, active)
     }
 
     #[inline(always)]

@@ -176,9 +176,9 @@ impl<'m> Knowledge<'m> {
 
     /// See [`Cache::find_jittered`].
     #[inline]
-    pub(crate) fn scene_bins(&self, matte: Mask8, p: Vec3x8, dir: Vec3x8, jitter: [F32x8; 3], active: Mask8) -> U32x8 {
+    pub(crate) fn scene_bins(&self, kind: U32x8, p: Vec3x8, dir: Vec3x8, jitter: [F32x8; 3], active: Mask8) -> U32x8 {
         match &self.cache {
-            Some(c) => c.find_jittered(matte, p, dir, jitter, active),
+            Some(c) => c.find_jittered(kind, p, dir, jitter, active),
             None => U32x8::splat(u32::MAX),
         }
     }

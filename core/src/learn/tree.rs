@@ -16,8 +16,8 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 pub(super) const MAX_DEPTH: u32 = 16;
 /// Most leaves: their numbers have 26 bits.
 pub(super) const MAX_LEAVES: u32 = 1 << 26;
-/// Roots: matte vertices, all others.
-pub(super) const ROOTS: u32 = 2;
+/// Octrees.
+pub(super) const ROOTS: u32 = 4;
 /// Children lie at multiples of 8, so the roots have eight words as well.
 const FIRST_CHILD: u32 = 8;
 
@@ -186,8 +186,7 @@ impl<'m> Tree<'m> {
     /// First bin of the leaf per lane. With `jitter` in [0, 1) of the leaf around a place that was moved by
     /// `jitter - 0.5` of the edge of its own leaf, but not out of the cube.
     #[inline(always)]
-    pub(super) fn find(&self, matte: Mask8, p: Vec3x8, jitter: Option<[F32x8; 3]>) -> U32x8 {
-        let root = U32x8::select(matte, U32x8::splat(0), U32x8::splat(1));
+    pub(super) fn find(&self, root: U32x8, p: Vec3x8, jitter: Option<[F32x8; 3]>) -> U32x8 {
         let place = self.place(p);
         let mut word = self.descend(root, place);
         if let Some([a, b, c]) = jitter {

@@ -6,6 +6,7 @@ use super::shard::Shard;
 use super::vertex::{RESERVE, Vertex8};
 use crate::accel::Intersector;
 use crate::bsdf::{self, Bsdf, Inputs8, Visitor};
+use crate::learn::cache::Kind;
 use crate::profile::Profile;
 use crate::rrs::{self, Learned8, Space, Vertices8};
 use crate::scene::Scene;
@@ -101,6 +102,7 @@ fn place<P: Profile, I: Intersector>(
     session: &Session<'_, '_, P, I>,
     a: &Arrival8,
     albedo: Vec3x8,
+    importance: Vec3x8,
     space: Space,
     mut root_film: impl FnMut(usize) -> u32,
 ) -> Place8 {
@@ -112,8 +114,16 @@ fn place<P: Profile, I: Intersector>(
             let mirrored = v.ns * (v.ns.dot(v.wo) * F32x8::splat(2.0)) - v.wo;
             let matte = lanes_of(MATTE, a);
             let dir = Vec3x8::select(lanes_of(THROUGH, a), v.wo, Vec3x8::select(matte, v.ns, mirrored));
-            let bin = knowledge.scene_bins(matte, v.p, dir, [u0, u1, u2], a.active);
-            Place8 { bin, scale: inverse(albedo, DARKEST), unscale: albedo }
+            let seen = v.depth.eq(U32x8::splat(1));
+            let kind = U32x8::select(matte, U32x8::splat(Kind::Matte as u32), U32x8::splat(Kind::Shiny as u32));
+            let first = U32x8::splat(Kind::FirstMatte as u32 - Kind::Matte as u32);
+            let kind = kind + U32x8::select(seen, first, U32x8::splat(0));
+            let bin = knowledge.scene_bins(kind, v.p, dir, [u0, u1, u2], a.active);
+            // in one cell bright pixels see bright samples: only their ratio is alike
+            let pixel = inverse(importance, f32::MIN_POSITIVE);
+            let pixel = Vec3x8::new(pixel.x.sqrt(), pixel.y.sqrt(), pixel.z.sqrt());
+            let unscale = Vec3x8::select(seen, pixel, albedo);
+            Place8 { bin, scale: inverse(unscale, DARKEST), unscale }
         }
         Space::Image => {
             let depth = v.depth.to_array();
@@ -156,7 +166,7 @@ impl Shard<'_> {
         }
         if let Some(space) = strategy.space() {
             let root = v.root.to_array();
-            let found = place(session, &a, albedo, space, |i| self.roots.get(root[i]).film);
+            let found = place(session, &a, albedo, learned.importance, space, |i| self.roots.get(root[i]).film);
             knowledge.local8(&mut learned, found.bin, found.unscale, a.active);
             logged = Some(found);
         }
