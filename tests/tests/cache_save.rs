@@ -32,7 +32,7 @@ fn a_saved_cache_comes_back_bit_for_bit() {
     for _ in 0..10_000 {
         let (p, d) = vertex(&mut rng);
         let [a, b] = [&cache, &other].map(|c| {
-            let bin = croupier::simd::U32x8::splat(find(c, true, p, d));
+            let bin = croupier::simd::U32x8::splat(find(c, 0, p, d));
             let l = c.local(bin, croupier::simd::Mask8::first(1));
             [l.mean.lane(0), l.moment.lane(0), l.variance.lane(0), [l.cost.lane(0), l.count.lane(0), 0.0]]
         });

@@ -328,6 +328,11 @@ impl<'m> Knowledge<'m> {
         whole.then(|| core::array::from_fn(|c| &*self.estimate[c]))
     }
 
+    /// Is there an estimate of the pixels?
+    pub(crate) fn has_estimate(&self) -> bool {
+        self.estimated
+    }
+
     /// The host's estimate of the pixels replaces the built-in one from now on.
     pub(crate) fn give_estimate(&mut self, rgb: &[[f32; 3]]) -> bool {
         if self.learning.estimate != Estimate::Denoised || rgb.len() != self.estimate[0].len() {
