@@ -81,7 +81,6 @@ pub fn render(subject: &Subject, strategy: &str, seed: u64, target: Target, nois
         seed,
         shards: 16,
         strategy: Strategy::parse(strategy)?,
-        learning: knobs(),
         aovs: true,
         ..Settings::for_scene(&scene)
     };
@@ -147,14 +146,4 @@ impl Observer for Watch<'_> {
         state.snapshots.push(snapshot);
         state.paused += cpu_seconds().zip(now).map_or(0.0, |(b, a)| b - a);
     }
-}
-
-fn knobs() -> croupier::learn::Learning {
-    let mut l = croupier::learn::Learning::default();
-    for (k, x) in l.knobs.iter_mut().zip(std::env::var("KNOBS").unwrap_or_default().split(',')) {
-        if let Ok(x) = x.parse() {
-            *k = x;
-        }
-    }
-    l
 }

@@ -4,7 +4,7 @@ use crate::film::{PixelAov, PixelStats};
 use crate::learn::cache::CacheSize;
 use crate::learn::{Constant, Knowledge, Learning};
 use crate::memory::{Layout, Measure};
-use crate::rrs::{Space, Strategy};
+use crate::rrs::{MAX_FACTOR, MIN_FACTOR, Space, Strategy};
 use crate::scene::Scene;
 use crate::tiles::Tiles;
 use crate::tracer::shard_measure;
@@ -97,7 +97,7 @@ impl fmt::Display for SettingsError {
             Self::Ring(n) => write!(f, "ring of {n} vertices: need {MIN_RING} to 2^24"),
             Self::Cache(n) => write!(f, "cache of {n} bytes: too small for one leaf per shard and the session"),
             Self::Constant => f.write_str("the constant of roulette must be finite, and the cached mean needs ear, ears, adrr or adrrs"),
-            Self::Learning => f.write_str("learning: need a ledger of 1 to 2^24 records, a split count above 0, a carry of 0 to 1"),
+            Self::Learning => f.write_str("learning: need a ledger of 1 to 2^24 records, a split count above 0, a carry of 0 to 1, factors around 1 in 0.05 to 20"),
             Self::Memory => f.write_str("these settings need more memory than can be addressed"),
         }
     }
@@ -178,7 +178,9 @@ fn cache_size(s: &Settings) -> Result<Option<CacheSize>, SettingsError> {
         return Ok(None);
     }
     let l = &s.learning;
-    if l.ledger == 0 || l.ledger > 1 << 24 || !(l.split_count > 0.0) || !(0.0..=1.0).contains(&l.carry) {
+    let [least, most] = l.factors;
+    let bounds = MIN_FACTOR <= least && least <= 1.0 && 1.0 <= most && most <= MAX_FACTOR;
+    if !bounds || l.ledger == 0 || l.ledger > 1 << 24 || !(l.split_count > 0.0) || !(0.0..=1.0).contains(&l.carry) {
         return Err(SettingsError::Learning);
     }
     CacheSize::within(l.cache_bytes, s.shards).map(Some).ok_or(SettingsError::Cache(l.cache_bytes))

@@ -14,8 +14,6 @@ pub const MAX_VALUE: f32 = 36_028_797_018_963_968.0;
 /// Twice the square of [`MAX_VALUE`].
 const MAX_SQUARE: f32 = 2.0 * MAX_VALUE * MAX_VALUE;
 
-/// Samples that the mean of a bin's leaf counts for in the bin.
-const LEAF_SAMPLES: f64 = 8.0;
 /// Pairs that `moment - mean^2` counts for in the variance.
 const SPREAD_PAIRS: f64 = 16.0;
 

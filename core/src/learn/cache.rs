@@ -18,6 +18,9 @@ use super::tree::{MAX_DEPTH, MAX_LEAVES, Node, ROOTS, Tree, direction_bin};
 use crate::memory::{Carver, Layout, Measure, MemoryError};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
+/// Samples that the surroundings of a cell count for in it.
+const PRIOR_SAMPLES: f64 = 4.0;
+
 /// Kinds of vertices, each with an octree of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
@@ -81,7 +84,6 @@ pub struct Cache<'m> {
     splits_refused: u64,
     /// Leaves of a cache without a tree.
     flat: Option<u32>,
-    pub(crate) prior_samples: f64,
 }
 
 impl<'m> Cache<'m> {
@@ -105,7 +107,7 @@ impl<'m> Cache<'m> {
 
     pub(crate) fn carve(c: &mut Carver<'m>, size: CacheSize, lo: [f32; 3], hi: [f32; 3]) -> Result<Self, MemoryError> {
         let tree = Tree::carve(c, Tree::nodes_for(size.splits), size.leaves(), lo, hi)?;
-        Ok(Self { tree, sums: c.take(size.bins())?, frozen: c.take(size.bins())?, size, splits_refused: 0, flat: None, prior_samples: 8.0 })
+        Ok(Self { tree, sums: c.take(size.bins())?, frozen: c.take(size.bins())?, size, splits_refused: 0, flat: None })
     }
 
     /// The bins of eight vertices, `u32::MAX` in inactive lanes. `kind` holds [`Kind`]s, `dir` unit vectors in world space.
@@ -224,7 +226,7 @@ impl<'m> Cache<'m> {
 
     fn freeze_below(&mut self, index: u32, prior: &BinSums) {
         match self.tree.node(index) {
-            Node::Leaf { number, .. } => self.freeze_one(number, prior, self.prior_samples),
+            Node::Leaf { number, .. } => self.freeze_one(number, prior, PRIOR_SAMPLES),
             Node::Inner { child } => {
                 let mut all = BinSums::ZERO;
                 self.tree.visit(index, &mut |n| {
@@ -232,7 +234,7 @@ impl<'m> Cache<'m> {
                         self.leaf(number).iter().for_each(|b| all.add(b, 1.0));
                     }
                 });
-                all.shrink(prior, self.prior_samples);
+                all.shrink(prior, PRIOR_SAMPLES);
                 (child..child + 8).for_each(|c| self.freeze_below(c, &all));
             }
         }

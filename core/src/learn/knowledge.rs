@@ -16,9 +16,10 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 /// Bins of path lengths per block of pixels, for statistics over the picture.
 const DEPTHS: u32 = 16;
 
-/// Share of the pixels whose variance is left out of the picture's: a single outlier would decide all factors (EARS
-/// section 5.2: 0.001 %).
-const OUTLIERS: f64 = 1e-5;
+/// Share of the pixels whose variance is left out of the picture's. A single outlier would decide all factors: with the
+/// 0.001 % of EARS (section 5.2), none in a small picture, one bright sample made all vertices look worthless, and roulette
+/// then made more such samples.
+const OUTLIERS: f64 = 1e-3;
 
 /// Iterations count at most this much more than their work says.
 const LARGEST_GAIN: f64 = 10.0;
@@ -46,6 +47,8 @@ pub struct PictureStatistics {
     pub outliers: f64,
     /// Mean counted cost (eq. 33).
     pub cost: f64,
+    /// Error of one sample that would make its pixel an outlier.
+    pub limit: f64,
 }
 
 /// Everything learned, frozen while an iteration runs.
@@ -292,13 +295,18 @@ impl<'m> Knowledge<'m> {
         if self.weight > 0.0 && b.variance > 0.0 { (b.cost / b.variance).min(1e30) as f32 } else { 0.0 }
     }
 
+    /// Error of one sample in its pixel beyond which it is an outlier to the statistics; infinite while unknown.
+    #[inline]
+    pub(crate) fn outlier(&self) -> f32 {
+        if self.blended.limit > 0.0 { self.blended.limit as f32 } else { f32::INFINITY }
+    }
+
     /// What is known of the picture, for vertices of pixels of this importance.
     #[inline]
     pub(crate) fn image8(&self, importance: Vec3x8) -> Learned8 {
         Learned8 {
             importance,
             norm: self.learning.norm,
-            knobs: self.learning.knobs,
             cost_over_variance: F32x8::splat(self.cost_over_variance()),
             ..Learned8::NONE
         }
@@ -393,6 +401,7 @@ impl<'m> Knowledge<'m> {
             }
         });
         let n = n.max(1) as f64;
+        s.limit = f64::from(outlier) * counters.camera_samples as f64 / n.max(1.0);
         s.variance /= kept.max(1) as f64;
         s.outliers /= n;
         let c = counters;
@@ -407,6 +416,7 @@ impl<'m> Knowledge<'m> {
             variance: blend(self.blended.variance, s.variance),
             outliers: blend(self.blended.outliers, s.outliers),
             cost: blend(self.blended.cost, s.cost),
+            limit: s.limit,
         };
         if self.first[0] == 0.0 {
             self.first = [s.cost, s.variance];
@@ -455,10 +465,9 @@ impl<'m> Knowledge<'m> {
     /// Ends an iteration: adds what the shards learned of the scene.
     pub(crate) fn learn_scene<'a, 'b: 'a>(&mut self, shards: impl Iterator<Item = &'a Training<'b>>) {
         if let Some(cache) = &mut self.cache {
-            cache.prior_samples = f64::from(self.learning.knobs[4]);
-            cache.begin_merge(f64::from(self.learning.knobs[0]));
+            cache.begin_merge(f64::from(self.learning.carry));
             shards.for_each(|t| cache.absorb(t));
-            cache.freeze(f64::from(self.learning.knobs[5]));
+            cache.freeze(f64::from(self.learning.split_count));
         }
     }
 

@@ -1,7 +1,7 @@
 //! What the caller chooses about learning.
 
 use super::knowledge::Estimate;
-use crate::rrs::{Learned8, Norm};
+use crate::rrs::{Learned8, MAX_FACTOR, MIN_FACTOR, Norm};
 use croupier_simd::{F32x8, Vec3x8};
 
 /// Which error is to be small.
@@ -58,8 +58,8 @@ pub struct Learning {
     pub objective: Objective,
     /// How the errors of the channels become one.
     pub norm: Norm,
-    /// Experiments.
-    pub knobs: [f32; 8],
+    /// Smallest and largest learned factor, within [`MIN_FACTOR`] and [`MAX_FACTOR`].
+    pub factors: [f32; 2],
 }
 
 impl Default for Learning {
@@ -72,7 +72,7 @@ impl Default for Learning {
             estimate: Estimate::Denoised,
             objective: Objective::Relative,
             norm: Norm::Mean,
-            knobs: [0.75, 32.0, 256.0, 0.0, 8.0, 10000.0, 20.0, 0.0],
+            factors: [MIN_FACTOR, MAX_FACTOR],
         }
     }
 }

@@ -9,6 +9,7 @@
 //! |---|---|---|
 //! | [`TRUST_MEAN`] | samples of a bin | 32 |
 //! | [`TRUST_MOMENT`] | samples of a bin | 256 |
+//! | [`MOST_THROUGHPUT`] | throughput after roulette | 10 |
 
 use super::{Classic, MAX_FACTOR, MIN_FACTOR, RrsStrategy, Space, Vertices8, adrrs};
 use croupier_simd::F32x8;
@@ -17,6 +18,8 @@ use croupier_simd::F32x8;
 const TRUST_MEAN: f32 = 32.0;
 /// Samples at which the second moment counts half.
 const TRUST_MOMENT: f32 = 256.0;
+/// Throughput (times albedo) that roulette may lead to.
+const MOST_THROUGHPUT: f32 = 10.0;
 
 /// The most efficient factor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,15 +61,11 @@ pub(super) fn grown(v: &Vertices8, s: F32x8, plain: bool) -> F32x8 {
     let log = |x: F32x8| x.clamp(MIN_FACTOR, MAX_FACTOR).ln();
     let blend = |a: F32x8, b: F32x8, t: F32x8| a + (b - a) * t;
     let window = adrrs::window(l.contribution(v.beta));
-    let learned = blend(log(window), log(s), l.trust(l.knobs[2]));
-    let s = known.select(blend(log(classic), learned, l.trust(l.knobs[1])).exp(), classic);
-    let s = s.min(F32x8::splat(l.knobs[6]));
-    if l.knobs[3] > 0.0 {
-        let g = (v.beta * v.albedo).max_component() * F32x8::splat(1.0 / l.knobs[3]);
-        s.max(g.min(F32x8::ONE))
-    } else {
-        s
-    }
+    let learned = blend(log(window), log(s), l.trust(TRUST_MOMENT));
+    let s = known.select(blend(log(classic), learned, l.trust(TRUST_MEAN)).exp(), classic);
+    // what is killed out of ignorance comes back as a few samples of enormous weight: no factor below 1 brings the
+    // throughput over the limit
+    s.max(((v.beta * v.albedo).max_component() / MOST_THROUGHPUT).min(F32x8::ONE))
 }
 
 impl RrsStrategy for Ears {

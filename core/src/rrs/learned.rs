@@ -64,8 +64,6 @@ pub struct Learned8 {
     pub cost: F32x8,
     /// Samples behind these; 0 means that nothing is known.
     pub count: F32x8,
-    /// Experiments.
-    pub knobs: [f32; 8],
 }
 
 impl Learned8 {
@@ -79,7 +77,6 @@ impl Learned8 {
         variance: Vec3x8::ZERO,
         cost: F32x8::ONE,
         count: F32x8::ZERO,
-        knobs: [0.0; 8],
     };
 
     /// The factor that is best for samples whose square is expected to be `r`: eq. 32 for prefix weight `beta`.

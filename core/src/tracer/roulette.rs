@@ -180,6 +180,8 @@ impl Shard<'_> {
             shininess: if strategy.needs_shininess() { shininess(session.scene(), &a) } else { F32x8::ZERO },
             learned,
         });
+        let [least, most] = settings.learning.factors;
+        let s = if logged.is_some() { s.clamp(least, most) } else { s };
         let s = self.bound(s, v.root, a.active);
         let n = rrs::comb(a.active.zero_unless(s), self.comb_bits());
         self.record_factors(a.active, s, &v);

@@ -2,6 +2,7 @@
 //! film.
 
 use super::shard::Shard;
+use crate::film::REL_MSE_EPSILON;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Radiance found by eight samples.
@@ -34,7 +35,7 @@ impl Shard<'_> {
             self.count_non_finite(root[i]);
         }
         if self.ledger.is_on() {
-            let x = found.local;
+            let x = found.local * self.tamed(good, radiance, U32x8::new(root));
             let (r, g, b) = (x.x.to_array(), x.y.to_array(), x.z.to_array());
             let ledger = ledger.to_array();
             for i in good.lanes() {
@@ -44,6 +45,20 @@ impl Shard<'_> {
                 self.ledger.spoil(ledger[i]);
             }
         }
+    }
+
+    /// What part of eight contributions the statistics take. The variance of the picture leaves outliers out; so must the
+    /// moments that are weighed against it, or cells that met one sample of them would split for ever.
+    fn tamed(&mut self, mask: Mask8, radiance: Vec3x8, root: U32x8) -> F32x8 {
+        let limit = F32x8::splat(self.outlier);
+        let square = radiance * radiance;
+        // the importance of a channel is at most that of a black pixel
+        let most = square.max_component() * F32x8::splat(1.0 / REL_MSE_EPSILON as f32);
+        if (mask & most.gt(limit)).none() {
+            return F32x8::ONE;
+        }
+        let error = (square * self.importance(root, mask)).mean();
+        error.gt(limit).select((limit / error).sqrt(), F32x8::ONE)
     }
 
     /// Counts a value that was not finite and remembers the first pixel.

@@ -73,6 +73,8 @@ pub struct Shard<'m> {
     pub(crate) training: Option<Training<'m>>,
     pub(super) pixels: &'m mut [PixelSums],
     pub(super) aovs: &'m mut [PixelAov],
+    /// Error of a sample beyond which it is an outlier to the statistics.
+    pub(super) outlier: f32,
     /// Numbers of the combs, one per packet.
     comb: Pcg32,
     pub(super) counters: Counters,
@@ -99,6 +101,7 @@ impl<'m> Shard<'m> {
             training: plan.cache.map(|size| Training::carve(&mut c, size)).transpose().map_err(memory)?,
             pixels: c.take(pixels).map_err(memory)?,
             aovs: c.take(if s.aovs { pixels } else { 0 }).map_err(memory)?,
+            outlier: f32::INFINITY,
             comb: Pcg32::seed_from_u64(0),
             counters: Counters::default(),
         })
@@ -141,6 +144,7 @@ impl<'m> Shard<'m> {
         self.cursor = Cursor::new(&self.plan.tiles, self.index, iteration.samples);
         self.counters = Counters::default();
         self.pixels.fill(PixelSums::default());
+        self.outlier = session.knowledge().outlier();
         if let Some(t) = &mut self.training {
             t.clear(session.knowledge().used_bins());
         }
