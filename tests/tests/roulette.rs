@@ -1,6 +1,6 @@
 //! Factors, their rounding and their bounds.
 
-use croupier::rrs::{COMB_ONE, MAX_FACTOR, MIN_FACTOR, Strategy, Vertices8, comb};
+use croupier::rrs::{COMB_ONE, Learned8, MAX_FACTOR, MIN_FACTOR, Strategy, Vertices8, comb};
 use croupier::simd::{F32x8, U32x8, Vec3x8};
 
 /// Mean of n over all u on a grid of `m` equally spaced values that includes 0: exact for a comb in fixed point whose
