@@ -79,7 +79,7 @@ impl Learned8 {
         variance: Vec3x8::ZERO,
         cost: F32x8::ONE,
         count: F32x8::ZERO,
-        knobs: [0.0; 8],
+        knobs: [0.75, 32.0, 256.0, 0.0, 8.0, 10000.0, 20.0, 0.0],
     };
 
     /// The factor that is best for samples whose square is expected to be `r`: eq. 32 for prefix weight `beta`.
