@@ -210,3 +210,30 @@ pub fn height_and_azimuth(d: [f64; 3]) -> [f64; 2] {
     let (height, x, y) = (dot([2.0, -1.0, 2.0]), dot([2.0, 2.0, -1.0]), dot([-1.0, 2.0, 2.0]));
     [height, y.atan2(x).rem_euclid(std::f64::consts::TAU)]
 }
+
+/// Puts other sums into saved bytes: `sums` gives count, pairs, cost, sum (3), squared sum (3) and pair sum (3) of a bin.
+pub fn overwrite(bytes: &mut [u8], mut sums: impl FnMut() -> [f64; 12]) {
+    let at = sums_at(bytes);
+    for bin in bytes[at..].chunks_exact_mut(96) {
+        for (b, x) in bin.chunks_exact_mut(8).zip(sums()) {
+            b.copy_from_slice(&x.to_le_bytes());
+        }
+    }
+    rehash(bytes);
+}
+
+/// Sums of a bin that have nothing to do with any scene, each number over many orders of magnitude; some bins are empty.
+pub fn random_sums(rng: &mut SplitMix) -> [f64; 12] {
+    let mut log = |lo: f64, hi: f64| (rng.range(lo.ln(), hi.ln())).exp();
+    let (count, pairs) = (log(1.0, 1e5), log(1.0, 1e5));
+    let mean = [(); 3].map(|()| log(1e-2, 10.0));
+    let spread = [(); 3].map(|()| log(1e-3, 30.0));
+    let cost = log(1.0, 30.0) * count;
+    let pair = [(); 3].map(|()| log(1e-4, 100.0) * pairs);
+    if log(1.0, 10.0) < 1.3 {
+        return [0.0; 12];
+    }
+    let of = |c: usize| mean[c] * count;
+    let sqr = |c: usize| mean[c] * mean[c] * (1.0 + spread[c]) * count;
+    [count, pairs, cost, of(0), of(1), of(2), sqr(0), sqr(1), sqr(2), pair[0], pair[1], pair[2]]
+}

@@ -10,6 +10,7 @@ pub mod light_scene;
 pub mod light_stats;
 pub mod math;
 pub mod quadrature;
+pub mod replay;
 pub mod runner;
 pub mod scenes;
 pub mod stats;

@@ -2,8 +2,10 @@
 
 use croupier::accel::{Intersector, WideBvh};
 use croupier::film::{PixelAov, PixelStats};
+use croupier::learn::PictureStatistics;
+use croupier::learn::cache::CacheError;
 use croupier::profile::{Full, Matte, Profile};
-use croupier::{Budget, Counters, ErrorEstimate, Plan, Progress, Scene, Session, Settings, Shard, Strategy};
+use croupier::{Budget, Counters, ErrorEstimate, Plan, Progress, Scene, Session, SessionError, Settings, Shard, Strategy};
 use croupier_host::blob::AlignedBytes;
 
 use crate::stats::SplitMix;
@@ -89,6 +91,73 @@ pub fn scheduled(scene: &[u8], settings: &Settings, iterations: &[u32], schedule
     }
 }
 
+/// As [`scheduled`]; `before` sees what was learned before each iteration, and may change it.
+pub fn learning(
+    scene: &[u8],
+    settings: &Settings,
+    iterations: &[u32],
+    schedule: Schedule,
+    before: &mut dyn FnMut(usize, &mut dyn Learned),
+) -> Image {
+    let scene = Scene::from_bytes(scene).expect("a valid scene");
+    let bvh = WideBvh::new(&scene);
+    if Matte::EFFECTS.contains(scene.effects) {
+        learning_with::<Matte, _>(scene, bvh, settings, iterations, schedule, before)
+    } else {
+        learning_with::<Full, _>(scene, bvh, settings, iterations, schedule, before)
+    }
+}
+
+/// What a session has learned, whatever its profile.
+pub trait Learned {
+    /// The statistics of the scene as bytes, if there are any.
+    fn saved(&self) -> Option<Vec<u8>>;
+
+    /// Loads saved statistics.
+    fn load(&mut self, bytes: &[u8]) -> Result<(), CacheError>;
+
+    /// Gives an estimate of the pixels.
+    fn give(&mut self, rgb: &[[f32; 3]]) -> Result<(), SessionError>;
+
+    /// What is known of the picture: of the last iteration, and blended.
+    fn statistics(&self) -> [PictureStatistics; 2];
+
+    /// Counts of the finished iterations.
+    fn counters(&self) -> Counters;
+
+    /// Pixels of the finished iterations.
+    fn pixels(&self) -> &[PixelStats];
+}
+
+impl<P: Profile, I: Intersector> Learned for Session<'_, '_, P, I> {
+    fn saved(&self) -> Option<Vec<u8>> {
+        let cache = self.cache()?;
+        let mut bytes = vec![0; cache.saved_len()];
+        cache.save(&mut bytes).expect("room for the cache");
+        Some(bytes)
+    }
+
+    fn load(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
+        self.cache_mut().expect("a cache").load(bytes)
+    }
+
+    fn give(&mut self, rgb: &[[f32; 3]]) -> Result<(), SessionError> {
+        self.give_estimate(rgb)
+    }
+
+    fn statistics(&self) -> [PictureStatistics; 2] {
+        self.picture_statistics()
+    }
+
+    fn counters(&self) -> Counters {
+        *Session::counters(self)
+    }
+
+    fn pixels(&self) -> &[PixelStats] {
+        self.film().pixels()
+    }
+}
+
 /// Renders with an intersector and a profile.
 pub fn render_with<P: Profile + Sync, I: Intersector + Sync>(
     scene: Scene<'_>,
@@ -97,13 +166,25 @@ pub fn render_with<P: Profile + Sync, I: Intersector + Sync>(
     iterations: &[u32],
     schedule: Schedule,
 ) -> Image {
+    learning_with::<P, I>(scene, intersector, settings, iterations, schedule, &mut |_, _| ())
+}
+
+fn learning_with<P: Profile + Sync, I: Intersector + Sync>(
+    scene: Scene<'_>,
+    intersector: I,
+    settings: &Settings,
+    iterations: &[u32],
+    schedule: Schedule,
+    before: &mut dyn FnMut(usize, &mut dyn Learned),
+) -> Image {
     let plan = Plan::new(settings).expect("settings that can be used");
     let mut shared = AlignedBytes::zeroed(plan.session().size);
     let mut blocks: Vec<_> = (0..settings.shards).map(|_| AlignedBytes::zeroed(plan.shard().size)).collect();
     let mut session = Session::<P, _>::new(scene, intersector, &plan, shared.as_mut()).expect("a session");
     let shards = blocks.iter_mut().enumerate().map(|(i, b)| Shard::new(&plan, i as u32, b.as_mut()));
     let mut shards: Vec<_> = shards.collect::<Result<_, _>>().expect("shards");
-    for spp in iterations {
+    for (i, spp) in iterations.iter().enumerate() {
+        before(i, &mut session);
         session.begin_iteration(*spp);
         run(&session, &mut shards, schedule);
         session.end_iteration(&shards).expect("all shards are done");

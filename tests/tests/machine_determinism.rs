@@ -2,10 +2,11 @@
 //! which shards are stepped do not matter, nor, in `reproducible` arithmetic, does the instruction set.
 
 use croupier::Settings;
+use croupier::learn::Constant;
 use croupier::scene::blob::content_hash;
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::builtin;
-use croupier_tests::runner::{Image, Schedule, render, scheduled, settings};
+use croupier_tests::runner::{Image, Learned, Schedule, learning, render, scheduled, settings};
 use croupier_tests::scenes::{blob, cornell, everything};
 use std::fmt::Write;
 use std::path::Path;
@@ -38,6 +39,52 @@ fn schedules_do_not_change_a_bit() {
                 assert!(other.bits() == reference.bits(), "{name}, {strategy}, {schedule:?}: the picture differs");
                 assert_eq!(other.counters, reference.counters, "{name}, {strategy}, {schedule:?}");
                 assert_eq!(other.error, reference.error);
+            }
+        }
+    }
+}
+
+/// What is learned, and everything that hangs on it, is as indifferent to schedules as the rest. Killed by: statistics that
+/// are absorbed in the order of completion, a cache that changes within an iteration, an estimate of the picture summed per
+/// thread, adaptive counts that a shard makes for itself.
+#[test]
+fn schedules_do_not_change_what_is_learned() {
+    for (name, scene) in [("cornell", cornell([24, 20])), ("everything", everything([24, 20]))] {
+        let scene = blob(&scene);
+        for all in [false, true] {
+            let mut settings = Settings { shards: 5, aovs: true, seed: 8, max_depth: 6, ..settings(&scene, "ears") };
+            settings.learning.split_count = 500.0;
+            // some samples find no record
+            settings.learning.ledger = 64;
+            if all {
+                (settings.adaptive, settings.shadow_roulette, settings.constant) = (true, true, Constant::Cached);
+            }
+            let iterations = [2, 3, 4];
+            let mut seen = Vec::new();
+            let mut run = |schedule| {
+                let mut learned = Vec::new();
+                let image = learning(&scene, &settings, &iterations, schedule, &mut |_, l: &mut dyn Learned| {
+                    learned.push((l.saved(), l.statistics()));
+                });
+                seen.push((schedule, image, learned));
+            };
+            run(Schedule::InOrder(1_000_000_000));
+            run(Schedule::InOrder(1));
+            run(Schedule::Reversed(100));
+            run(Schedule::InTurn(37));
+            run(Schedule::Shuffled(5, 500));
+            run(Schedule::Threads(1, 4096));
+            run(Schedule::Threads(2, 64));
+            run(Schedule::Threads(5, 1000));
+            let (_, reference, learned) = &seen[0];
+            let c = reference.counters;
+            assert!(c.samples_logged > 1000 && c.roulette_kills > 100 && c.splits > 100, "{c:?}");
+            assert!(learned[2].1[0].variance > 0.0 && (!all || c.shadow_kills > 100));
+            for (schedule, image, other) in &seen[1..] {
+                let what = format!("{name}, everything on {all}, {schedule:?}");
+                assert!(other == learned, "{what}: other statistics");
+                assert!(image.bits() == reference.bits(), "{what}: another picture");
+                assert_eq!(image.counters, reference.counters, "{what}");
             }
         }
     }
@@ -135,13 +182,20 @@ fn pictures_have_the_same_bits_on_every_target() {
     let mut text = String::from("# scene, strategy, hash of all sums of the film; rewrite with BLESS=1\n");
     for (name, scene) in [("builtin", box_of_the_program), ("everything", everything([48, 36]))] {
         let scene = bake(&scene, &BakeOptions::default(), |_, _| {}).unwrap().bytes;
-        for strategy in ["classic", "throughput", "fixed:3.3"] {
-            let settings =
-                Settings { shards: 4, aovs: true, max_depth: 12, split_budget: 64, ..settings(&scene, strategy) };
-            let image = scheduled(&scene, &settings, &[1, 3], Schedule::Threads(2, 4096));
+        let base = Settings { shards: 4, aovs: true, max_depth: 12, split_budget: 64, ..settings(&scene, "none") };
+        let mut add = |what: &str, settings: Settings, iterations: &[u32]| {
+            let image = scheduled(&scene, &settings, iterations, Schedule::Threads(2, 4096));
             assert_eq!(image.counters.non_finite, 0);
-            writeln!(text, "{name} {strategy} {:016x}", content_hash(&image.bits())).unwrap();
+            writeln!(text, "{name} {what} {:016x}", content_hash(&image.bits())).unwrap();
+        };
+        for strategy in ["classic", "throughput", "fixed:3.3"] {
+            add(strategy, Settings { strategy: settings(&scene, strategy).strategy, ..base }, &[1, 3]);
         }
+        let mut learns = Settings { strategy: settings(&scene, "ears").strategy, ..base };
+        learns.learning.split_count = 1000.0;
+        add("ears", learns, &[1, 2, 4]);
+        let all = Settings { adaptive: true, shadow_roulette: true, constant: Constant::Cached, ..learns };
+        add("ears+adaptive+shadow+constant", all, &[1, 2, 4]);
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("snapshots/hashes.txt");
     if std::env::var_os("BLESS").is_some() {

@@ -1,6 +1,6 @@
 //! Factors, their rounding and their bounds.
 
-use croupier::rrs::{COMB_ONE, Learned8, MAX_FACTOR, MIN_FACTOR, Strategy, Vertices8, comb};
+use croupier::rrs::{COMB_ONE, Learned8, MAX_FACTOR, MIN_FACTOR, Norm, Strategy, Vertices8, comb};
 use croupier::simd::{F32x8, U32x8, Vec3x8};
 
 /// Mean of n over all u on a grid of `m` equally spaced values that includes 0: exact for a comb in fixed point whose
@@ -99,6 +99,188 @@ fn strategies_follow_their_rules() {
     assert_eq!(factor("fixed:3.3", 0.5, 0.5, 1), 3.3);
 }
 
+/// "Go with the winners": throughput x albedo x sqrt(VR + VV / (shininess + 1)^2). Killed by: a variance in place of its
+/// root, the shininess unsquared, a factor held to 1.
+#[test]
+fn winners_follow_their_rule() {
+    let winners = |options: &str, beta: f32, shininess: f32| {
+        let v = Vertices8 { shininess: F32x8::splat(shininess), ..vertices(beta, 0.5, 1) };
+        Strategy::parse(&format!("winners{options}")).unwrap().factor(&v).lane(0)
+    };
+    // a matte surface: sqrt(1 + 3) = 2
+    assert_eq!(winners("", 0.5, 0.0), 0.5);
+    assert_eq!(winners("", 2.0, 0.0), 2.0);
+    // (1 + 1)^2 = 4: sqrt(1 + 3 / 4)
+    assert!((winners("", 1.0, 1.0) - 0.5 * 1.75f32.sqrt()).abs() < 1e-6);
+    // a mirror reflects one direction: only the reflected light varies
+    assert!((winners("", 1.0, 1e4) - 0.5).abs() < 1e-6);
+    assert_eq!(winners(":4:0", 1.0, 7.0), 1.0);
+    assert_eq!(winners(":0:16", 1.0, 1.0), 1.0);
+}
+
+/// Killed by: a relative rule without the root of the importance, one that looks at the wrong option.
+#[test]
+fn relative_classic_is_over_the_pixel() {
+    // the pixel is 1/4: importance 16
+    let learned = Learned8 { importance: Vec3x8::splat(16.0, 4.0, 1.0), ..Learned8::NONE };
+    let at = |text: &str, beta: f32, depth: u32| {
+        let v = Vertices8 { learned, ..vertices(beta, 0.5, depth) };
+        Strategy::parse(text).unwrap().factor(&v).lane(0)
+    };
+    assert_eq!(at("classic:5:relative", 0.25, 5), 0.5);
+    assert_eq!(at("classic:5:relative", 0.25, 4), 1.0);
+    assert_eq!(at("classic:5:relative", 8.0, 5), 1.0);
+    assert_eq!(at("classic:5", 0.25, 5), 0.125);
+    assert_eq!(at("classic:2:relative", 0.125, 2), 0.25);
+}
+
+/// A vertex of weight 1 whose bin has been learned so well that nothing is blended in.
+fn learned(mean: f32, moment: f32, variance: f32, cost: f32) -> Vertices8 {
+    let grey = |x: f32| Vec3x8::splat(x, x, x);
+    let learned = Learned8 {
+        importance: Vec3x8::ONE,
+        norm: Norm::Mean,
+        cost_over_variance: F32x8::ONE,
+        mean: grey(mean),
+        moment: grey(moment),
+        variance: grey(variance),
+        cost: F32x8::splat(cost),
+        count: F32x8::splat(1e12),
+        ..Learned8::NONE
+    };
+    Vertices8 { beta: grey(1.0), albedo: grey(0.5), learned, ..vertices(1.0, 0.5, 1) }
+}
+
+fn with(strategy: &str, v: &Vertices8) -> f32 {
+    Strategy::parse(strategy).unwrap().factor(v).lane(6)
+}
+
+/// Eq. 27: roulette by the moment if that says so; splitting by the variance if both say so; else neither. Killed by: splitting
+/// by the moment, roulette by the variance, a NaN or infinity that becomes the largest factor (NUMERICS RRS-3, RRS-4).
+#[test]
+fn moment_and_variance_decide_together() {
+    let (nan, inf) = (f32::NAN, f32::INFINITY);
+    // factors are the roots of these
+    for (moment, variance, ears, ear) in [
+        (0.25, 0.25, 0.5, 0.5),
+        (0.25, 4.0, 0.5, 0.5),
+        (0.25, 0.0, 0.5, 0.5),
+        (1.0, 0.25, 1.0, 1.0),
+        (1.0, 4.0, 1.0, 1.0),
+        (4.0, 0.25, 1.0, 1.0),
+        (4.0, 1.0, 1.0, 1.0),
+        (4.0, 2.25, 1.5, 1.0),
+        (4.0, 4.0, 2.0, 1.0),
+        (4.0, 0.0, 1.0, 1.0),
+        (1e9, 1e8, MAX_FACTOR, 1.0),
+        (0.0, 0.0, MIN_FACTOR, MIN_FACTOR),
+        (1e-9, 1e-9, MIN_FACTOR, MIN_FACTOR),
+        // not decidable: neither roulette nor splitting
+        (nan, nan, 1.0, 1.0),
+        (inf, inf, 1.0, 1.0),
+        (inf, 0.25, 1.0, 1.0),
+        (inf, nan, 1.0, 1.0),
+        (4.0, nan, 1.0, 1.0),
+        (4.0, inf, 1.0, 1.0),
+        (0.25, nan, 0.5, 0.5),
+        (0.25, inf, 0.5, 0.5),
+    ] {
+        let v = learned(0.5, moment, variance, 1.0);
+        assert_eq!(with("ears:plain", &v), ears, "ears, moment {moment}, variance {variance}");
+        assert_eq!(with("ear:plain", &v), ear, "ear, moment {moment}, variance {variance}");
+        if moment.is_finite() && variance.is_finite() {
+            let s = with("bolin-meyer", &v);
+            assert_eq!(s, ears, "bolin-meyer, moment {moment}, variance {variance}");
+        }
+    }
+}
+
+/// Eq. 32: s = sqrt(norm(beta^2 x importance x moment) x C / V / c). Killed by: a weight unsquared, the cost upside down, an
+/// importance per colour that is averaged first.
+#[test]
+fn factors_are_the_most_efficient_ones() {
+    let base = learned(0.5, 0.25, 0.25, 1.0);
+    let change = |f: &dyn Fn(&mut Vertices8)| {
+        let mut v = base;
+        f(&mut v);
+        with("ears:plain", &v)
+    };
+    assert_eq!(change(&|_| ()), 0.5);
+    assert_eq!(change(&|v| v.beta = v.beta * 0.5), 0.25);
+    assert_eq!(change(&|v| v.learned.cost = F32x8::splat(4.0)), 0.25);
+    assert_eq!(change(&|v| v.learned.cost_over_variance = F32x8::splat(4.0)), 1.0);
+    assert_eq!(change(&|v| v.learned.importance = v.learned.importance * 4.0), 1.0);
+    // (1 + 4 x 2 + 0) / 3 of a moment of 0.25
+    let colours = |v: &mut Vertices8| {
+        v.beta = Vec3x8::splat(1.0, 2.0, 0.0);
+        v.learned.importance = Vec3x8::splat(1.0, 2.0, 5.0);
+    };
+    assert!((change(&colours) - 0.75f32.sqrt()).abs() < 1e-6);
+    let by = |norm: Norm| {
+        change(&|v| {
+            colours(v);
+            v.learned.norm = norm;
+        })
+    };
+    assert!((by(Norm::Max) - 2f32.sqrt()).abs() < 1e-6);
+    assert!((by(Norm::Luminance) - (0.25 * (0.2126f32 + 8.0 * 0.7152)).sqrt()).abs() < 1e-4);
+}
+
+/// Nothing known is `classic`, much known is the rule itself. Killed by: an empty bin that kills (STA-5), ignorance of the
+/// picture taken for a picture without variance, confidence that shrinks with the samples.
+#[test]
+fn ignorance_is_classic() {
+    for strategy in ["ear", "ears", "ear:plain", "ears:plain"] {
+        for depth in [1, 5, 9] {
+            let classic = factor("classic", 0.25, 0.5, depth);
+            let with = |f: &dyn Fn(&mut Learned8)| {
+                let mut l = learned(0.5, 1e-6, 1e-6, 1.0).learned;
+                f(&mut l);
+                with(strategy, &Vertices8 { learned: l, ..vertices(0.25, 0.5, depth) })
+            };
+            assert_eq!(with(&|l| l.count = F32x8::ZERO), classic, "{strategy}: an empty bin");
+            assert_eq!(with(&|l| l.cost_over_variance = F32x8::ZERO), classic, "{strategy}: no picture");
+            assert!(with(&|_| ()) < 0.06, "{strategy} knows that nothing is there");
+        }
+    }
+    for strategy in ["adrr", "adrrs"] {
+        let empty = Learned8 { count: F32x8::ZERO, ..learned(0.5, 1.0, 1.0, 1.0).learned };
+        let v = Vertices8 { learned: empty, ..vertices(0.25, 0.5, 6) };
+        assert_eq!(with(strategy, &v), factor("classic", 0.25, 0.5, 6));
+    }
+    // in between: neither classic's 1 nor the rule's 0.05, and nearer to the rule with more samples
+    let at = |count: f32| {
+        let mut v = learned(1e-3, 1e-6, 1e-6, 1.0);
+        v.learned.count = F32x8::splat(count);
+        with("ears", &v)
+    };
+    let few = [1.0, 10.0, 100.0, 1e4].map(at);
+    assert!(few[0] < 1.0 && few.is_sorted_by(|a, b| a > b) && few[3] > 0.05, "{few:?}");
+}
+
+/// Expected contributions are brought into [1/3, 5/3] of the pixel. Killed by: a factor that aims at the middle of the window,
+/// a pixel that multiplies.
+#[test]
+fn the_window_is_left_alone() {
+    for (mean, importance, adrrs, adrr) in [
+        (1.0, 1.0, 1.0, 1.0),
+        (0.34, 1.0, 1.0, 1.0),
+        (1.66, 1.0, 1.0, 1.0),
+        (1.0 / 6.0, 1.0, 0.5, 0.5),
+        (10.0 / 3.0, 1.0, 2.0, 1.0),
+        (1.0 / 12.0, 4.0, 0.5, 0.5),
+        (5.0 / 3.0, 4.0, 2.0, 1.0),
+        (1e6, 1.0, MAX_FACTOR, 1.0),
+        (0.0, 1.0, MIN_FACTOR, MIN_FACTOR),
+    ] {
+        let mut v = learned(mean, mean * mean, 0.0, 1.0);
+        v.learned.importance = Vec3x8::splat(importance, importance, importance);
+        let close = |a: f32, b: f32| (a - b).abs() < 1e-5 * b;
+        let (s, r) = (with("adrrs", &v), with("adrr", &v));
+        assert!(close(s, adrrs) && close(r, adrr), "mean {mean}, importance {importance}: {s} and {r}");
+    }
+}
+
 /// Killed by: `clamp` before the finiteness test (`NaN.min(20)` is 20), no floor (NUMERICS RRS-3, RRS-5).
 #[test]
 fn factors_stay_in_their_bounds() {
@@ -131,6 +313,16 @@ fn unknown_strategies_and_options_are_named() {
         "threshold:-1",
         "threshold:NaN",
         "albedo:x",
+        "classic:5:absolute",
+        "classic:x:relative",
+        "winners:-1",
+        "winners:1:x",
+        "winners:1:1:1",
+        "ears:fancy",
+        "ear:x",
+        "adrr:1",
+        "adrrs:1",
+        "bolin-meyer:1",
     ] {
         let name = bad.split(':').next().unwrap();
         assert!(message(bad).contains(&format!("`{name}`")), "{bad}: {}", message(bad));

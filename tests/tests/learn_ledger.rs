@@ -1,0 +1,232 @@
+//! What the machine logs is what a recursive oracle finds with the same random numbers, and a ledger that is too small spoils
+//! nothing.
+
+use croupier::accel::WideBvh;
+use croupier::learn::cache::{Cache, CacheSize};
+use croupier::learn::{Estimate, Learning};
+use croupier::{Scene, Settings};
+use croupier_host::blob::AlignedBytes;
+use croupier_host::description::{Emitter, Model, Reflectance, SceneDescription};
+use croupier_tests::cache::{Oracle, overwrite};
+use croupier_tests::replay::{Replay, Sums};
+use croupier_tests::runner::{Learned, Schedule, learning, scheduled, settings};
+use croupier_tests::scenes::*;
+
+const IN_ORDER: Schedule = Schedule::InOrder(1 << 20);
+
+/// A closed diffuse box with a lamp, which the camera sees.
+fn lamp_box() -> SceneDescription {
+    let mut s = SceneDescription {
+        camera: camera([0.1, -0.1, 0.9], [0.1, 0.4, -1.0], 80.0, [4, 4]),
+        ..SceneDescription::default()
+    };
+    let wall = s.add_material("wall", diffuse([0.7, 0.5, 0.3]));
+    let lamp = s.add_material("lamp", grey(0.4));
+    add_box(&mut s, wall, [-1.0; 3], [1.0; 3], true);
+    add_quad(&mut s, "lamp", lamp, facing_y(0.3, 0.96, -1.0));
+    s.emitters.push(Emitter::Area { material: lamp, radiance: [5.0, 6.0, 7.0] });
+    s
+}
+
+/// The same with a mirror and a block of glass.
+fn mirror_and_glass() -> SceneDescription {
+    let mut s = lamp_box();
+    let mirror = s.add_material("mirror", Model::Mirror { reflectance: Reflectance::Constant([0.9, 0.8, 0.7]) });
+    let glass = s.add_material("glass", Model::Dielectric { int_ior: 1.5, ext_ior: 1.0 });
+    add_quad(&mut s, "mirror", mirror, facing_z(0.7, -0.9, 1.0));
+    add_box(&mut s, glass, [-0.6, -0.9, -0.4], [0.2, 0.1, 0.2], false);
+    s
+}
+
+/// One leaf for matte vertices and one for others: bins stay what they are.
+fn two_leaves(scene: &[u8], max_depth: u32) -> Settings {
+    let s = settings(scene, "ears:plain");
+    let learning = Learning { cache_bytes: 6500, ledger: 1 << 14, estimate: Estimate::Blocks, ..s.learning };
+    Settings { max_depth, learning, ring: 1 << 14, split_budget: 1 << 20, ..s }
+}
+
+/// Sums of all bins.
+fn bins(l: &dyn Learned) -> Vec<Sums> {
+    Oracle::new(&l.saved().unwrap()).leaves.into_iter().flatten().collect()
+}
+
+/// One more iteration of `spp` samples by the machine after `before`, and by the oracle: sums that were added, pixels.
+struct Both {
+    machine: Vec<Sums>,
+    oracle: Vec<Sums>,
+    /// Rays and samples of vertices, machine and oracle.
+    counted: [[u64; 2]; 2],
+    /// Radiance of the pixels, machine and oracle.
+    pixels: Vec<[[f64; 3]; 2]>,
+    pairs: f64,
+}
+
+/// Statistics so large that every factor is the largest, 20.
+const GREEDY: Sums = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1e12, 1e12, 1e12, 0.0, 0.0, 0.0];
+
+/// Renders `first` samples, then `second` ones with all factors 20; looks at the last of these iterations.
+fn both(description: &SceneDescription, max_depth: u32, iterations: &[u32]) -> Both {
+    let bytes = blob(description);
+    let s = two_leaves(&bytes, max_depth);
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    let mut states = Vec::new();
+    // the last "iteration" of no samples shows what the one before it left
+    let iterations = [iterations, &[0]].concat();
+    learning(&bytes, &s, &iterations, IN_ORDER, &mut |i, l: &mut dyn Learned| {
+        states.push((bins(l), l.pixels().to_vec(), l.counters()));
+        if i == 1 && iterations.len() > 2 {
+            let mut bytes = l.saved().unwrap();
+            overwrite(&mut bytes, || GREEDY);
+            l.load(&bytes).unwrap();
+        }
+    });
+    let greedy = iterations.len() > 2;
+    let (mut machine, new_pixels, new) = states.pop().unwrap();
+    let (_, old_pixels, old) = states.pop().unwrap();
+    assert_eq!((new.ledger_full, new.samples_refused, new.ring_capped, new.budget_capped), (0, 0, 0, 0), "{new:?}");
+
+    let size = CacheSize::within(s.learning.cache_bytes, 1).unwrap();
+    assert_eq!(size.leaves(), 2);
+    let mut block = AlignedBytes::zeroed(Cache::layout(size).unwrap().size);
+    let cache = Cache::new(size, scene.info.bounds_min, scene.info.bounds_max, block.as_mut()).unwrap();
+    let mut replay = Replay {
+        scene,
+        bvh: WideBvh::new(&scene),
+        cache: &cache,
+        seed: s.seed,
+        max_depth,
+        size: s.size,
+        factor: if greedy { 20 } else { 1 },
+        sums: vec![[0.0; 12]; 32],
+        counted: [0; 2],
+    };
+    let (before, spp) = if greedy { (iterations[0], iterations[1]) } else { (0, iterations[0]) };
+    let mut pixels = Vec::new();
+    for (i, (p, q)) in new_pixels.iter().zip(&old_pixels).enumerate() {
+        let weight = p.weight - q.weight;
+        let found = [0, 1, 2].map(|c| (p.sum[c] - q.sum[c]) / weight);
+        let at = [i as u32 % s.size[0], i as u32 / s.size[0]];
+        let mut expected = [0.0; 3];
+        for k in before..before + spp {
+            let x = replay.camera_sample(at, k);
+            (0..3).for_each(|c| expected[c] += x[c] / f64::from(spp));
+        }
+        pixels.push([found, expected]);
+    }
+    if greedy {
+        // what is carried over is the same part of everything
+        let carried = machine[0][0] - replay.sums[0][0];
+        assert!((0.0..=1.0).contains(&carried), "{carried} of the old samples");
+        for b in &mut machine {
+            b.iter_mut().zip(GREEDY).for_each(|(x, old)| *x -= carried * old);
+        }
+    }
+    let counted = [[new.rays() - old.rays(), new.vertex_samples - old.vertex_samples], replay.counted];
+    let total = |sums: &[Sums]| sums.iter().map(|b| b[9] + b[10] + b[11]).sum::<f64>();
+    let pairs = total(&machine) / total(&replay.sums);
+    Both { machine, oracle: replay.sums, counted, pixels, pairs }
+}
+
+fn check(what: &str, b: &Both) {
+    assert_eq!(b.counted[0], b.counted[1], "{what}: rays and samples");
+    let samples: f64 = b.machine.iter().map(|s| s[0]).sum();
+    assert!((samples - b.counted[0][1] as f64).abs() < 1e-6, "{what}: {samples} of {} samples logged", b.counted[0][1]);
+    for (bin, (m, o)) in b.machine.iter().zip(&b.oracle).enumerate() {
+        for field in 0..9 {
+            // counts, pairs and costs are whole numbers
+            let tolerance = if field < 3 { 1e-6 } else { 1e-3 + 2e-5 * o[field] };
+            let off = (m[field] - o[field]).abs();
+            assert!(off <= tolerance, "{what}: bin {bin}, field {field}: {} for {}", m[field], o[field]);
+        }
+    }
+    for (i, [m, o]) in b.pixels.iter().enumerate() {
+        for c in 0..3 {
+            assert!((m[c] - o[c]).abs() <= 1e-4 * o[c], "{what}: pixel {i}, channel {c}: {} for {}", m[c], o[c]);
+        }
+    }
+}
+
+/// Without splitting. Killed by: a sample logged in the bin it arrives at instead of the one it leaves, values with the weight
+/// of the path before them, emission without its MIS weight, the first camera ray charged to a sample.
+#[test]
+fn single_samples_are_logged_as_recursion_has_them() {
+    for (name, scene) in [("lamp", lamp_box()), ("mirror and glass", mirror_and_glass())] {
+        for max_depth in [2, 3, 5] {
+            let b = both(&scene, max_depth, &[200]);
+            let used = b.oracle.iter().filter(|s| s[0] > 0.0).count();
+            println!("{name}, depth {max_depth}: {} samples in {used} bins", b.counted[0][1]);
+            assert!(b.counted[0][1] > 3000 && used > if max_depth > 2 && name != "lamp" { 8 } else { 2 });
+            check(&format!("{name}, depth {max_depth}"), &b);
+        }
+    }
+}
+
+/// With twenty samples at every vertex, nested. Killed by: an inner estimate over n or over nothing, samples of a split vertex
+/// whose cost is counted once, a sum that is folded into the parent before it is complete.
+#[test]
+fn nested_splits_are_logged_as_recursion_has_them() {
+    for (name, scene) in [("lamp", lamp_box()), ("mirror and glass", mirror_and_glass())] {
+        for (max_depth, spp) in [(2, 12), (3, 8), (4, 1)] {
+            let b = both(&scene, max_depth, &[4, spp]);
+            println!("{name}, depth {max_depth}: {} samples, pairs {:.4} of those in random order", b.counted[0][1], b.pairs);
+            assert!(b.counted[0][1] > 3000);
+            check(&format!("{name}, depth {max_depth}, split"), &b);
+            assert!((b.pairs - 1.0).abs() < 0.15, "{name}, depth {max_depth}: pairs {}", b.pairs);
+        }
+    }
+}
+
+/// A ledger for a few samples: one iteration has the picture of a large one to the bit, what finds no record is counted, and
+/// what is logged are complete samples: of no bin more than there are. Killed by: a path that ends with its record, a sample
+/// that is logged without what its children would have added.
+#[test]
+fn a_full_ledger_changes_no_picture() {
+    for scene in [blob(&lamp_box()), blob(&mirror_and_glass())] {
+        for shards in [1, 3] {
+            let mut s = Settings { shards, size: [16, 16], ..two_leaves(&scene, 5) };
+            s.learning.cache_bytes = 1 << 16;
+            let run = |ledger: u32| {
+                let mut s = s;
+                s.learning.ledger = ledger;
+                scheduled(&scene, &s, &[8], IN_ORDER)
+            };
+            let large = run(1 << 14);
+            assert_eq!(large.counters.ledger_full, 0);
+            assert_eq!(large.counters.samples_logged, large.counters.vertex_samples);
+            for ledger in [1, 4, 16, 64] {
+                let small = run(ledger);
+                let c = small.counters;
+                assert!(small.bits() == large.bits(), "a ledger of {ledger} changes the picture");
+                assert!(c.ledger_full > 0, "a ledger of {ledger}: {c:?}");
+                assert!(c.samples_logged < large.counters.samples_logged, "{ledger}: {c:?}");
+                // a packet of camera samples takes eight records; with no more there is none for what follows
+                assert!((c.samples_logged > 0) == (ledger > 8), "{ledger}: {c:?}");
+            }
+        }
+    }
+}
+
+/// Complete samples only: with a small ledger a bin's samples cost at least what any sample costs, and where paths have one
+/// bounce left the means are those of a large one. Killed by: a spoiled sample that is logged all the same (too cheap and too
+/// dark).
+#[test]
+fn only_complete_samples_are_logged() {
+    let scene = blob(&lamp_box());
+    let means = |ledger: u32, max_depth: u32| {
+        let mut s = Settings { size: [16, 16], ..two_leaves(&scene, max_depth) };
+        s.learning.ledger = ledger;
+        let mut sums = [0.0; 12];
+        learning(&scene, &s, &[64, 0], IN_ORDER, &mut |i, l: &mut dyn Learned| {
+            if i == 1 {
+                bins(l).iter().for_each(|b| (0..12).for_each(|k| sums[k] += b[k]));
+            }
+        });
+        (sums[0], sums[2] / sums[0], sums[3] / sums[0])
+    };
+    // depth 2: a sample is a light ray and a bounce that ends; which of them finds a record hangs on nothing
+    let (all, cost, value) = means(1 << 14, 2);
+    let (few, small_cost, small_value) = means(12, 2);
+    println!("{few} of {all} samples: {small_cost} for {cost} rays, {small_value} for {value}");
+    assert!(few < 0.9 * all && few > 1000.0);
+    assert!((small_cost / cost - 1.0).abs() < 0.02 && (small_value / value - 1.0).abs() < 0.1);
+}

@@ -1,0 +1,290 @@
+//! Whatever was learned, and however, the mean stays: equivalence tests (TOST) of strategies that learn, of their settings and
+//! of statistics that are nonsense, against renders without roulette and against known radiance.
+//!
+//! As in `unbiased.rs`: equal is a difference within 0.2 % of the mean with 95 % confidence from both sides, standard errors
+//! are asserted to be below 0.06 %. A bias of 0.2 % passes with a probability of 5 %, one of 0.3 % with less than 1e-4.
+//! Here the iterations of a render are not independent; where that may matter the error comes from renders with different
+//! seeds.
+
+use croupier::learn::{Constant, Estimate, Learning, Objective};
+use croupier::rrs::Norm;
+use croupier::{Settings, Strategy};
+use croupier_host::builtin;
+use croupier_host::description::SceneDescription;
+use croupier_tests::cache::{overwrite, random_sums};
+use croupier_tests::runner::{Image, Learned, Schedule, learning, render, scheduled, settings};
+use croupier_tests::scenes::{blob, cornell, everything, glowing_box};
+use croupier_tests::stats::{Mean, SplitMix, equivalent};
+
+/// Half-width of what counts as equal, relative to the mean.
+const DELTA: f64 = 0.002;
+
+/// Standard error that renders aim at, relative to the mean.
+const TARGET: f64 = 0.00045;
+
+const IN_ORDER: Schedule = Schedule::InOrder(1 << 20);
+
+/// A mean and its standard error.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    mean: f64,
+    error: f64,
+}
+
+impl Known {
+    fn of(image: &Image) -> Self {
+        assert_eq!(image.counters.non_finite, 0);
+        Self { mean: image.mean(), error: image.error_of_mean() }
+    }
+
+    fn over(means: impl Iterator<Item = f64>) -> Self {
+        let mut m = Mean::default();
+        means.for_each(|x| m.add(x));
+        Self { mean: m.mean(), error: m.error() }
+    }
+}
+
+#[track_caller]
+fn assert_equivalent(what: &str, a: Known, b: Known) {
+    let (d, error) = ((a.mean - b.mean) / b.mean, a.error.hypot(b.error) / b.mean);
+    println!("{what}: {:+.4} % +- {:.4} %", 100.0 * d, 100.0 * error);
+    assert!(error < 0.0006, "{what}: the standard error of {error} is too large for the test");
+    assert!(equivalent(d, error, DELTA, 0.05), "{what}: differs by {d} +- {error}");
+}
+
+/// Statistics of a size that suits small pictures.
+fn learns(scene: &[u8], strategy: &str, max_depth: u32) -> Settings {
+    let s = settings(scene, strategy);
+    let learning = Learning { cache_bytes: 1 << 20, split_count: 2000.0, ..s.learning };
+    Settings { max_depth, learning, ..s }
+}
+
+/// Iterations that double up to 256 samples, `spp` in all.
+fn doubling(spp: u32) -> Vec<u32> {
+    let (mut all, mut left) = (vec![], spp);
+    while left > 0 {
+        let n = (spp - left).clamp(8, 256).min(left);
+        all.push(n);
+        left -= n;
+    }
+    all
+}
+
+/// As many samples as [`TARGET`] takes, by a pilot with another seed.
+fn run(scene: &[u8], s: &Settings) -> Image {
+    let pilot = scheduled(scene, &Settings { seed: s.seed + 100, ..*s }, &doubling(504), IN_ORDER);
+    let spp = 504.0 * (pilot.error_of_mean() / pilot.mean() / TARGET).powi(2);
+    scheduled(scene, s, &doubling((spp as u32).clamp(504, 60_000)), IN_ORDER)
+}
+
+/// Every strategy but the biased one, with the options that matter.
+fn strategies() -> Vec<String> {
+    let options: &[(&str, &[&str])] = &[
+        ("throughput", &["", ":luminance", ":mean:0.1:3:2"]),
+        ("albedo", &["", ":product"]),
+        ("classic", &["", ":1", ":5:relative", ":1:relative"]),
+        ("winners", &["", ":0.3:1"]),
+        ("ear", &["", ":plain"]),
+        ("ears", &["", ":plain"]),
+        ("fixed", &[":0.7", ":1.5"]),
+    ];
+    let of = |name: &'static str| options.iter().find(|o| o.0 == name).map_or(&[""][..], |o| o.1);
+    let names = Strategy::TABLE.iter().map(|t| t.0).filter(|n| *n != "threshold");
+    names.flat_map(|n| of(n).iter().map(move |o| format!("{n}{o}"))).collect()
+}
+
+/// In a closed box that glows radiance is L / (1 - rho) everywhere; paths never find a way out, so every factor counts.
+/// Killed by: weights over n, a sample counted into the pixel twice, iterations of unequal weight that are not divided by it.
+#[test]
+fn closed_boxes_have_their_radiance() {
+    let scene = blob(&glowing_box(0.5, 1.0, [8, 8]));
+    for strategy in strategies() {
+        // what is cut off is known; splitting everywhere needs a short end
+        let depth = match strategy.as_str() {
+            "fixed:1.5" => 7,
+            // the factors of its paths fall faster than their light: the variance grows with every segment
+            "albedo:product" => 4,
+            // splits more and more while that makes the pixel's own spread, which is 0, the only error
+            "bolin-meyer" => 3,
+            _ => 24,
+        };
+        let s = Settings { adaptive: strategy == "ears", ..learns(&scene, &strategy, depth) };
+        let image = run(&scene, &s);
+        let expected = 2.0 * (1.0 - 0.5f64.powi(depth as i32));
+        assert_equivalent(&strategy, Known::of(&image), Known { mean: expected, error: 0.0 });
+    }
+}
+
+/// Killed by: factors that hang on the sample's own future, statistics that change within an iteration, weights of
+/// iterations that follow their brightness.
+#[test]
+fn strategies_that_learn_agree_with_none() {
+    let scene = blob(&cornell([16, 16]));
+    let none = Known::of(&render(&scene, &Settings { seed: 1, ..learns(&scene, "none", 40) }, 9000));
+    for strategy in [
+        "classic:5:relative",
+        "classic:1:relative",
+        "winners",
+        "bolin-meyer",
+        "adrr",
+        "adrrs",
+        "ear",
+        "ear:plain",
+        "ears",
+        "ears:plain",
+    ] {
+        let s = Settings { seed: 2, ..learns(&scene, strategy, 40) };
+        assert_equivalent(strategy, Known::of(&run(&scene, &s)), none);
+    }
+}
+
+/// All materials under a soft sky, for strategies that key statistics by material and direction. Killed by: a value that
+/// is scaled by the albedo and not scaled back in the pixel, a class of vertices whose record is closed twice.
+#[test]
+fn strategies_that_learn_agree_on_all_materials() {
+    let scene = blob(&soft(everything([16, 12])));
+    let none = Known::of(&render(&scene, &Settings { seed: 3, ..learns(&scene, "none", 9) }, 6000));
+    for strategy in ["adrrs", "ear", "ears", "ears:plain", "winners"] {
+        let s = Settings { seed: 4, ..learns(&scene, strategy, 9) };
+        assert_equivalent(strategy, Known::of(&run(&scene, &s)), none);
+    }
+}
+
+/// Without small lights, whose reflections would take hours to average, and without the lens.
+fn soft(mut s: SceneDescription) -> SceneDescription {
+    s.camera.lens = None;
+    s.emitters.clear();
+    s.environment = Some(builtin::sky());
+    s
+}
+
+/// Every choice there is. Killed by: an adaptive pixel whose weight follows its own noise, shadow roulette that divides one
+/// of two sums, a constant that is added without what was rounded away, a bound that lowers n and not s.
+#[test]
+fn choices_do_not_bias() {
+    let scene = blob(&cornell([16, 16]));
+    let none = Known::of(&render(&scene, &Settings { seed: 5, ..learns(&scene, "none", 6) }, 30_000));
+    let check = |what: &str, strategy: &str, change: &dyn Fn(&mut Settings)| {
+        let mut s = Settings { seed: 6, ..learns(&scene, strategy, 6) };
+        change(&mut s);
+        let image = run(&scene, &s);
+        assert_equivalent(&format!("{strategy}, {what}"), Known::of(&image), none);
+        image.counters
+    };
+    let c = check("ring of 16", "ears:plain", &|s| s.ring = 16);
+    assert!(c.ring_capped > 0);
+    let c = check("ledger of 4", "ears", &|s| s.learning.ledger = 4);
+    assert!(c.ledger_full > c.samples_logged, "{c:?}");
+    check("cache of 32 KiB", "ears", &|s| s.learning.cache_bytes = 32 << 10);
+    check("no split budget", "ears:plain", &|s| s.split_budget = 0);
+    check("everything small", "ears", &|s| {
+        (s.ring, s.learning.ledger, s.learning.cache_bytes, s.learning.estimate) = (16, 4, 8 << 10, Estimate::Blocks);
+        (s.adaptive, s.shadow_roulette, s.constant) = (true, true, Constant::Cached);
+    });
+    check("adaptive", "ears", &|s| s.adaptive = true);
+    check("adaptive", "none", &|s| s.adaptive = true);
+    let c = check("shadow roulette", "ears", &|s| s.shadow_roulette = true);
+    assert!(c.shadow_kills > c.shadow_rays / 50, "{c:?}");
+    check("shadow roulette", "classic", &|s| s.shadow_roulette = true);
+    check("cached constant", "ears", &|s| s.constant = Constant::Cached);
+    check("cached constant", "ear:plain", &|s| s.constant = Constant::Cached);
+    check("constant of 0.3", "fixed:0.7", &|s| s.constant = Constant::Number(0.3));
+    check("constant of -0.2", "ears", &|s| s.constant = Constant::Number(-0.2));
+    check("absolute error", "ears", &|s| s.learning.objective = Objective::Absolute);
+    check("blocks", "ears:plain", &|s| s.learning.estimate = Estimate::Blocks);
+    for norm in [Norm::Max, Norm::Luminance] {
+        check(&format!("{norm:?}"), "ears:plain", &|s| s.learning.norm = norm);
+    }
+    check("nothing carried", "ears", &|s| s.learning.carry = 0.0);
+    check("all carried", "ears", &|s| s.learning.carry = 1.0);
+}
+
+/// Renders of a few samples in several iterations, many of them with different seeds: what hangs on an iteration's own
+/// noise shows here and not in long renders. Killed by: an iteration weighted by its own variance, adaptive counts from
+/// the samples that they weigh.
+#[test]
+fn short_renders_are_unbiased() {
+    let scene = blob(&cornell([16, 16]));
+    let none = Known::of(&render(&scene, &Settings { seed: 7, ..learns(&scene, "none", 6) }, 30_000));
+    for (what, adaptive) in [("ears", false), ("ears, adaptive", true)] {
+        let one = |seed: u64| {
+            let s = Settings { seed, adaptive, shadow_roulette: adaptive, ..learns(&scene, "ears:plain", 6) };
+            let learning = Learning { cache_bytes: 32 << 10, ..s.learning };
+            scheduled(&scene, &Settings { learning, ..s }, &[1, 1, 2, 4], IN_ORDER).mean()
+        };
+        assert_equivalent(what, Known::over((1000..2000).map(one)), none);
+    }
+}
+
+/// Renders of four samples whose statistics are replaced by random ones before the second iteration, and again before the
+/// third: factors of any size next to each other. Killed by: any use of what was learned but as a factor or a constant.
+#[test]
+fn random_statistics_do_not_bias() {
+    let scene = blob(&cornell([16, 16]));
+    let none = Known::of(&render(&scene, &Settings { seed: 8, ..learns(&scene, "none", 3) }, 14_000));
+    for (strategy, constant, renders) in [
+        ("ears:plain", Constant::Off, 700),
+        ("ears", Constant::Cached, 700),
+        ("ear:plain", Constant::Off, 1500),
+        ("adrrs", Constant::Cached, 1000),
+    ] {
+        let (mut spread, mut count) = ([0u64; 2], 0);
+        let one = |seed: u64| {
+            let mut s = Settings { seed, constant, ..learns(&scene, strategy, 3) };
+            s.learning.cache_bytes = 32 << 10;
+            let mut rng = SplitMix(seed);
+            let image = learning(&scene, &s, &[1, 1, 2], IN_ORDER, &mut |i, l: &mut dyn Learned| {
+                if i > 0 {
+                    let mut bytes = l.saved().unwrap();
+                    overwrite(&mut bytes, || random_sums(&mut rng));
+                    l.load(&bytes).unwrap();
+                }
+            });
+            let c = image.counters;
+            spread[0] += c.splits;
+            spread[1] += c.roulette_kills;
+            count += c.camera_samples;
+            image.mean()
+        };
+        let known = Known::over((0..renders).map(one));
+        println!("{strategy}: {} splits, {} kills of {count}", spread[0], spread[1]);
+        assert!(spread[1] > count / 20 && (strategy.starts_with("ear:") || spread[0] > count / 4));
+        assert_equivalent(&format!("{strategy} with random statistics"), known, none);
+    }
+}
+
+/// A random estimate of the pixels from the host. Killed by: an estimate that finds its way into the film.
+#[test]
+fn random_estimates_do_not_bias() {
+    let scene = blob(&cornell([16, 16]));
+    let none = Known::of(&render(&scene, &Settings { seed: 9, ..learns(&scene, "none", 5) }, 9000));
+    for adaptive in [false, true] {
+        let s = Settings { seed: 10, adaptive, shadow_roulette: true, ..learns(&scene, "ears:plain", 5) };
+        let mut rng = SplitMix(11);
+        let image = learning(&scene, &s, &doubling(9000), IN_ORDER, &mut |i, l: &mut dyn Learned| {
+            let bad = [f32::NAN, f32::INFINITY, -1.0, 0.0, 1e30];
+            let bad = if i == 1 { &bad[..] } else { &[] };
+            let mut value = |i: usize| bad.get(i).copied().unwrap_or_else(|| rng.range(-2.5, 0.0).exp() as f32);
+            let rgb: Vec<[f32; 3]> = (0..256).map(|i| [(); 3].map(|()| value(i))).collect();
+            l.give(&rgb).unwrap();
+        });
+        assert_equivalent(&format!("random estimates, adaptive {adaptive}"), Known::of(&image), none);
+    }
+}
+
+/// A cache saved in the middle of one render goes on in another. Killed by: loaded statistics that count as samples.
+#[test]
+fn loaded_statistics_do_not_bias() {
+    let scene = blob(&cornell([16, 16]));
+    let none = Known::of(&render(&scene, &Settings { seed: 12, ..learns(&scene, "none", 6) }, 30_000));
+    let s = Settings { seed: 13, ..learns(&scene, "ears", 6) };
+    let mut bytes = None;
+    learning(&scene, &s, &[32, 32, 1], IN_ORDER, &mut |_, l: &mut dyn Learned| bytes = l.saved());
+    let bytes = bytes.unwrap();
+    let image = learning(&scene, &Settings { seed: 14, ..s }, &doubling(6000), IN_ORDER, &mut |i, l: &mut dyn Learned| {
+        if i % 2 == 0 {
+            l.load(&bytes).unwrap();
+        }
+    });
+    assert_equivalent("a loaded cache", Known::of(&image), none);
+}
