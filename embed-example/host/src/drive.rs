@@ -263,6 +263,11 @@ pub fn drive_with<P: Profile + Send + Sync>(
         if samples == 0 {
             break;
         }
+        // the shards of a small picture finish in a single step, and do not ask
+        if all.samples > 0 && observer.stop() {
+            stopped_early = true;
+            break;
+        }
         let begun = Instant::now();
         session.begin_iteration(samples);
         let run = Run { session: &session, observer, start, all, last, samples, error, rays: AtomicU64::new(0) };

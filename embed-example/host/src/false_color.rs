@@ -66,7 +66,9 @@ impl Scale {
     /// Of numbers above 0, from the smallest of them to what all but a thousandth stay below, widened to 1, 2 or 5 times
     /// a power of ten.
     pub fn sequential(values: &[f32]) -> Self {
-        let mut sorted: Vec<_> = values.iter().copied().filter(|x| *x > 0.0 && x.is_finite()).collect();
+        // the clamp keeps the ends, and what is computed from them, finite
+        let positive = values.iter().filter(|x| **x > 0.0 && x.is_finite());
+        let mut sorted: Vec<_> = positive.map(|x| x.clamp(1e-30, 1e30)).collect();
         sorted.sort_by(f32::total_cmp);
         let (Some(&low), Some(&high)) = (sorted.first(), sorted.get(sorted.len() * 999 / 1000)) else {
             return Self { low: 1.0, high: 10.0, diverging: false };
@@ -93,12 +95,20 @@ impl Scale {
         })
     }
 
-    /// Values with a label: the ends, and what is round between them.
+    /// Values that are marked, the most important first: ends, middle, powers of ten, others.
     fn ticks(&self) -> Vec<f32> {
         if self.diverging {
-            return vec![0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0];
+            return vec![1.0, 0.05, 20.0, 5.0, 0.2, 2.0, 0.5, 10.0, 0.1];
         }
-        round_numbers(self.low).filter(|x| *x >= self.low * 0.999).take_while(|x| *x <= self.high * 1.001).collect()
+        let from = round_numbers(self.low).filter(|x| *x >= self.low * 0.999);
+        let mut ticks: Vec<_> = from.take_while(|x| *x <= self.high * 1.001).collect();
+        let rank = |x: f32| {
+            let end = (x / self.low).ln().abs() < 0.01 || (x / self.high).ln().abs() < 0.01;
+            let power = (x.log10() - x.log10().round()).abs() < 0.01;
+            (!end, !power)
+        };
+        ticks.sort_by_key(|x| rank(*x));
+        ticks
     }
 
     fn label(&self, x: f32) -> String {
@@ -160,18 +170,19 @@ impl Drawing {
         for x in first..=last {
             (BAR[0]..=BAR[1]).for_each(|y| self.set(x, top + y, scale.at(place(x))));
         }
-        let mut free = 0;
-        for tick in labelled(scale) {
+        let mut taken: Vec<[usize; 2]> = Vec::new();
+        for tick in scale.ticks() {
             let t = (tick / scale.low).ln() / (scale.high / scale.low).ln();
             let x = first + (t.clamp(0.0, 1.0) * (last - first) as f32).round() as usize;
+            (BAR[1]..=BAR[1] + TICK).for_each(|y| self.set(x, top + y, [0; 3]));
             let label = scale.label(tick);
             let half = label.len() * CHARACTER / 2;
-            if x < free + half || x + half > self.width {
-                continue;
+            let span = [x.saturating_sub(half), x + half];
+            // the most important come first
+            if taken.iter().all(|t| span[0] >= t[1] + GAP || span[1] + GAP <= t[0]) {
+                taken.push(span);
+                self.text(x, top + BAR[1] + TICK + 2, &label, Alignment::Center);
             }
-            free = x + half + GAP;
-            (BAR[1]..=BAR[1] + TICK).for_each(|y| self.set(x, top + y, [0; 3]));
-            self.text(x, top + BAR[1] + TICK + 2, &label, Alignment::Center);
         }
     }
 
@@ -182,17 +193,6 @@ impl Drawing {
         let place = Point::new(x as i32, y as i32 + 7);
         let Ok(_) = Text::with_alignment(text, place, style, alignment).draw(self);
     }
-}
-
-/// Labels from left to right; powers of ten alone where all would be too many.
-fn labelled(scale: &Scale) -> Vec<f32> {
-    let ticks = scale.ticks();
-    if scale.diverging || ticks.len() <= 7 {
-        return ticks;
-    }
-    let is_power = |x: f32| (x.log10() - x.log10().round()).abs() < 1e-3;
-    let tens: Vec<_> = ticks.iter().copied().filter(|x| is_power(*x)).collect();
-    if tens.len() < 2 { ticks } else { tens }
 }
 
 impl OriginDimensions for Drawing {

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 /// Flags about learning.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Learning")]
-pub struct Flags {
+pub struct LearningFlags {
     /// More samples for pixels with much error, fewer for others
     #[arg(long)]
     adaptive: bool,
@@ -39,7 +39,7 @@ pub struct Flags {
     pub cache_out: Option<PathBuf>,
 }
 
-impl Flags {
+impl LearningFlags {
     /// Puts them into `options`, and reads the saved statistics.
     pub fn apply(&self, options: &mut RenderOptions) -> Result<(), Box<dyn Error>> {
         let strategy = Strategy::parse(&options.strategy)?;

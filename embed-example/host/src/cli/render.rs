@@ -1,7 +1,8 @@
 //! `croupier render`
 
+use super::learning::LearningFlags;
 use super::progress::Rendering;
-use super::{Outcome, learning, say, say_json, scene};
+use super::{Outcome, say, say_json, scene};
 use croupier::Strategy;
 use croupier::rrs::ParseError;
 use croupier_host::false_color::{Scale, draw};
@@ -64,11 +65,12 @@ pub struct Flags {
     /// Print what paths, iterations and learning took
     #[arg(long)]
     stats: bool,
-    #[command(flatten)]
-    learning: learning::Flags,
     /// Print the figures as one line of JSON
     #[arg(long)]
     json: bool,
+    // The heading of the last flags would hold for any after them.
+    #[command(flatten)]
+    learning: LearningFlags,
 }
 
 /// When to stop; 64 samples per pixel if nothing is given.
