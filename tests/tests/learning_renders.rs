@@ -1,10 +1,12 @@
 //! What renders that learn take and give: saved statistics, denoised pictures, figures.
 
+use croupier::denoise::{Planes, scratch_len};
 use croupier::learn::{Constant, Learning, Objective};
 use croupier::rrs::Norm;
+use croupier::{Scene, Settings};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::builtin;
-use croupier_host::drive::DriveError;
+use croupier_host::drive::{DriveError, Options, Unobserved, drive};
 use croupier_host::image::Picture;
 use croupier_host::render::{Observer, Progress, RenderOptions, RenderResult, Target, render};
 use croupier_tests::scenes::{blob, everything};
@@ -157,6 +159,26 @@ fn denoised_pictures_are_nearer_the_truth() {
     }
 }
 
+/// Killed by: a denoiser without albedo and normals, or with those of other pixels.
+#[test]
+fn the_denoiser_knows_what_the_first_hits_look_like() {
+    let o = RenderOptions { denoise: true, ..options("classic", 5) };
+    let base = Settings::for_scene(&Scene::from_bytes(scene()).unwrap());
+    let settings = Settings { aovs: true, shards: o.shards, ..base };
+    let driven = drive(scene(), &Options { threads: 1, ..Options::new(settings, o.target) }, &Unobserved).unwrap();
+    let size = driven.size;
+    let mut memory = vec![0.0; Planes::len(size, true)];
+    let mut planes = Planes::carve(size, true, &mut memory).unwrap();
+    for (i, (p, a)) in driven.pixels.iter().zip(&driven.aovs).enumerate() {
+        planes.set(i, p, Some(a));
+    }
+    planes.denoise(&mut vec![0.0; scratch_len(size)]).unwrap();
+    let out = planes.out.map(|p| p.to_vec());
+    let picture = rendered(&o).picture;
+    let layer = picture.layer("denoised").unwrap();
+    assert_eq!(["R", "G", "B"].map(|c| layer.channel(c).unwrap().to_vec()), out);
+}
+
 /// Figures that are known otherwise. Killed by: paths over vertices instead of camera samples, a layer of the wrong sums,
 /// the factor of another depth, an efficiency that is not the inverse product, parts of the time counted twice.
 #[test]
@@ -203,6 +225,12 @@ fn figures_fit_together() {
         let text = s.to_string();
         assert!(text.contains("path length") && text.contains("estimating pixels"), "{text}");
         assert_eq!(text.contains("looking up"), learns);
+    }
+    // these learn of the picture, not of the scene
+    let picture_alone = [RenderOptions { adaptive: true, ..options("classic", 3) }, options("classic:2:relative", 3)];
+    for o in picture_alone {
+        let s = rendered(&o).statistics;
+        assert!(s.iterations.iter().all(|i| i.variance > Some(0.0) && i.leaves.is_none()), "{s}");
     }
     let plain = rendered(&options("ears", 3)).statistics;
     assert!(plain.time.iter().all(|p| !p.within_tracing));
