@@ -114,7 +114,7 @@ impl Scale {
     fn label(&self, x: f32) -> String {
         if self.diverging && x < 0.999 {
             format!("1/{}", (1.0 / x).round())
-        } else if x >= 1e4 || x < 1e-3 {
+        } else if !(1e-3..1e4).contains(&x) {
             format!("{x:.0e}")
         } else {
             format!("{}", (f64::from(x) * 1e4).round() / 1e4)
