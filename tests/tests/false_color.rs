@@ -84,11 +84,16 @@ fn the_legend_is_below_and_complete() {
         let ticks = (0..d.width).filter(|x| pixel(&d, *x, height + 15) == BLACK).count();
         assert_eq!(ticks, 9);
         let ink = |x: usize| (18..LEGEND).any(|y| pixel(&d, x, height + y) == BLACK);
-        let words = (0..d.width).fold((0, 100), |(words, blank), x| match ink(x) {
-            true => (words + u32::from(blank >= 6), 0),
-            false => (words, blank + 1),
-        });
-        assert!(words.0 >= 3 && (width < 1000 || words.0 == 9), "{width}: {words:?}");
+        // first and last column of every label
+        let mut words: Vec<[usize; 2]> = Vec::new();
+        for x in (0..d.width).filter(|x| ink(*x)) {
+            match words.last_mut().filter(|w| x - w[1] <= 6) {
+                Some(word) => word[1] = x,
+                None => words.push([x, x]),
+            }
+        }
+        assert!(words.len() >= 3 && (width < 1000 || words.len() == 9), "{width}: {words:?}");
+        assert!(words.iter().all(|w| w[1] - w[0] < 24), "{width}: {words:?}");
         let ink = (0..d.width).flat_map(|x| (0..LEGEND).map(move |y| (x, y)));
         let ink = ink.filter(|(x, y)| pixel(&d, *x, height + y) == BLACK);
         assert!(ink.clone().count() > 60, "no text");
