@@ -87,7 +87,7 @@ pub fn render(subject: &Subject, strategy: &str, seed: u64, target: Target, nois
     let watch = Watch { reference: &subject.image, noise, start: cpu_seconds(), state: Mutex::default() };
     let truth = std::env::var_os("TRUTH").is_some();
     let estimate = truth.then_some(&*subject.image.pixels);
-    drive_scene(scene, &Options { settings, target, threads: 1, estimate }, &watch)?;
+    drive_scene(scene, &Options { threads: 1, estimate, ..Options::new(settings, target) }, &watch)?;
     let snapshots = watch.state.into_inner().unwrap_or_else(PoisonError::into_inner).snapshots;
     let snapshots = snapshots.into_iter().collect::<Result<Vec<_>, _>>()?;
     let end = *snapshots.last().ok_or("a render without an iteration")?;

@@ -159,7 +159,7 @@ fn the_driver_does_not_depend_on_threads() {
     let scene = blob(&everything([24, 16]));
     let settings = Settings { shards: 7, ..settings(&scene, "classic:2") };
     let hash = |threads| {
-        let options = Options { settings, target: Target::Spp(5), threads, estimate: None };
+        let options = Options { threads, ..Options::new(settings, Target::Spp(5)) };
         let r = drive(&scene, &options, &Unobserved).unwrap();
         assert_eq!(r.spp, 5);
         (r.hash(), r.counters)

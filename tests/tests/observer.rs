@@ -35,7 +35,7 @@ fn iterations_are_shown_outside_the_clock() {
     let scene = bake(&builtin::cornell_box(), &BakeOptions::default(), |_, _| ()).unwrap();
     let settings =
         Settings { size: [8, 8], shards: 3, ..Settings::for_scene(&Scene::from_bytes(&scene.bytes).unwrap()) };
-    let options = Options { settings, target: Target::Spp(9), threads: 1, estimate: None };
+    let options = Options { threads: 1, ..Options::new(settings, Target::Spp(9)) };
     let observer = Slow { pause: Duration::from_millis(300), ..Slow::default() };
     let start = Instant::now();
     let rendered = drive(&scene.bytes, &options, &observer).unwrap();

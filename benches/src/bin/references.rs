@@ -252,7 +252,7 @@ fn test(subject: &Subject, spp: u32, args: &Args, plan: &Plan, strategy: &str) -
     let (mut images, mut mrays) = (Vec::new(), 0.0);
     for seed in 0..u64::from(args.seeds) {
         let settings = Settings { seed: args.first_seed.wrapping_add(seed), ..settings };
-        let options = Options { settings, target: Target::Spp(spp), threads: args.threads, estimate: None };
+        let options = Options { threads: args.threads, ..Options::new(settings, Target::Spp(spp)) };
         let rendered = drive_scene(scene, &options, &Unobserved)?;
         mrays += rendered.counters.rays() as f64 * 1e-6;
         let [width, height] = rendered.size.map(|s| s as usize);

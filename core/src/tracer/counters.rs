@@ -72,6 +72,8 @@ pub struct Counters {
     pub occlude: Utilisation,
     /// Surface stage (hits only).
     pub surface: Utilisation,
+    /// Look-ups of statistics by place or pixel.
+    pub look_ups: Utilisation,
     /// Most vertices that waited at once.
     pub ring_peak: u64,
 }
@@ -107,6 +109,7 @@ impl Counters {
         self.trace.merge(&o.trace);
         self.occlude.merge(&o.occlude);
         self.surface.merge(&o.surface);
+        self.look_ups.merge(&o.look_ups);
         self.ring_peak = self.ring_peak.max(o.ring_peak);
     }
 }

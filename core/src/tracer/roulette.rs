@@ -169,6 +169,7 @@ impl Shard<'_> {
             let root = v.root.to_array();
             let found = place(session, &a, albedo, learned.importance, space, |i| self.roots.get(root[i]).film);
             knowledge.local8(&mut learned, found.bin, found.unscale, a.active);
+            self.counters.look_ups.count(a.active.count());
             logged = Some(found);
         }
         let s = strategy.factor(&Vertices8 {

@@ -1,25 +1,31 @@
 //! Drives the core: memory, threads, iterations and when to stop. The core has no clock; time lives here. [`crate::render`]
 //! is the same with pictures and names.
 
+mod calibrate;
+pub mod schedule;
+
+pub use calibrate::Calibration;
+
 use crate::blob::AlignedBytes;
 use crate::render::{Observer, Progress, Target};
-use croupier::accel::WideBvh;
+use croupier::accel::{Intersector, WideBvh};
 use croupier::film::{PixelAov, PixelStats};
+use croupier::learn::PictureStatistics;
+use croupier::learn::cache::{Cache, CacheError};
 use croupier::profile::{AnyProfile, Full, Matte, Profile};
+use croupier::rrs::Space;
 use croupier::{
-    Budget, Counters, ErrorEstimate, Plan, Progress as Step, Scene, SceneError, Session, SessionError, Settings,
+    Budget, Counters, ErrorEstimate, Phase, Plan, Progress as Step, Scene, SceneError, Session, SessionError, Settings,
     SettingsError, Shard, ShardError,
 };
 use rayon::prelude::*;
+use schedule::Work;
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 /// Rays between two looks at the clock and at [`Observer::stop`].
 const STEP_RAYS: u64 = 1 << 16;
-
-/// Iterations grow to this many samples per pixel.
-const LARGEST_ITERATION: u32 = 64;
 
 /// How to render.
 #[derive(Clone, Copy, Debug)]
@@ -33,6 +39,19 @@ pub struct Options<'a> {
     /// Pixels that strategies which learn take for the true ones, instead of the denoised picture: efficiency, not the
     /// expectation, hangs on them.
     pub estimate: Option<&'a [[f32; 3]]>,
+    /// A saved cache to begin with. Needs a strategy that learns from the scene.
+    pub cache: Option<&'a [u8]>,
+    /// Return the cache of the scene's statistics as bytes. Needs such a strategy too.
+    pub save_cache: bool,
+    /// Measure in the end what a look-up of statistics takes.
+    pub calibrate: bool,
+}
+
+impl Options<'_> {
+    /// One thread per core, the built-in estimate, an empty cache that is not saved.
+    pub fn new(settings: Settings, target: Target) -> Self {
+        Self { settings, target, threads: 0, estimate: None, cache: None, save_cache: false, calibrate: false }
+    }
 }
 
 /// Watches nothing.
@@ -45,6 +64,38 @@ impl Observer for Unobserved {
     fn stop(&self) -> bool {
         false
     }
+}
+
+/// One finished iteration.
+#[derive(Clone, Copy, Debug)]
+pub struct IterationRecord {
+    /// Camera samples per pixel, rays, and seconds with all phases.
+    pub work: Work,
+    /// What happened in it.
+    pub counters: Counters,
+    /// Seconds of tracing.
+    pub tracing: f64,
+    /// Seconds of merging the shards' pixels and measuring the picture's variance.
+    pub merging: f64,
+    /// Seconds of estimating the pixels (denoising).
+    pub estimating: f64,
+    /// Seconds of merging the scene's statistics and rebuilding their tree.
+    pub learning: f64,
+    /// Error and cost of a camera sample; `None` unless something learns from the picture.
+    pub picture: Option<PictureStatistics>,
+    /// Leaves of the cache after it, and splits for which there was no room until then.
+    pub cache: Option<CacheRecord>,
+    /// Estimated error of the picture after it.
+    pub error: ErrorEstimate,
+}
+
+/// The cache's size after an iteration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CacheRecord {
+    /// Leaves in use.
+    pub leaves: u32,
+    /// Splits for which there was no room, in all iterations so far.
+    pub splits_refused: u64,
 }
 
 /// A finished render.
@@ -70,6 +121,14 @@ pub struct Rendered {
     pub memory: [usize; 2],
     /// The observer asked to stop before the target.
     pub stopped_early: bool,
+    /// Threads that traced.
+    pub threads: usize,
+    /// Every iteration, the one that was stopped too.
+    pub iterations: Vec<IterationRecord>,
+    /// The saved cache, if asked for.
+    pub cache: Option<Vec<u8>>,
+    /// What look-ups take, if asked for and anything is looked up.
+    pub calibration: Option<Calibration>,
 }
 
 impl Rendered {
@@ -109,6 +168,10 @@ pub enum DriveError {
     Shard(ShardError),
     /// There is no such roulette strategy.
     Strategy(croupier::rrs::ParseError),
+    /// The saved cache cannot be loaded, or the cache not be saved.
+    Cache(CacheError),
+    /// A cache is to be loaded or saved with this strategy, which learns nothing of the scene.
+    NoCache(&'static str),
     /// The thread pool cannot start.
     Threads(rayon::ThreadPoolBuildError),
 }
@@ -121,6 +184,14 @@ impl fmt::Display for DriveError {
             Self::Session(e) => e.fmt(f),
             Self::Shard(e) => e.fmt(f),
             Self::Strategy(e) => e.fmt(f),
+            Self::Cache(e @ CacheError::Bounds { .. }) => write!(f, "statistics of another scene: {e}"),
+            Self::Cache(e) => e.fmt(f),
+            Self::NoCache(strategy) => {
+                write!(
+                    f,
+                    "roulette strategy `{strategy}` learns nothing of the scene: there is no cache to load or save"
+                )
+            }
             Self::Threads(e) => write!(f, "cannot start threads: {e}"),
         }
     }
@@ -137,7 +208,7 @@ macro_rules! from {
         }
     )*};
 }
-from!(SceneError => Scene, SettingsError => Settings, SessionError => Session, ShardError => Shard,
+from!(SceneError => Scene, SettingsError => Settings, SessionError => Session, ShardError => Shard, CacheError => Cache,
       rayon::ThreadPoolBuildError => Threads);
 
 /// Renders a scene blob.
@@ -159,10 +230,14 @@ pub fn drive_with<P: Profile + Send + Sync>(
     options: &Options<'_>,
     observer: &dyn Observer,
 ) -> Result<Rendered, DriveError> {
-    let plan = Plan::new(&options.settings)?;
+    let settings = &options.settings;
+    let space = settings.strategy.space();
+    if (options.cache.is_some() || options.save_cache) && space != Some(Space::Scene) {
+        return Err(DriveError::NoCache(settings.strategy.name()));
+    }
+    let plan = Plan::new(settings)?;
     let mut shared = AlignedBytes::zeroed(plan.session().size);
-    let count = options.settings.shards;
-    let mut blocks: Vec<_> = (0..count).map(|_| AlignedBytes::zeroed(plan.shard().size)).collect();
+    let mut blocks: Vec<_> = (0..settings.shards).map(|_| AlignedBytes::zeroed(plan.shard().size)).collect();
     let mut session = Session::<P, _>::new(scene, WideBvh::new(&scene), &plan, shared.as_mut())?;
     let mut shards = Vec::with_capacity(blocks.len());
     for (i, b) in blocks.iter_mut().enumerate() {
@@ -171,61 +246,125 @@ pub fn drive_with<P: Profile + Send + Sync>(
     if let Some(rgb) = options.estimate {
         session.give_estimate(rgb)?;
     }
+    if let Some((bytes, cache)) = options.cache.zip(session.cache_mut()) {
+        cache.load(bytes)?;
+    }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build()?;
 
     // later by every pause for the observer
     let mut start = Instant::now();
-    let mut spp = 0u32;
-    let mut error = None;
+    let mut iterations: Vec<IterationRecord> = Vec::new();
+    let mut all = Work::default();
     let mut stopped_early = false;
-    loop {
-        let samples = next_iteration(options.target, spp, start.elapsed().as_secs_f64(), session.counters(), error);
+    while !stopped_early {
+        let (last, error) = iterations.last().map_or((Work::default(), None), |i| (i.work, Some(i.error)));
+        let now = Work { seconds: start.elapsed().as_secs_f64(), ..all };
+        let samples = schedule::next(options.target, learns(settings), &now, &last, error);
         if samples == 0 {
             break;
         }
-        session.begin_iteration(samples);
-        let run = Run { session: &session, observer, start, spp, samples, error, rays: AtomicU64::new(0) };
-        stopped_early = pool.install(|| run.all(&mut shards));
-        session.end_iteration(&shards)?;
-        if std::env::var_os("CR_DEBUG").is_some() {
-            eprintln!("{samples} {:?} leaves {:?}", session.picture_statistics()[0], session.cache().map(|c| (c.leaves(), c.splits_refused())));
+        // the shards of a small picture finish in a single step, and do not ask
+        if all.samples > 0 && observer.stop() {
+            stopped_early = true;
+            break;
         }
+        let begun = Instant::now();
+        session.begin_iteration(samples);
+        let run = Run { session: &session, observer, start, all, last, samples, error, rays: AtomicU64::new(0) };
+        stopped_early = pool.install(|| run.all(&mut shards));
+        let mut record = end_iteration(&mut session, &shards, begun)?;
+        record.work.samples = samples;
+        record.picture = learns(settings).then(|| session.picture_statistics()[0]);
+        iterations.push(record);
         if stopped_early {
             break;
         }
-        spp = spp.saturating_add(samples);
-        error = Some(session.film().error_estimate());
+        all.samples = all.samples.saturating_add(samples);
+        all.rays += record.work.rays;
         let pause = Instant::now();
         observer.iteration(session.film(), (pause - start).as_secs_f64());
         start += pause.elapsed();
     }
+    let seconds = start.elapsed().as_secs_f64();
     let film = session.film();
+    let used = space.zip(session.cache());
     Ok(Rendered {
         size: film.size(),
         pixels: film.pixels().to_vec(),
         aovs: film.aovs().to_vec(),
         counters: *session.counters(),
         error: film.error_estimate(),
-        spp,
-        seconds: start.elapsed().as_secs_f64(),
+        spp: all.samples,
+        seconds,
         profile: P::NAME,
-        memory: [plan.session().size, plan.shard().size * count as usize],
+        memory: [plan.session().size, plan.shard().size * shards.len()],
         stopped_early,
+        threads: pool.current_num_threads().min(shards.len()),
+        iterations,
+        cache: used.filter(|_| options.save_cache).map(|(_, c)| save(c)).transpose()?,
+        calibration: used.filter(|_| options.calibrate).and_then(|(s, c)| calibrate::calibrate(c, s, &scene)),
+    })
+}
+
+/// Does anything learn between iterations, so that the cost of a camera sample changes?
+fn learns(s: &Settings) -> bool {
+    s.strategy.needs_image() || s.shadow_roulette || s.adaptive
+}
+
+fn save(cache: &Cache<'_>) -> Result<Vec<u8>, CacheError> {
+    let mut bytes = vec![0; cache.saved_len()];
+    cache.save(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// Ends an iteration that has begun at `begun` and is traced.
+fn end_iteration<P: Profile, I: Intersector>(
+    session: &mut Session<'_, '_, P, I>,
+    shards: &[Shard<'_>],
+    begun: Instant,
+) -> Result<IterationRecord, SessionError> {
+    let traced = Instant::now();
+    let [mut merged, mut estimated, mut learned] = [traced; 3];
+    session.end_iteration_in_phases(shards, |phase| {
+        let passed = match phase {
+            Phase::Merged => &mut merged,
+            Phase::Estimated => &mut estimated,
+            Phase::Learned => &mut learned,
+        };
+        *passed = Instant::now();
+    })?;
+    let mut counters = Counters::default();
+    shards.iter().for_each(|s| counters.merge(s.counters()));
+    let error = session.film().error_estimate();
+    let cache = session.cache().map(|c| CacheRecord { leaves: c.leaves(), splits_refused: c.splits_refused() });
+    let seconds = |from: Instant, to: Instant| (to - from).as_secs_f64();
+    Ok(IterationRecord {
+        work: Work { samples: 0, rays: counters.rays(), seconds: begun.elapsed().as_secs_f64() },
+        counters,
+        tracing: seconds(begun, traced),
+        merging: seconds(traced, merged),
+        estimating: seconds(merged, estimated),
+        learning: seconds(estimated, learned),
+        picture: None,
+        cache,
+        error,
     })
 }
 
 /// One iteration over all shards.
-struct Run<'a, 's, 'm, P: Profile, I: croupier::accel::Intersector> {
+struct Run<'a, 's, 'm, P: Profile, I: Intersector> {
     session: &'a Session<'s, 'm, P, I>,
     observer: &'a dyn Observer,
     start: Instant,
-    spp: u32,
+    /// Iterations before this one, and the last of them.
+    all: Work,
+    last: Work,
     samples: u32,
     error: Option<ErrorEstimate>,
     rays: AtomicU64,
 }
 
-impl<P: Profile + Sync, I: croupier::accel::Intersector + Sync> Run<'_, '_, '_, P, I> {
+impl<P: Profile + Sync, I: Intersector + Sync> Run<'_, '_, '_, P, I> {
     /// `true` if the observer stopped it.
     fn all(&self, shards: &mut [Shard<'_>]) -> bool {
         let stopped: Vec<bool> = shards.par_iter_mut().map(|s| self.one(s)).collect();
@@ -251,40 +390,15 @@ impl<P: Profile + Sync, I: croupier::accel::Intersector + Sync> Run<'_, '_, '_, 
     }
 
     fn progress(&self, rays: u64) -> Progress {
-        let finished = self.session.counters().rays();
-        // the share of this iteration, guessed from the rays that earlier ones took per sample
-        let expected = finished as f64 / f64::from(self.spp.max(1)) * f64::from(self.samples);
-        let share = if self.spp == 0 { 0.0 } else { (rays as f64 / expected.max(1.0)).min(1.0) };
+        // the share of this iteration, guessed from the rays that the last one took per sample
+        let samples = f64::from(self.samples);
+        let expected = self.last.rays as f64 / f64::from(self.last.samples.max(1)) * samples;
+        let share = if self.last.samples == 0 { 0.0 } else { (rays as f64 / expected.max(1.0)).min(1.0) };
         Progress {
-            spp: f64::from(self.spp) + share * f64::from(self.samples),
-            rays: finished + rays,
+            spp: f64::from(self.all.samples) + share * samples,
+            rays: self.all.rays + rays,
             seconds: self.start.elapsed().as_secs_f64(),
             relmse_estimate: self.error.map(|e| e.rel_mse),
         }
-    }
-}
-
-/// Samples per pixel of the next iteration, 0 when the target is reached. With a target in samples it depends on nothing
-/// but the samples so far, so that the picture is a pure function of its inputs.
-fn next_iteration(target: Target, spp: u32, seconds: f64, counters: &Counters, error: Option<ErrorEstimate>) -> u32 {
-    let grow = spp.clamp(1, LARGEST_ITERATION);
-    let per_sample = |spent: f64| spent / f64::from(spp.max(1));
-    // at least one iteration, then only whole ones that fit
-    let fit = |left: f64, cost: f64| -> u32 {
-        if spp == 0 { 1 } else { ((left / cost.max(1e-12)).floor().max(0.0) as u32).min(grow) }
-    };
-    match target {
-        Target::Spp(n) => grow.min(n.saturating_sub(spp)),
-        Target::Seconds(s) => fit(s - seconds, per_sample(seconds)),
-        Target::Rays(n) => fit(n as f64 - counters.rays() as f64, per_sample(counters.rays() as f64)),
-        Target::Error(e) => match error {
-            None => 1,
-            // a few samples cannot judge their own error
-            Some(x) if x.rel_mse <= e && spp >= 4 => 0,
-            Some(x) => {
-                let needed = f64::from(spp) * (x.rel_mse / e.max(1e-30) - 1.0);
-                (needed.ceil().max(1.0) as u32).min(grow)
-            }
-        },
     }
 }

@@ -9,7 +9,8 @@
 //! | [`blob`] | the blob's layout on disk and in memory | what sections mean |
 //! | [`drive`] | memory, threads, iterations around the core | files |
 //! | [`render`] | names in, pictures out | how light is transported |
-//! | [`image`], [`tonemap`] | EXR and PNG | scenes |
+//! | [`statistics`] | what a render did, as tables | files |
+//! | [`image`], [`tonemap`], [`false_color`] | EXR and PNG | scenes |
 //! | [`compare`], [`flip`] | how far two pictures differ | scenes |
 
 pub mod alias;
@@ -21,9 +22,11 @@ pub mod compare;
 pub mod description;
 pub mod drive;
 pub mod environment;
+pub mod false_color;
 pub mod flip;
 pub mod image;
 pub mod load;
 pub mod microfacet;
 pub mod render;
+pub mod statistics;
 pub mod tonemap;

@@ -2,7 +2,10 @@
 
 use crate::drive::{Options, Rendered, drive_scene};
 use crate::image::Picture;
+use crate::statistics::Statistics;
+use croupier::denoise::{Planes, scratch_len};
 use croupier::film::{PixelAov, PixelStats};
+use croupier::learn::{Constant, Learning};
 use croupier::profile::AnyProfile;
 use croupier::{Film, Plan, Scene, Settings, Strategy};
 use serde::Serialize;
@@ -53,6 +56,22 @@ pub struct RenderOptions {
     pub threads: usize,
     /// Units of parallel work, >= 1. Part of what determines the image.
     pub shards: u32,
+    /// See [`Settings::adaptive`].
+    pub adaptive: bool,
+    /// See [`Settings::shadow_roulette`].
+    pub shadow_roulette: bool,
+    /// See [`Settings::constant`].
+    pub constant: Constant,
+    /// Choices of the strategies that learn.
+    pub learning: Learning,
+    /// A saved cache to begin with. Needs a strategy that learns from the scene.
+    pub cache: Option<Vec<u8>>,
+    /// Return the cache in the end. Needs such a strategy too.
+    pub save_cache: bool,
+    /// Add the layer `denoised`.
+    pub denoise: bool,
+    /// Measure what look-ups take, for [`Statistics::time`].
+    pub calibrate: bool,
 }
 
 impl Default for RenderOptions {
@@ -65,6 +84,14 @@ impl Default for RenderOptions {
             seed: 0,
             threads: 0,
             shards: 16,
+            adaptive: false,
+            shadow_roulette: false,
+            constant: Constant::default(),
+            learning: Learning::default(),
+            cache: None,
+            save_cache: false,
+            denoise: false,
+            calibrate: false,
         }
     }
 }
@@ -121,6 +148,10 @@ pub struct RenderResult {
     pub picture: Picture,
     /// Figures.
     pub stats: RenderStats,
+    /// More of them: paths, iterations, time.
+    pub statistics: Statistics,
+    /// The saved cache, if asked for.
+    pub cache: Option<Vec<u8>>,
     /// The observer ended it before its target.
     pub stopped_early: bool,
 }
@@ -150,6 +181,10 @@ fn settings(scene: &Scene<'_>, options: &RenderOptions) -> Result<Settings, Rend
         max_depth: options.max_depth.unwrap_or(base.max_depth),
         strategy: Strategy::parse(&options.strategy).map_err(RenderError::Strategy)?,
         aovs: true,
+        adaptive: options.adaptive,
+        shadow_roulette: options.shadow_roulette,
+        constant: options.constant,
+        learning: options.learning,
         ..base
     })
 }
@@ -158,9 +193,25 @@ fn settings(scene: &Scene<'_>, options: &RenderOptions) -> Result<Settings, Rend
 pub fn render(scene: &[u8], options: &RenderOptions, observer: &dyn Observer) -> Result<RenderResult, RenderError> {
     let scene = Scene::from_bytes(scene)?;
     let settings = settings(&scene, options)?;
-    let o = Options { settings, target: options.target, threads: options.threads, estimate: None };
+    let o = Options {
+        threads: options.threads,
+        cache: options.cache.as_deref(),
+        save_cache: options.save_cache,
+        calibrate: options.calibrate,
+        ..Options::new(settings, options.target)
+    };
     let rendered = drive_scene(scene, &o, observer)?;
-    Ok(RenderResult { picture: picture(&rendered), stats: stats(&rendered), stopped_early: rendered.stopped_early })
+    let mut picture = picture(&rendered);
+    if options.denoise {
+        picture.add3("denoised", RGB, &denoised(&rendered));
+    }
+    Ok(RenderResult {
+        picture,
+        stats: stats(&rendered),
+        statistics: Statistics::of(&rendered),
+        cache: rendered.cache,
+        stopped_early: rendered.stopped_early,
+    })
 }
 
 /// What [`render`] would take, without rendering.
@@ -175,9 +226,24 @@ pub fn plan(scene: &[u8], options: &RenderOptions) -> Result<PlanSummary, Render
     })
 }
 
+const RGB: [&str; 3] = ["R", "G", "B"];
+
+/// The built-in denoiser's guess at the picture, by the final film and what the first hits look like.
+fn denoised(r: &Rendered) -> Vec<[f32; 3]> {
+    let features = !r.aovs.is_empty();
+    let mut memory = vec![0.0; Planes::len(r.size, features)];
+    let mut scratch = vec![0.0; scratch_len(r.size)];
+    let done = Planes::carve(r.size, features, &mut memory).and_then(|mut planes| {
+        r.pixels.iter().enumerate().for_each(|(i, p)| planes.set(i, p, r.aovs.get(i)));
+        planes.denoise(&mut scratch)?;
+        let [red, green, blue] = planes.out;
+        Ok(red.iter().zip(green).zip(blue).map(|((r, g), b)| [*r, *g, *b]).collect())
+    });
+    done.expect("memory of the sizes asked for")
+}
+
 /// All layers that the film holds.
 fn picture(r: &Rendered) -> Picture {
-    const RGB: [&str; 3] = ["R", "G", "B"];
     let mut picture = Picture::new(r.size[0] as usize, r.size[1] as usize);
     picture.add3("", RGB, &r.image());
     picture.add3("stderr", RGB, &r.stderr());
@@ -191,6 +257,8 @@ fn picture(r: &Rendered) -> Picture {
         let normal: Vec<_> = r.aovs.iter().map(|a| a.normal.map(|x| per_hit(a, x))).collect();
         picture.add3("normal", ["X", "Y", "Z"], &normal);
         picture.add1("depth", "Z", &r.aovs.iter().map(|a| per_hit(a, a.depth)).collect::<Vec<_>>());
+        let paths = |(p, a): (&PixelStats, &PixelAov)| (a.paths / p.samples.max(1) as f64) as f32;
+        picture.add1("paths", "N", &r.pixels.iter().zip(&r.aovs).map(paths).collect::<Vec<_>>());
         for (d, layer) in ["factor1", "factor2", "factor3", "factor4"].into_iter().enumerate() {
             let mean = |a: &PixelAov| (a.factor[d] / a.vertices[d].max(1.0)) as f32;
             picture.add1(layer, "s", &r.aovs.iter().map(mean).collect::<Vec<_>>());
@@ -212,6 +280,11 @@ fn stats(r: &Rendered) -> RenderStats {
         ("ring_capped", c.ring_capped),
         ("budget_capped", c.budget_capped),
         ("ring_peak", c.ring_peak),
+        ("shadow_kills", c.shadow_kills),
+        ("look_ups", c.look_ups.lanes),
+        ("samples_logged", c.samples_logged),
+        ("samples_refused", c.samples_refused),
+        ("ledger_full", c.ledger_full),
         ("non_finite", c.non_finite),
     ];
     RenderStats {

@@ -6,6 +6,7 @@
 mod bake;
 mod compare;
 mod info;
+mod learning;
 mod progress;
 mod render;
 mod scene;

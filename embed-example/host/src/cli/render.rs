@@ -1,13 +1,18 @@
 //! `croupier render`
 
+use super::learning::LearningFlags;
 use super::progress::Rendering;
 use super::{Outcome, say, say_json, scene};
 use croupier::Strategy;
 use croupier::rrs::ParseError;
-use croupier_host::image::write_png;
+use croupier_host::false_color::{Scale, draw};
+use croupier_host::image::{ImageError, Picture, write_png, write_whole};
 use croupier_host::render::{RenderOptions, RenderResult, RenderStats, Target, render};
+use croupier_host::statistics::Statistics;
 use croupier_host::tonemap::{Curve, tonemap};
 use serde::Serialize;
+use std::error::Error;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Path segments at which every path ends, whatever the settings.
@@ -27,8 +32,8 @@ pub struct Flags {
     /// Where the picture goes; a tone-mapped PNG goes beside it
     #[arg(short, long, value_name = "FILE", default_value = "croupier.exr", value_parser = exr_path)]
     output: PathBuf,
-    /// Roulette strategy: none, threshold, contribution, throughput, albedo, classic or fixed:S
-    #[arg(long, value_name = "NAME", default_value_t = RenderOptions::default().strategy, value_parser = strategy)]
+    /// Roulette strategy; --help lists them
+    #[arg(long, value_name = "NAME", long_help = strategies(), default_value_t = RenderOptions::default().strategy, value_parser = strategy)]
     rrs: String,
     #[command(flatten)]
     until: Until,
@@ -50,9 +55,22 @@ pub struct Flags {
     /// Stops of exposure for the PNG; 0 if absent, 1 for the built-in scene
     #[arg(long, value_name = "STOPS", value_parser = stops, allow_negative_numbers = true)]
     exposure: Option<f32>,
+    /// Add the denoised picture as layer `denoised`, and make the PNG from it
+    #[arg(long)]
+    denoise: bool,
+    /// Also write roulette factors, costs and paths as pictures with legends: NAME.factor1.png to NAME.factor4.png,
+    /// NAME.cost.png, NAME.paths.png
+    #[arg(long)]
+    false_color: bool,
+    /// Print what paths, iterations and learning took
+    #[arg(long)]
+    stats: bool,
     /// Print the figures as one line of JSON
     #[arg(long)]
     json: bool,
+    // The heading of the last flags would hold for any after them.
+    #[command(flatten)]
+    learning: LearningFlags,
 }
 
 /// When to stop; 64 samples per pixel if nothing is given.
@@ -83,8 +101,8 @@ impl Until {
 
 impl Flags {
     /// The same for the library.
-    fn options(&self) -> RenderOptions {
-        RenderOptions {
+    fn options(&self) -> Result<RenderOptions, Box<dyn Error>> {
+        let mut options = RenderOptions {
             strategy: self.rrs.clone(),
             target: self.until.target(),
             max_depth: self.max_depth,
@@ -92,7 +110,12 @@ impl Flags {
             seed: self.seed,
             threads: self.threads,
             shards: self.shards,
-        }
+            denoise: self.denoise,
+            calibrate: self.stats,
+            ..RenderOptions::default()
+        };
+        self.learning.apply(&mut options)?;
+        Ok(options)
     }
 }
 
@@ -100,6 +123,8 @@ impl Flags {
 struct Report<'a> {
     #[serde(flatten)]
     stats: &'a RenderStats,
+    #[serde(flatten)]
+    statistics: Option<&'a Statistics>,
     width: usize,
     height: usize,
     strategy: &'a str,
@@ -107,31 +132,42 @@ struct Report<'a> {
     stopped_early: bool,
     output: &'a Path,
     png: &'a Path,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    false_color: Vec<PathBuf>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cache_out: Option<&'a Path>,
 }
 
 /// Runs the command.
 pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     let png = flags.output.with_extension("png");
     // Said now, not after an hour of rendering.
-    let folder = flags.output.parent().filter(|p| !p.as_os_str().is_empty());
-    if let Some(folder) = folder.filter(|f| !f.is_dir()) {
-        return Err(format!("cannot write {}: {} is not a folder", flags.output.display(), folder.display()).into());
-    }
-    let options = flags.options();
+    writable(&flags.output)?;
+    let cache_out = flags.learning.cache_out.as_deref();
+    cache_out.map_or(Ok(()), writable)?;
+    let options = flags.options()?;
     let bytes = scene::open(path)?;
     let watch = Rendering::start(options.target);
-    let result = render(&bytes, &options, &watch).map_err(|e| scene::about(path)(&e))?;
+    let result = render(&bytes, &options, &watch)
+        .map_err(|e| flags.learning.about(&e).unwrap_or_else(|| scene::about(path)(&e)))?;
     drop(watch);
-    let RenderResult { picture, stats, stopped_early } = &result;
+    let RenderResult { picture, stats, statistics, cache, stopped_early } = &result;
     picture.write_exr(&flags.output)?;
+    if let Some((path, bytes)) = cache_out.zip(cache.as_ref()) {
+        write_whole(path, |out| out.write_all(bytes).map_err(|e| ImageError::Write(path.into(), e)))?;
+    }
     let (width, height) = (picture.width, picture.height);
-    let image = picture.rgb("").ok_or_else(|| format!("{}: the picture has no colours", flags.output.display()))?;
+    let image = picture
+        .rgb(if flags.denoise { "denoised" } else { "" })
+        .ok_or_else(|| format!("{}: the picture has no colours", flags.output.display()))?;
     // Its lamp lights the walls to about a fifth of white.
     let exposure = flags.exposure.unwrap_or(if path.is_none() { 1.0 } else { 0.0 });
     write_png(&png, width, height, &tonemap(&image, exposure, Curve::Shoulder))?;
+    let false_color = if flags.false_color { write_false_color(&flags.output, picture)? } else { Vec::new() };
     if flags.json {
         return say_json(&Report {
             stats,
+            statistics: flags.stats.then_some(statistics),
             width,
             height,
             strategy: &options.strategy,
@@ -139,6 +175,8 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
             stopped_early: *stopped_early,
             output: &flags.output,
             png: &png,
+            false_color,
+            cache_out,
         });
     }
     let early = if *stopped_early { "stopped early: " } else { "" };
@@ -154,7 +192,51 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     for (name, count) in stats.counters.iter().filter(|(_, count)| **count > 0) {
         say(&format!("{name}: {count}"))?;
     }
-    say(&format!("wrote {} and {}", flags.output.display(), png.display()))
+    if flags.stats {
+        say(&format!("\n{statistics}"))?;
+    }
+    let more = false_color.iter().map(PathBuf::as_path).chain(cache_out);
+    let more: String = more.map(|p| format!(", {}", p.display())).collect();
+    say(&format!("wrote {} and {}{more}", flags.output.display(), png.display()))
+}
+
+/// Can a file of this name be made?
+fn writable(path: &Path) -> Result<(), String> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    match folder.filter(|f| !f.is_dir()) {
+        Some(folder) => Err(format!("cannot write {}: {} is not a folder", path.display(), folder.display())),
+        None if path.is_dir() => Err(format!("cannot write {}: it is a folder", path.display())),
+        None => Ok(()),
+    }
+}
+
+/// Pictures of factors, costs and paths beside `output`; their names.
+fn write_false_color(output: &Path, picture: &Picture) -> Result<Vec<PathBuf>, ImageError> {
+    const LAYERS: [(&str, &str); 6] = [
+        ("factor1", "factor 1"),
+        ("factor2", "factor 2"),
+        ("factor3", "factor 3"),
+        ("factor4", "factor 4+"),
+        ("cost", "rays"),
+        ("paths", "paths"),
+    ];
+    let mut names = Vec::new();
+    for (layer, title) in LAYERS {
+        let Some(channel) = picture.layer(layer).and_then(|l| l.channels.first()) else { continue };
+        let factors = layer.starts_with("factor");
+        let scale = if factors { Scale::FACTORS } else { Scale::sequential(&channel.values) };
+        let drawing = draw(&channel.values, picture.width, &scale, title);
+        let name = output.with_extension(format!("{layer}.png"));
+        write_png(&name, drawing.width, drawing.height, &drawing.pixels)?;
+        names.push(name);
+    }
+    Ok(names)
+}
+
+/// Help of `--rrs`.
+fn strategies() -> String {
+    let lines = Strategy::TABLE.iter().map(|(name, help)| format!("\n  {name}: {help}"));
+    format!("Roulette strategy:{}", lines.collect::<String>())
 }
 
 fn exr_path(text: &str) -> Result<PathBuf, String> {

@@ -1,0 +1,138 @@
+//! What the strategies that learn are told.
+
+use croupier::learn::cache::CacheError;
+use croupier::learn::{Constant, Learning, Objective};
+use croupier::rrs::{Norm, Space};
+use croupier::{SettingsError, Strategy};
+use croupier_host::drive::DriveError;
+use croupier_host::render::RenderOptions;
+use std::error::Error;
+use std::path::PathBuf;
+
+/// Flags about learning.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Learning")]
+pub struct LearningFlags {
+    /// More samples for pixels with much error, fewer for others
+    #[arg(long)]
+    adaptive: bool,
+    /// Roulette for shadow rays too
+    #[arg(long)]
+    shadow_roulette: bool,
+    /// What stands in for samples that roulette skips: off, cached (the learned mean) or a radiance
+    #[arg(long, value_name = "off|cached|NUMBER", default_value = "off", value_parser = constant, allow_negative_numbers = true)]
+    constant: Constant,
+    /// Which error is to be small: relative to the pixel, or absolute
+    #[arg(long, value_name = "relative|absolute", default_value = "relative", value_parser = objective)]
+    objective: Objective,
+    /// How the errors of the channels become one: mean, luminance or max
+    #[arg(long, value_name = "mean|luminance|max", default_value = "mean", value_parser = norm)]
+    norm: Norm,
+    /// Memory for statistics of the scene, of all shards together
+    #[arg(long, value_name = "N", default_value = "24MiB", value_parser = bytes)]
+    cache_bytes: usize,
+    /// Begin with statistics that a render of this scene has saved
+    #[arg(long, value_name = "FILE")]
+    cache_in: Option<PathBuf>,
+    /// Save the statistics of the scene in the end
+    #[arg(long, value_name = "FILE")]
+    pub cache_out: Option<PathBuf>,
+}
+
+impl LearningFlags {
+    /// Puts them into `options`, and reads the saved statistics.
+    pub fn apply(&self, options: &mut RenderOptions) -> Result<(), Box<dyn Error>> {
+        let strategy = Strategy::parse(&options.strategy)?;
+        let caches = self.cache_in.is_some() || self.cache_out.is_some();
+        // Said before the scene is loaded.
+        if caches && strategy.space() != Some(Space::Scene) {
+            return Err(DriveError::NoCache(strategy.name()).into());
+        }
+        if self.constant == Constant::Cached && strategy.space() != Some(Space::Scene) {
+            return Err(SettingsError::Constant.into());
+        }
+        let read = |p: &PathBuf| std::fs::read(p).map_err(|e| format!("cannot read {}: {e}", p.display()));
+        options.adaptive = self.adaptive;
+        options.shadow_roulette = self.shadow_roulette;
+        options.constant = self.constant;
+        options.learning =
+            Learning { cache_bytes: self.cache_bytes, objective: self.objective, norm: self.norm, ..options.learning };
+        options.cache = self.cache_in.as_ref().map(read).transpose()?;
+        options.save_cache = self.cache_out.is_some();
+        Ok(())
+    }
+
+    /// Is this error about the saved statistics? Then with the name of their file, and what to do.
+    pub fn about(&self, e: &DriveError) -> Option<String> {
+        match (e, &self.cache_in) {
+            (DriveError::Cache(CacheError::Full { .. }), Some(path)) => {
+                Some(format!("{}: {e}; give more --cache-bytes", path.display()))
+            }
+            (DriveError::Cache(_), Some(path)) => Some(format!("{}: {e}", path.display())),
+            _ => None,
+        }
+    }
+}
+
+fn constant(text: &str) -> Result<Constant, String> {
+    match text {
+        "off" => Ok(Constant::Off),
+        "cached" => Ok(Constant::Cached),
+        _ => match text.parse::<f32>() {
+            Ok(x) if x.is_finite() => Ok(Constant::Number(x)),
+            _ => Err("write off, cached or a finite number".into()),
+        },
+    }
+}
+
+fn objective(text: &str) -> Result<Objective, String> {
+    match text {
+        "relative" => Ok(Objective::Relative),
+        "absolute" => Ok(Objective::Absolute),
+        _ => Err("write relative or absolute".into()),
+    }
+}
+
+fn norm(text: &str) -> Result<Norm, String> {
+    match text {
+        "mean" => Ok(Norm::Mean),
+        "luminance" => Ok(Norm::Luminance),
+        "max" => Ok(Norm::Max),
+        _ => Err("write mean, luminance or max".into()),
+    }
+}
+
+/// `65536`, `32KiB`, `24MiB`, `1GiB`.
+fn bytes(text: &str) -> Result<usize, String> {
+    let digits = text.trim_end_matches(|c: char| !c.is_ascii_digit());
+    let shift = match &text[digits.len()..] {
+        "" => 0,
+        "KiB" => 10,
+        "MiB" => 20,
+        "GiB" => 30,
+        _ => return Err("write it as 65536, 32KiB, 24MiB or 1GiB".into()),
+    };
+    let number: usize = digits.parse().map_err(|_| "write it as 65536, 32KiB, 24MiB or 1GiB")?;
+    number.checked_mul(1 << shift).ok_or_else(|| "more bytes than can be addressed".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Killed by: a suffix that counts in thousands, a product that wraps, the flags' defaults unlike the library's.
+    #[test]
+    fn texts() {
+        for (text, value) in [("65536", 65536), ("32KiB", 32768), ("24MiB", 25_165_824), ("1GiB", 1 << 30), ("0", 0)] {
+            assert_eq!(bytes(text), Ok(value), "{text}");
+        }
+        for text in ["", "KiB", "24MB", "24 MiB", "-1", "1.5MiB", "99999999999999999999", "18446744073709551615KiB"] {
+            assert!(bytes(text).is_err(), "{text}");
+        }
+        let l = Learning::default();
+        assert_eq!(bytes("24MiB"), Ok(l.cache_bytes));
+        assert_eq!((objective("relative"), norm("mean")), (Ok(l.objective), Ok(l.norm)));
+        assert_eq!(constant("-0.5"), Ok(Constant::Number(-0.5)));
+        assert!(constant("inf").is_err() && constant("on").is_err());
+    }
+}

@@ -1,0 +1,200 @@
+//! What a render did and what learning took: figures to compare roulette strategies with (EARS, SIGGRAPH 2022, Table 1,
+//! Fig. 9 and section 6.2).
+
+use crate::drive::{IterationRecord, Rendered};
+use serde::Serialize;
+use std::fmt;
+
+/// All of it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Statistics {
+    /// Paths of the whole render.
+    pub paths: Paths,
+    /// Every iteration.
+    pub iterations: Vec<Iteration>,
+    /// Where the time went.
+    pub time: Vec<Part>,
+}
+
+/// A row of Table 1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Paths {
+    /// Camera samples per pixel.
+    pub spp: f64,
+    /// Mean number of segments of a path from the camera to its end.
+    pub path_length: f64,
+    /// Mean number of paths that a camera sample becomes.
+    pub paths_per_sample: f64,
+    /// Mean roulette factor at the first hit; absent if nothing was hit.
+    pub first_factor: Option<f64>,
+}
+
+/// A point of Fig. 9. Costs are rays, so that they do not depend on the machine.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Iteration {
+    /// Camera samples per pixel that were asked for.
+    pub samples: u32,
+    /// Error of the picture made of one sample per pixel, by the objective; absent unless something is learned.
+    pub variance: Option<f64>,
+    /// Part of it in the worst pixels, which `variance` leaves out.
+    pub outliers: Option<f64>,
+    /// Mean cost of a camera sample.
+    pub cost: f64,
+    /// 1 / (variance x cost).
+    pub efficiency: Option<f64>,
+    /// Leaves of the cache afterwards.
+    pub leaves: Option<u32>,
+    /// Splits of leaves for which there was no room so far.
+    pub splits_refused: Option<u64>,
+    /// Estimated relMSE of the picture afterwards; absent after a single sample.
+    pub relmse_estimate: Option<f64>,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+}
+
+/// What a part of the work took.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Part {
+    /// Which.
+    pub name: &'static str,
+    /// Wall-clock seconds; those of work that all threads share, over their number.
+    pub seconds: f64,
+    /// Of the whole render, 0 to 1.
+    pub share: f64,
+    /// Contained in `tracing`: counted, times what one takes in a loop of nothing else.
+    pub within_tracing: bool,
+}
+
+impl Statistics {
+    /// Of a finished render. Parts of tracing are there if it was calibrated.
+    pub fn of(r: &Rendered) -> Self {
+        let c = &r.counters;
+        let over = |a: u64, b: u64| a as f64 / b.max(1) as f64;
+        let first = |f: fn(&croupier::film::PixelAov) -> f64| r.aovs.iter().map(f).sum::<f64>();
+        let hits = first(|a| a.vertices[0]);
+        let pixels = u64::from(r.size[0]) * u64::from(r.size[1]);
+        // an iteration before which one sample per pixel was all there is
+        let mut samples = 0;
+        let iterations = r.iterations.iter().map(|i| {
+            samples += i.work.samples;
+            Iteration::of(i, samples > 1)
+        });
+        Self {
+            paths: Paths {
+                spp: over(c.camera_samples, pixels),
+                path_length: over(c.path_segments, c.paths),
+                paths_per_sample: over(c.paths, c.camera_samples),
+                first_factor: (hits > 0.0).then(|| first(|a| a.factor[0]) / hits),
+            },
+            iterations: iterations.collect(),
+            time: time(r),
+        }
+    }
+}
+
+impl Iteration {
+    fn of(i: &IterationRecord, judged: bool) -> Self {
+        // an iteration that was stopped may have measured nothing
+        let picture = i.picture.filter(|p| p.cost > 0.0);
+        let cost = picture.map_or(i.work.rays as f64 / i.counters.camera_samples.max(1) as f64, |p| p.cost);
+        let variance = picture.map(|p| p.variance);
+        Self {
+            samples: i.work.samples,
+            variance,
+            outliers: picture.map(|p| p.outliers),
+            cost,
+            efficiency: variance.map(|v| 1.0 / (v * cost)).filter(|e| e.is_finite()),
+            leaves: i.cache.map(|c| c.leaves),
+            splits_refused: i.cache.map(|c| c.splits_refused),
+            relmse_estimate: judged.then_some(i.error.rel_mse),
+            seconds: i.work.seconds,
+        }
+    }
+}
+
+fn time(r: &Rendered) -> Vec<Part> {
+    let sum = |f: fn(&IterationRecord) -> f64| r.iterations.iter().map(f).sum::<f64>();
+    let part = |name, seconds: f64, within_tracing| {
+        let share = if r.seconds > 0.0 { seconds / r.seconds } else { 0.0 };
+        Part { name, seconds, share, within_tracing }
+    };
+    let mut parts = vec![part("tracing", sum(|i| i.tracing), false)];
+    if let Some(one) = r.calibration {
+        let threads = r.threads.max(1) as f64;
+        let (packets, samples) = (r.counters.look_ups.packets as f64, r.counters.samples_logged as f64);
+        parts.push(part("looking up", packets * one.look_up / threads, true));
+        parts.push(part("logging", samples * one.log / threads, true));
+    }
+    parts.push(part("merging pixels", sum(|i| i.merging), false));
+    parts.push(part("estimating pixels", sum(|i| i.estimating), false));
+    parts.push(part("building the tree", sum(|i| i.learning), false));
+    parts
+}
+
+/// Tables for people.
+impl fmt::Display for Statistics {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let p = &self.paths;
+        let mut table =
+            vec![["spp", "path length", "paths per sample", "factor at first hit"].map(String::from).to_vec()];
+        table.push(vec![digits(p.spp), digits(p.path_length), digits(p.paths_per_sample), optional(p.first_factor)]);
+        write_table(f, &table)?;
+        writeln!(f)?;
+        let head =
+            ["iteration", "samples", "variance", "outliers", "cost", "efficiency", "leaves", "relMSE so far", "s"];
+        let mut table = vec![head.map(String::from).to_vec()];
+        for (n, i) in self.iterations.iter().enumerate() {
+            table.push(vec![
+                (n + 1).to_string(),
+                i.samples.to_string(),
+                optional(i.variance),
+                optional(i.outliers),
+                digits(i.cost),
+                optional(i.efficiency),
+                i.leaves.map_or("-".into(), |n| n.to_string()),
+                optional(i.relmse_estimate),
+                digits(i.seconds),
+            ]);
+        }
+        write_table(f, &table)?;
+        if let Some(n) = self.iterations.last().and_then(|i| i.splits_refused).filter(|n| *n > 0) {
+            writeln!(f, "{n} leaves of the cache found no room to split")?;
+        }
+        writeln!(f)?;
+        let mut table = vec![["part", "s", "share"].map(String::from).to_vec()];
+        for p in &self.time {
+            let name = if p.within_tracing { format!("of it {} (about)", p.name) } else { p.name.into() };
+            table.push(vec![name, digits(p.seconds), format!("{:.2} %", 100.0 * p.share)]);
+        }
+        write_table(f, &table)
+    }
+}
+
+/// Columns as wide as their widest cell, all to the right.
+fn write_table(f: &mut fmt::Formatter<'_>, rows: &[Vec<String>]) -> fmt::Result {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|x| x.chars().count()).max().unwrap_or(0);
+    let widths: Vec<_> = (0..columns).map(width).collect();
+    for row in rows {
+        let cells: Vec<_> = row.iter().zip(&widths).map(|(x, &w)| format!("{x:>w$}")).collect();
+        writeln!(f, "{}", cells.join("  "))?;
+    }
+    Ok(())
+}
+
+fn optional(x: Option<f64>) -> String {
+    x.map_or("-".into(), digits)
+}
+
+/// Three digits.
+fn digits(x: f64) -> String {
+    let size = x.abs();
+    if size == 0.0 || !x.is_finite() {
+        format!("{x}")
+    } else if !(1e-3..1e6).contains(&size) {
+        format!("{x:.2e}")
+    } else {
+        let decimals = (2 - size.log10().floor() as i32).max(0) as usize;
+        format!("{x:.decimals$}")
+    }
+}

@@ -1,0 +1,176 @@
+//! The program's flags about learning, denoising, false colours and statistics, from outside.
+
+use croupier_host::image::Picture;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn croupier(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_croupier")).args(arguments).current_dir(folder).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// A render of the built-in scene, as small as can be.
+fn render(folder: &Path, arguments: &[&str]) -> Output {
+    let small = ["render", "--size", "24x20", "--threads", "1", "--shards", "2"];
+    croupier(folder, &[&small, arguments].concat())
+}
+
+fn json(out: &Output) -> serde_json::Value {
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    assert_eq!(text(&out.stdout).lines().count(), 1);
+    serde_json::from_slice(&out.stdout).unwrap()
+}
+
+/// Killed by: a list of strategies in words, of which one is forgotten.
+#[test]
+fn help_lists_every_strategy() {
+    let dir = tempfile::tempdir().unwrap();
+    let help = text(&croupier(dir.path(), &["render", "--help"]).stdout);
+    let words = help.split_whitespace().collect::<Vec<_>>().join(" ");
+    for (name, what) in croupier::Strategy::TABLE {
+        assert!(words.contains(&format!("{name}: {what}")), "{name}: {help}");
+    }
+}
+
+/// Killed by: an argument that goes unchecked.
+#[test]
+fn usage_errors_are_status_2() {
+    let dir = tempfile::tempdir().unwrap();
+    for (arguments, said) in [
+        (["--constant", "on"], "off, cached or a finite number"),
+        (["--constant", "nan"], "off, cached or a finite number"),
+        (["--objective", "both"], "relative or absolute"),
+        (["--norm", "median"], "mean, luminance or max"),
+        (["--cache-bytes", "24MB"], "24MiB"),
+        (["--cache-bytes", "1.5MiB"], "24MiB"),
+    ] {
+        let out = croupier(dir.path(), &[&["render"], &arguments[..]].concat());
+        let error = text(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{arguments:?}: {error}");
+        assert!(error.contains(said) && out.stdout.is_empty(), "{arguments:?}: {error}");
+    }
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+}
+
+/// Killed by: an error after rendering instead of before, without the file's name, or none.
+#[test]
+fn wrong_files_are_named_before_rendering() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let fails = |arguments: &[&str], parts: &[&str]| {
+        let out = render(dir, &[&["--spp", "1"], arguments].concat());
+        let error = text(&out.stderr);
+        assert_eq!(out.status.code(), Some(1), "{arguments:?}: {error}");
+        assert!(error.lines().count() == 1 && out.stdout.is_empty(), "{arguments:?}: {error}");
+        assert!(parts.iter().all(|p| error.contains(p)), "{arguments:?}: {error}");
+    };
+    let ears = |more: &[&str], parts: &[&str]| fails(&[&["--rrs", "ears"], more].concat(), parts);
+    std::fs::write(
+        dir.join("words.cache"),
+        "this is no cache at all, but it has more than sixty-four bytes, to be sure",
+    )
+    .unwrap();
+    std::fs::create_dir(dir.join("folder")).unwrap();
+    ears(&["--cache-in", "missing.cache"], &["cannot read missing.cache", "No such file"]);
+    ears(&["--cache-in", "words.cache"], &["words.cache: not a saved cache"]);
+    ears(&["--cache-out", "no/where.cache"], &["cannot write no/where.cache", "not a folder"]);
+    ears(&["--cache-out", "folder"], &["cannot write folder", "it is a folder"]);
+    ears(&["--cache-bytes", "1KiB"], &["cache of 1024 bytes"]);
+    fails(&["--rrs", "classic", "--cache-out", "x.cache"], &["`classic`", "no cache"]);
+    fails(&["--rrs", "bolin-meyer", "--cache-in", "words.cache"], &["`bolin-meyer`", "no cache"]);
+    fails(&["--rrs", "classic", "--constant", "cached"], &["constant", "ears"]);
+
+    // of a scene with other bounds: a triangle
+    std::fs::write(dir.join("t.obj"), "v 0 0 0\nv 7 0 0\nv 0 7 0\nf 1 2 3\n").unwrap();
+    let out = croupier(
+        dir,
+        &["render", "t.obj", "--size", "8x8", "--spp", "2", "--rrs", "ears", "-o", "t.exr", "--cache-out", "t.cache"],
+    );
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    ears(&["--cache-in", "t.cache"], &["t.cache: statistics of another scene"]);
+    let names = std::fs::read_dir(dir).unwrap().map(|f| f.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<_> = names.collect();
+    names.sort();
+    assert_eq!(names, ["folder", "t.cache", "t.exr", "t.obj", "t.png", "words.cache"]);
+}
+
+/// Killed by: files that are not written or not said, layers that are missing, a PNG of the noisy picture, statistics
+/// unasked.
+#[test]
+fn everything_at_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let flags = ["--rrs", "ears", "--spp", "6", "--adaptive", "--shadow-roulette", "--constant", "cached", "--json"];
+    let more = ["--objective", "absolute", "--norm", "luminance", "--denoise", "--false-color", "--stats"];
+    let caches = ["--cache-out", "a.cache", "-o", "a.exr"];
+    let found = json(&render(dir, &[&flags[..], &more, &caches].concat()));
+    assert_eq!(found["cache_out"], "a.cache");
+    let images = ["factor1", "factor2", "factor3", "factor4", "cost", "paths"].map(|n| format!("a.{n}.png"));
+    assert_eq!(found["false_color"], serde_json::json!(images));
+    for name in images.iter().map(String::as_str).chain(["a.png", "a.exr", "a.cache"]) {
+        assert!(std::fs::metadata(dir.join(name)).unwrap().len() > 100, "{name}");
+    }
+    assert!(found["iterations"].as_array().unwrap().len() >= 3);
+    assert!(found["iterations"][2]["efficiency"].as_f64().unwrap() > 0.0);
+    assert!(found["paths"]["path_length"].as_f64().unwrap() > 1.0);
+    assert_eq!(found["time"].as_array().unwrap().len(), 6);
+    let picture = Picture::read_exr(&dir.join("a.exr")).unwrap();
+    for layer in ["", "denoised", "paths", "cost", "factor1", "factor4", "albedo"] {
+        assert!(picture.layer(layer).is_some(), "{layer}");
+    }
+
+    // begun with its own statistics; without the other flags
+    let plain = json(&render(dir, &["--rrs", "ears", "--spp", "2", "--cache-in", "a.cache", "-o", "b.exr", "--json"]));
+    assert!(["iterations", "time", "false_color", "cache_out"].iter().all(|k| plain.get(*k).is_none()), "{plain}");
+    assert!(Picture::read_exr(&dir.join("b.exr")).unwrap().layer("denoised").is_none());
+    assert!(!dir.join("b.factor1.png").exists());
+
+    let noisy = ["--spp", "4", "--json"];
+    json(&render(dir, &[&noisy[..], &["-o", "noisy.exr"]].concat()));
+    json(&render(dir, &[&noisy[..], &["-o", "clean.exr", "--denoise"]].concat()));
+    let read = |name: &str| std::fs::read(dir.join(name)).unwrap();
+    assert_ne!(read("noisy.png"), read("clean.png"));
+    let rgb = |name: &str| Picture::read_exr(&dir.join(name)).unwrap().rgb("").unwrap();
+    assert_eq!(rgb("noisy.exr"), rgb("clean.exr"));
+
+    let words = text(&render(dir, &["--rrs", "ears", "--spp", "4", "--stats", "-o", "w.exr"]).stdout);
+    for part in ["paths per sample", "factor at first hit", "efficiency", "looking up", "building the tree"] {
+        assert!(words.contains(part), "{words}");
+    }
+}
+
+/// Killed by: a Ctrl-C after which the statistics are lost.
+#[cfg(target_os = "linux")]
+#[test]
+fn statistics_are_saved_after_ctrl_c() {
+    let dir = tempfile::tempdir().unwrap();
+    let arguments = ["render", "--size", "16x16", "--threads", "1", "--rrs", "ears", "--seconds", "1000000", "--json"];
+    let mut child = Command::new(env!("CARGO_BIN_EXE_croupier"))
+        .args(arguments)
+        .args(["--cache-out", "a.cache"])
+        .current_dir(dir.path())
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    // until the program catches SIGINT (number 2)
+    let id = child.id();
+    let catches = || {
+        let status = std::fs::read_to_string(format!("/proc/{id}/status")).unwrap();
+        let caught = status.lines().find_map(|l| l.strip_prefix("SigCgt:")).unwrap().trim();
+        u64::from_str_radix(caught, 16).unwrap() >> 1 & 1 == 1
+    };
+    while !catches() {
+        assert!(child.try_wait().unwrap().is_none(), "ended before Ctrl-C");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    assert!(Command::new("kill").args(["-INT", &id.to_string()]).status().unwrap().success());
+    assert!(child.wait().unwrap().success());
+    let mut said = String::new();
+    std::io::Read::read_to_string(&mut child.stdout.take().unwrap(), &mut said).unwrap();
+    let said: serde_json::Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(said["stopped_early"], true);
+    assert!(std::fs::read(dir.path().join("a.cache")).unwrap().starts_with(b"CRPCACHE"));
+}
