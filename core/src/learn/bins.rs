@@ -1,4 +1,5 @@
 //! The statistics of one bin, in the three forms they take: gathered, kept, looked up.
+#![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, Vec3x8};

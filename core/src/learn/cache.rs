@@ -8,6 +8,7 @@
 //! There are several octrees, for kinds of vertices that should not be mixed, and the direction is the caller's choice: see
 //! [`Kind`]. Shards look up in what [`Cache::freeze`] computed and log into their own [`Training`]; between iterations
 //! those are absorbed in shard order, so the cache is the same whatever the threads did.
+#![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 pub use super::bins::{BIN_LIMIT, Local8, MAX_VALUE};
 pub use super::save::CacheError;

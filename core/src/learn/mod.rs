@@ -3,18 +3,21 @@
 //!
 //! This layer knows places, directions, values and costs. It must not know materials, lights or how paths are traced.
 //! Statistics change efficiency only: whatever they hold, no estimate's mean moves.
-#![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
+mod adaptive;
 mod bins;
 pub mod cache;
+mod estimate;
 mod knowledge;
+mod picture;
 mod save;
 mod settings;
 mod training;
 mod tree;
 
+pub use estimate::Estimate;
 pub(crate) use knowledge::Knowledge;
-pub use knowledge::{Estimate, PictureStatistics};
+pub use picture::PictureStatistics;
 pub use settings::{Constant, Learning, Objective};
 
 /// Relative cost of a camera ray. Costs are counted, never measured: the picture must not depend on a clock.

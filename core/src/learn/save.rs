@@ -9,6 +9,7 @@
 //! All numbers are little-endian. There are no indices, so bytes cannot describe anything but a tree: what is left to
 //! check is that the shape ends where it says, how deep it goes, and the numbers. Bytes are checked as a whole before
 //! anything is changed.
+#![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use super::bins::{BINS, BinSums};
 use super::cache::Cache;

@@ -1,6 +1,6 @@
 //! What the caller chooses about learning.
 
-use super::knowledge::Estimate;
+use super::estimate::Estimate;
 use crate::rrs::{Learned8, MAX_FACTOR, MIN_FACTOR, Norm};
 use croupier_simd::{F32x8, Vec3x8};
 

@@ -1,4 +1,5 @@
 //! A shard's side of the cache: what it has gathered in the current iteration.
+#![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use super::bins::Record;
 use super::cache::CacheSize;

@@ -7,6 +7,7 @@
 //!
 //! The first levels of a large tree are also kept as one table, a coarse grid, where a descent starts: a jittered look-up
 //! needs two descents.
+#![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use super::bins::BINS;
 use crate::memory::{Carver, Measure, MemoryError};

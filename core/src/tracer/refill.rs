@@ -80,7 +80,10 @@ impl Shard<'_> {
         let mut ledger = [NO_RECORD; 8];
         let mut lanes = 0;
         while lanes < 8 {
-            let Some((p, slot, s)) = self.cursor.next(&tiles, self.index, |t| session.knowledge().samples_of_tile(t)) else { break };
+            let Some((p, slot, s)) = self.cursor.next(&tiles, self.index, |t| session.knowledge().samples_of_tile(t))
+            else {
+                break;
+            };
             let film = tiles.film_index(p) as u32;
             let Some(r) = self.roots.open(slot, film, session.knowledge().importance(film)) else { break };
             [x[lanes], y[lanes]] = p;

@@ -1,8 +1,8 @@
 //! One unit of parallel work: exclusively owned, bounded, deterministic.
 
 use super::counters::Counters;
-use super::refill::Cursor;
 use super::ledger::Ledger;
+use super::refill::Cursor;
 use super::root::Roots;
 use super::vertex::{Pool, RESERVE};
 use super::{ledger_capacity, pixel_slots, roots_capacity};

@@ -2,7 +2,7 @@
 
 use crate::blob::AlignedBytes;
 use croupier::Scene;
-use croupier::learn::cache::{Cache, Training};
+use croupier::learn::cache::{Cache, Kind, Training};
 use croupier::rrs::Space;
 use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use std::hint::black_box;
@@ -30,7 +30,7 @@ pub(super) fn calibrate(cache: &Cache<'_>, space: Space, scene: &Scene<'_>) -> O
     let flat: Vec<_> = (0..PACKETS).map(|_| U32x8::new([(); 8].map(|()| random.below(cache.bins())))).collect();
     let all = Mask8::first(8);
     let bin = |i: usize| match space {
-        Space::Scene => cache.find_jittered(all, vertices[i].p, vertices[i].n, vertices[i].jitter, all),
+        Space::Scene => cache.find_jittered(U32x8::splat(Kind::Matte as u32), vertices[i].p, vertices[i].n, vertices[i].jitter, all),
         // those are numbered by pixel and depth, not found
         Space::Image => flat[i],
     };

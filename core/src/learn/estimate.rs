@@ -1,0 +1,165 @@
+//! The estimate of every pixel that errors are weighed by: a picture's relative error cannot be known without the picture.
+
+use super::settings::{Learning, Objective};
+use crate::denoise::{self, Planes};
+use crate::film::{Film, REL_MSE_EPSILON};
+use crate::memory::{Carver, Measure, MemoryError};
+use crate::tiles::TILE;
+
+/// How the estimate of the pixels is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Estimate {
+    /// By the built-in denoiser; takes about 140 bytes a pixel, scratch included.
+    #[default]
+    Denoised,
+    /// Means over squares of 8x8 pixels: 12 bytes for 64 pixels.
+    Blocks,
+}
+
+/// Where the values are.
+#[derive(Debug)]
+enum Values<'m> {
+    None,
+    Denoised { planes: Planes<'m>, scratch: &'m mut [f32] },
+    Blocks([&'m mut [f32]; 3]),
+}
+
+/// Estimates of the pixels.
+#[derive(Debug)]
+pub(super) struct Pixels<'m> {
+    size: [u32; 2],
+    relative: bool,
+    values: Values<'m>,
+    /// There are values.
+    known: bool,
+    /// They are the host's.
+    given: bool,
+}
+
+/// Tiles of a picture.
+pub(super) fn tiles(size: [u32; 2]) -> usize {
+    let [w, h] = size.map(|n| n.div_ceil(TILE) as usize);
+    w * h
+}
+
+/// The tile around a pixel.
+pub(super) fn tile_of(size: [u32; 2], film: u32) -> usize {
+    let (x, y) = (film % size[0] / TILE, film / size[0] / TILE);
+    (y * size[0].div_ceil(TILE) + x) as usize
+}
+
+impl<'m> Pixels<'m> {
+    pub(super) fn measure(m: Measure, size: [u32; 2], features: bool, how: Option<Estimate>) -> Measure {
+        match how {
+            None => m,
+            Some(Estimate::Denoised) => {
+                m.add::<f32>(Planes::len(size, features)).add::<f32>(denoise::scratch_len(size))
+            }
+            Some(Estimate::Blocks) => (0..3).fold(m, |m, _| m.add::<f32>(tiles(size))),
+        }
+    }
+
+    pub(super) fn carve(
+        c: &mut Carver<'m>,
+        size: [u32; 2],
+        features: bool,
+        how: Option<Estimate>,
+        learning: &Learning,
+    ) -> Result<Self, MemoryError> {
+        let values = match how {
+            None => Values::None,
+            Some(Estimate::Denoised) => {
+                let memory = c.take(Planes::len(size, features))?;
+                let given = memory.len();
+                let planes = Planes::carve(size, features, memory)
+                    .map_err(|e| MemoryError::TooSmall { needed: e.needed, given })?;
+                Values::Denoised { planes, scratch: c.take(denoise::scratch_len(size))? }
+            }
+            Some(Estimate::Blocks) => {
+                Values::Blocks([c.take(tiles(size))?, c.take(tiles(size))?, c.take(tiles(size))?])
+            }
+        };
+        Ok(Self { size, relative: learning.objective == Objective::Relative, values, known: false, given: false })
+    }
+
+    /// Are there values?
+    pub(super) fn known(&self) -> bool {
+        self.known
+    }
+
+    /// The estimate of a pixel, 0 while unknown.
+    #[inline]
+    pub(super) fn value(&self, film: u32) -> [f32; 3] {
+        let (planes, i) = match &self.values {
+            Values::None => return [0.0; 3],
+            Values::Denoised { planes, .. } => (planes.out.each_ref(), film as usize),
+            Values::Blocks(planes) => (planes.each_ref(), tile_of(self.size, film)),
+        };
+        planes.map(|p| p.get(i).copied().unwrap_or(0.0))
+    }
+
+    /// What a squared error of a pixel counts, per channel.
+    #[inline]
+    pub(super) fn importance(&self, film: u32) -> [f32; 3] {
+        if !self.known || !self.relative {
+            return [1.0; 3];
+        }
+        self.value(film).map(|x| 1.0 / (x * x + REL_MSE_EPSILON as f32))
+    }
+
+    /// All values, if there is one per pixel.
+    pub(super) fn planes(&self) -> Option<[&[f32]; 3]> {
+        match &self.values {
+            Values::Denoised { planes, .. } if self.known => Some(planes.out.each_ref().map(|p| &**p)),
+            _ => None,
+        }
+    }
+
+    /// The host's values replace the built-in ones from now on; `false` if there is not one per pixel.
+    pub(super) fn give(&mut self, rgb: &[[f32; 3]]) -> bool {
+        let Values::Denoised { planes, .. } = &mut self.values else { return false };
+        if planes.out.iter().any(|p| p.len() != rgb.len()) {
+            return false;
+        }
+        for (c, plane) in planes.out.iter_mut().enumerate() {
+            for (to, from) in plane.iter_mut().zip(rgb) {
+                *to = if from[c].is_finite() { from[c] } else { 0.0 };
+            }
+        }
+        (self.known, self.given) = (true, true);
+        true
+    }
+
+    /// New values from the picture so far.
+    pub(super) fn refresh(&mut self, film: &Film<'_>) {
+        if self.given {
+            return;
+        }
+        match &mut self.values {
+            Values::None => return,
+            Values::Denoised { planes, scratch } => {
+                for (i, p) in film.pixels().iter().enumerate() {
+                    planes.set(i, p, film.aovs().get(i));
+                }
+                // sizes are those of the plan, so this cannot fail; if it did, the last values would serve on
+                let _ = planes.denoise(scratch);
+            }
+            Values::Blocks(planes) => {
+                let [w, h] = self.size;
+                planes.iter_mut().for_each(|p| p.fill(0.0));
+                for (i, p) in film.pixels().iter().enumerate() {
+                    let (x, y) = (i as u32 % w, i as u32 / w);
+                    let sides = [w - x / TILE * TILE, h - y / TILE * TILE];
+                    let area = f64::from(sides.map(|n| n.min(TILE)).iter().product::<u32>());
+                    let at = tile_of(self.size, i as u32);
+                    for (plane, mean) in planes.iter_mut().zip(p.mean()) {
+                        if let Some(sum) = plane.get_mut(at) {
+                            *sum += (mean / area) as f32;
+                        }
+                    }
+                }
+            }
+        }
+        self.known = true;
+    }
+}

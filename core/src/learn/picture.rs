@@ -1,0 +1,144 @@
+//! Error and cost of the picture per camera sample (EARS, eqs. 33 and 34), and what an iteration's picture weighs.
+
+use super::adaptive::Allotment;
+use super::estimate::Pixels;
+use super::settings::Learning;
+use super::{COST_BOUNCE, COST_CAMERA, COST_SHADOW};
+use crate::film::{PixelSums, kth_largest};
+use crate::rrs::Norm;
+use crate::tracer::Counters;
+
+/// Share of the pixels whose variance is left out of the picture's. A single outlier would decide all factors: with the
+/// 0.001 % of EARS (section 5.2), none in a small picture, one bright sample made all vertices look worthless, and roulette
+/// then made more such samples.
+const OUTLIERS: f64 = 1e-3;
+
+/// Iterations count at most this much more than their work says.
+const LARGEST_GAIN: f64 = 10.0;
+
+/// What is known of the picture's error and cost per camera sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PictureStatistics {
+    /// Mean error over the pixels (eq. 34) without the outliers.
+    pub variance: f64,
+    /// The outliers' part of it, kept apart.
+    pub outliers: f64,
+    /// Mean counted cost (eq. 33).
+    pub cost: f64,
+    /// Error of one sample that would make its pixel an outlier.
+    pub limit: f64,
+}
+
+/// Calls its argument with every pixel's film index and sums of an iteration.
+pub(crate) trait Visit: Fn(&mut dyn FnMut(usize, &PixelSums)) {}
+
+impl<F: Fn(&mut dyn FnMut(usize, &PixelSums))> Visit for F {}
+
+/// Statistics over the iterations.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Picture {
+    /// Of the last iteration.
+    pub last: PictureStatistics,
+    /// Of all, older ones discounted.
+    pub blended: PictureStatistics,
+    /// What `blended` weighs: rays.
+    weight: f64,
+    /// Of the first iteration.
+    first: Option<PictureStatistics>,
+}
+
+impl Picture {
+    /// Has an iteration been measured?
+    pub(super) fn known(&self) -> bool {
+        self.first.is_some()
+    }
+
+    /// Mean cost over mean error; 0 while unknown.
+    pub(super) fn cost_over_variance(&self) -> f32 {
+        let b = &self.blended;
+        if b.variance > 0.0 { (b.cost / b.variance).min(1e30) as f32 } else { 0.0 }
+    }
+
+    /// Measures an iteration against the estimate of the pixels.
+    pub(super) fn measure(
+        &mut self,
+        learning: &Learning,
+        pixels: &Pixels<'_>,
+        allotment: &Allotment<'_>,
+        counters: &Counters,
+        visit: impl Visit,
+    ) {
+        let errors = |show: &mut dyn FnMut(f32)| {
+            visit(&mut |film, sums| {
+                if sums.samples > 0 {
+                    show(error_of(film as u32, sums, learning.norm, pixels, allotment) as f32);
+                }
+            });
+        };
+        let mut n = 0u64;
+        errors(&mut |_| n += 1);
+        let n = n as f64;
+        let outlier = kth_largest((n * OUTLIERS) as usize + 1, errors);
+        let (mut s, mut kept) = (PictureStatistics::default(), 0.0);
+        errors(&mut |e| {
+            // two disjoint sums: nothing is ever subtracted (NUMERICS STA-4)
+            if e < outlier {
+                s.variance += f64::from(e);
+                kept += 1.0;
+            } else {
+                s.outliers += f64::from(e);
+            }
+        });
+        s.variance /= f64::max(kept, 1.0);
+        s.outliers /= n.max(1.0);
+        s.limit = f64::from(outlier) * counters.camera_samples as f64 / n.max(1.0);
+        let c = counters;
+        let cost = [(c.camera_rays, COST_CAMERA), (c.scatter_rays, COST_BOUNCE), (c.shadow_rays, COST_SHADOW)];
+        let work: f64 = cost.iter().map(|&(rays, cost)| rays as f64 * f64::from(cost)).sum();
+        s.cost = work / c.camera_samples.max(1) as f64;
+
+        let old = self.weight * f64::from(learning.carry);
+        self.weight = old + work;
+        let blend = |a: f64, b: f64| (a * old + b * work) / self.weight.max(f64::MIN_POSITIVE);
+        let b = self.blended;
+        self.blended = PictureStatistics {
+            variance: blend(b.variance, s.variance),
+            outliers: blend(b.outliers, s.outliers),
+            cost: blend(b.cost, s.cost),
+            limit: s.limit,
+        };
+        self.last = s;
+        self.first.get_or_insert(s);
+    }
+
+    /// What a sample of the iterations now weighs in the picture, one of the first iteration weighing 1: inverse variance.
+    /// A variance is not taken at its word, though. With few samples of a heavy-tailed quantity it comes out too small, and
+    /// trusted, the first iterations would have most weight. So equal work weighs equally at least, and more only if the
+    /// variance has fallen for it.
+    pub(super) fn sample_weight(&self) -> f64 {
+        let (Some(first), b) = (self.first, &self.blended) else { return 1.0 };
+        if first.cost <= 0.0 || b.cost <= 0.0 || b.variance <= 0.0 {
+            return 1.0;
+        }
+        let gain = first.variance * first.cost / (b.variance * b.cost);
+        b.cost / first.cost * gain.clamp(1.0, LARGEST_GAIN)
+    }
+}
+
+/// Mean error of a pixel's samples against its estimate, weighted by its importance, normed over the channels; over the
+/// pixel's share of the samples, so that the mean over the pixels is the picture's.
+fn error_of(film: u32, p: &PixelSums, norm: Norm, pixels: &Pixels<'_>, allotment: &Allotment<'_>) -> f64 {
+    let (n, share) = (p.samples as f64, allotment.share(film));
+    let (value, importance) = (pixels.value(film), pixels.importance(film));
+    let error = |c: usize| {
+        let x = f64::from(value[c]);
+        let square = (p.sum_sqr[c] - 2.0 * x * p.sum[c]) / n + x * x;
+        square.max(0.0) * f64::from(importance[c]) / share
+    };
+    let [r, g, b] = [error(0), error(1), error(2)];
+    match norm {
+        Norm::Max => r.max(g).max(b),
+        Norm::Mean => (r + g + b) / 3.0,
+        Norm::Luminance => 0.2126 * r + 0.7152 * g + 0.0722 * b,
+    }
+}
