@@ -146,6 +146,7 @@ fn everything_at_once() {
 #[test]
 fn every_flag_changes_the_picture() {
     let dir = tempfile::tempdir().unwrap();
+    // enough samples that the small cache is too small
     let flags: [&[&str]; 9] = [
         &[],
         &["--adaptive"],
@@ -158,7 +159,7 @@ fn every_flag_changes_the_picture() {
         &["--cache-bytes", "12KiB"],
     ];
     let pictures = flags.map(|flags| {
-        json(&render(dir.path(), &[&["--rrs", "ears", "--spp", "6", "-o", "f.exr", "--json"], flags].concat()));
+        json(&render(dir.path(), &[&["--rrs", "ears", "--spp", "48", "-o", "f.exr", "--json"], flags].concat()));
         Picture::read_exr(&dir.path().join("f.exr")).unwrap().rgb("").unwrap()
     });
     for i in 0..pictures.len() {
