@@ -142,6 +142,33 @@ fn everything_at_once() {
     }
 }
 
+/// Killed by: a flag that is read and forgotten.
+#[test]
+fn every_flag_changes_the_picture() {
+    let dir = tempfile::tempdir().unwrap();
+    // enough samples that the small cache is too small
+    let flags: [&[&str]; 9] = [
+        &[],
+        &["--adaptive"],
+        &["--shadow-roulette"],
+        &["--constant", "cached"],
+        &["--constant", "0.25"],
+        &["--objective", "absolute"],
+        &["--norm", "luminance"],
+        &["--norm", "max"],
+        &["--cache-bytes", "12KiB"],
+    ];
+    let pictures = flags.map(|flags| {
+        json(&render(dir.path(), &[&["--rrs", "ears", "--spp", "48", "-o", "f.exr", "--json"], flags].concat()));
+        Picture::read_exr(&dir.path().join("f.exr")).unwrap().rgb("").unwrap()
+    });
+    for i in 0..pictures.len() {
+        for j in 0..i {
+            assert!(pictures[i] != pictures[j], "{:?} and {:?}", flags[i], flags[j]);
+        }
+    }
+}
+
 /// Killed by: a Ctrl-C after which the statistics are lost.
 #[cfg(target_os = "linux")]
 #[test]
