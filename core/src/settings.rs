@@ -179,8 +179,12 @@ fn cache_size(s: &Settings) -> Result<Option<CacheSize>, SettingsError> {
     }
     let l = &s.learning;
     let [least, most] = l.factors;
-    let bounds = MIN_FACTOR <= least && least <= 1.0 && 1.0 <= most && most <= MAX_FACTOR;
-    if !bounds || l.ledger == 0 || l.ledger > 1 << 24 || !(l.split_count > 0.0) || !(0.0..=1.0).contains(&l.carry) {
+    let fits = (MIN_FACTOR..=1.0).contains(&least)
+        && (1.0..=MAX_FACTOR).contains(&most)
+        && (1..=1 << 24).contains(&l.ledger)
+        && l.split_count > 0.0
+        && (0.0..=1.0).contains(&l.carry);
+    if !fits {
         return Err(SettingsError::Learning);
     }
     CacheSize::within(l.cache_bytes, s.shards).map(Some).ok_or(SettingsError::Cache(l.cache_bytes))

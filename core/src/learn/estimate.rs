@@ -18,6 +18,7 @@ pub enum Estimate {
 
 /// Where the values are.
 #[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one per session, and no allocator to box it")]
 enum Values<'m> {
     None,
     Denoised { planes: Planes<'m>, scratch: &'m mut [f32] },
