@@ -160,13 +160,13 @@ impl<'m> Knowledge<'m> {
         Ok(k)
     }
 
-    /// The cache of statistics over the scene.
+    /// The cache of statistics over the scene. Those over the picture have no tree and cannot be saved.
     pub(crate) fn cache(&self) -> Option<&Cache<'m>> {
-        self.cache.as_ref()
+        self.cache.as_ref().filter(|c| !c.is_flat())
     }
 
     pub(crate) fn cache_mut(&mut self) -> Option<&mut Cache<'m>> {
-        self.cache.as_mut()
+        self.cache.as_mut().filter(|c| !c.is_flat())
     }
 
     /// Bins that shards may log to in this iteration.
