@@ -347,14 +347,15 @@ impl<'m> Knowledge<'m> {
         if self.counts.is_empty() { weight } else { weight / self.share(film as u32) }
     }
 
-    /// Weight of the samples of an iteration whose pixels `visit` shows, measured against the estimate made before it.
+    /// Weight of the samples of an iteration whose pixels `visit` shows: from what the iterations before it had. Its own
+    /// variance must not be in it, since bright iterations are the noisy ones: the picture would be too dark.
     pub(crate) fn weigh(&mut self, counters: &Counters, visit: impl Fn(&mut dyn FnMut(usize, &PixelSums))) -> f64 {
         if !self.needed || !self.estimated {
             return 1.0;
         }
+        let b = self.blended;
         self.measure_picture(counters, visit);
         let [cost, variance] = self.first;
-        let b = &self.blended;
         if !(cost > 0.0 && b.cost > 0.0 && b.variance > 0.0) {
             return 1.0;
         }
