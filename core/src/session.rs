@@ -213,7 +213,8 @@ impl<'s, 'm, P: Profile, I: Intersector> Session<'s, 'm, P, I> {
         self.knowledge.statistics()
     }
 
-    /// The statistics of the scene, if the strategy learns them: to be saved, or loaded before the first iteration.
+    /// The statistics of the scene, if the strategy learns them (`bolin-meyer` learns of the picture): to be saved, or loaded
+    /// before the first iteration.
     pub fn cache(&self) -> Option<&Cache<'m>> {
         self.knowledge.cache()
     }

@@ -9,6 +9,7 @@ pub mod light_oracle;
 pub mod light_scene;
 pub mod light_stats;
 pub mod math;
+pub mod minimum;
 pub mod quadrature;
 pub mod replay;
 pub mod runner;

@@ -2,11 +2,11 @@
 //! sample of the packet machine can be told again; the ray, material and light functions are the core's own, tested elsewhere.
 //! What is independent here is the bookkeeping: which sample counts what, where, and how many rays it took.
 //!
-//! For flat-shaded scenes of area lights without textures, lens and environment.
+//! For flat-shaded scenes of area lights without textures, lens and environment, and the absolute objective.
 
 use croupier::accel::{Intersector, Ray8, WideBvh, offset, shadow_ray, surface_point};
 use croupier::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
-use croupier::learn::cache::Cache;
+use croupier::learn::cache::{Cache, Kind};
 use croupier::light::{LightSample8, PowerSelector, area_pdf, area_radiance, power_heuristic, sample};
 use croupier::rng::Key8;
 use croupier::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind};
@@ -166,9 +166,19 @@ impl Replay<'_, '_> {
             _ => v.ns * (v.ns.dot(v.wo) * F32x8::splat(2.0)) - v.wo,
         };
         let [a, b, c, _] = key.uniforms(3);
-        let matte = Mask8::splat(matches!(v.kind, MaterialKind::Diffuse));
-        let bin = self.cache.find_jittered(matte, v.p, dir, [a, b, c], one()).lane(0) as usize;
-        let scale = rgb(albedo).map(|a| if a < 1e-3 { 0.0 } else { 1.0 / a });
+        let kind = match (depth, v.kind) {
+            (1, MaterialKind::Diffuse) => Kind::FirstMatte,
+            (1, _) => Kind::FirstShiny,
+            (_, MaterialKind::Diffuse) => Kind::Matte,
+            _ => Kind::Shiny,
+        };
+        let kind = U32x8::splat(kind as u32);
+        let bin = self.cache.find_jittered(kind, v.p, dir, [a, b, c], one()).lane(0) as usize;
+        let scale = rgb(albedo).map(|a| match a {
+            _ if depth == 1 => 1.0,
+            a if a < 1e-3 => 0.0,
+            a => 1.0 / a,
+        });
         let n = f64::from(self.factor);
         let (mut mean, mut square, mut rays) = ([0.0; 3], [0.0; 3], 0.0);
         for k in 0..self.factor {

@@ -285,6 +285,11 @@ impl<'m> Cache<'m> {
         self.flat = Some(leaves.min(self.size.leaves()));
     }
 
+    /// Does the caller number the bins?
+    pub(crate) fn is_flat(&self) -> bool {
+        self.flat.is_some()
+    }
+
     /// Nodes in use, leaves included.
     pub fn nodes(&self) -> u32 {
         self.tree.nodes()

@@ -5,7 +5,7 @@ use super::adaptive::Allotment;
 use super::cache::{Cache, CacheSize, Training};
 use super::estimate::{Estimate, Pixels};
 use super::picture::{Picture, PictureStatistics, Visit};
-use super::settings::Learning;
+use super::settings::{Learning, Objective};
 use crate::film::Film;
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::rrs::{Learned8, Space};
@@ -73,13 +73,13 @@ impl<'m> Knowledge<'m> {
         })
     }
 
-    /// The cache of statistics over the scene.
+    /// The cache of statistics over the scene. Those over the picture have no tree and cannot be saved.
     pub(crate) fn cache(&self) -> Option<&Cache<'m>> {
-        self.cache.as_ref()
+        self.cache.as_ref().filter(|c| !c.is_flat())
     }
 
     pub(crate) fn cache_mut(&mut self) -> Option<&mut Cache<'m>> {
-        self.cache.as_mut()
+        self.cache.as_mut().filter(|c| !c.is_flat())
     }
 
     /// Bins that shards may log to in this iteration.
@@ -160,9 +160,9 @@ impl<'m> Knowledge<'m> {
         [self.picture.last, self.picture.blended]
     }
 
-    /// Is there an estimate of the pixels?
-    pub(crate) fn has_estimate(&self) -> bool {
-        self.pixels.known()
+    /// Is it known what an error in a pixel counts?
+    pub(crate) fn weighs_pixels(&self) -> bool {
+        self.pixels.known() || self.learning.objective == Objective::Absolute
     }
 
     /// Estimates of the pixels, rgb planes.

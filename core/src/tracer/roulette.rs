@@ -118,7 +118,7 @@ fn place<P: Profile, I: Intersector>(
             let kind = U32x8::select(matte, U32x8::splat(Kind::Matte as u32), U32x8::splat(Kind::Shiny as u32));
             let first = U32x8::splat(Kind::FirstMatte as u32 - Kind::Matte as u32);
             let kind = kind + U32x8::select(seen, first, U32x8::splat(0));
-            let known = if knowledge.has_estimate() { a.active } else { a.active.and_not(seen) };
+            let known = if knowledge.weighs_pixels() { a.active } else { a.active.and_not(seen) };
             let bin = knowledge.scene_bins(kind, v.p, dir, [u0, u1, u2], known);
             // in one cell bright pixels see bright samples: only their ratio is alike
             let pixel = inverse(importance, f32::MIN_POSITIVE);

@@ -1,0 +1,266 @@
+//! What was learned as part of a session: saved and loaded, carried over, counted, of another scene, in little memory, and in
+//! the face of numbers that are none.
+
+use croupier::film::{PixelAov, PixelStats};
+use croupier::learn::cache::{BIN_LIMIT, CacheError};
+use croupier::learn::{Constant, Estimate, Learning};
+use croupier::{Plan, Settings, SettingsError, Strategy};
+use croupier_host::description::*;
+use croupier_tests::cache::{Oracle, overwrite};
+use croupier_tests::runner::{Learned, Schedule, learning, render, scheduled, settings};
+use croupier_tests::scenes::*;
+use croupier_tests::stats::equivalent;
+
+const IN_ORDER: Schedule = Schedule::InOrder(1 << 20);
+
+fn learns(scene: &[u8], strategy: &str, max_depth: u32) -> Settings {
+    let s = settings(scene, strategy);
+    let learning = Learning { cache_bytes: 1 << 20, split_count: 500.0, ..s.learning };
+    Settings { max_depth, learning, ..s }
+}
+
+/// Bytes of what a few iterations teach.
+fn taught(scene: &[u8], s: &Settings, iterations: &[u32]) -> Vec<u8> {
+    let mut bytes = None;
+    let iterations = [iterations, &[0]].concat();
+    learning(scene, s, &iterations, IN_ORDER, &mut |_, l: &mut dyn Learned| bytes = l.saved());
+    bytes.unwrap()
+}
+
+/// A cache that is saved and loaded between two iterations gives the same factors: the picture has the same bits. Killed by: a
+/// sum that is not saved, shares of divided leaves that are dealt out again, look-ups that hang on the numbers of leaves.
+#[test]
+fn loading_what_was_saved_changes_nothing() {
+    for scene in [blob(&cornell([24, 16])), blob(&everything([24, 16]))] {
+        for strategy in ["ears", "adrrs"] {
+            let s = Settings { shards: 2, ..learns(&scene, strategy, 6) };
+            let run = |load: bool| {
+                let mut leaves = 0;
+                let image = learning(&scene, &s, &[64, 64, 8, 8], IN_ORDER, &mut |_, l: &mut dyn Learned| {
+                    let bytes = l.saved().unwrap();
+                    leaves = Oracle::new(&bytes).leaves.len();
+                    if load {
+                        l.load(&bytes).unwrap();
+                        assert!(l.saved().unwrap() == bytes);
+                    }
+                });
+                (image, leaves)
+            };
+            let ((image, leaves), (loaded, _)) = (run(false), run(true));
+            assert!(leaves > 15, "{strategy}: {leaves} leaves test nothing");
+            assert!(image.bits() == loaded.bits() && image.counters == loaded.counters, "{strategy}");
+        }
+    }
+}
+
+/// Statistics loaded before the first iteration change its successors, and with them the picture. Killed by: a first iteration
+/// that forgets them.
+#[test]
+fn loaded_statistics_are_used() {
+    let scene = blob(&cornell([16, 16]));
+    let s = Settings { max_depth: 6, ..learns(&scene, "ears", 6) };
+    let bytes = taught(&scene, &s, &[16, 16]);
+    let run = |load: bool| {
+        learning(&scene, &s, &[1, 2], IN_ORDER, &mut |i, l: &mut dyn Learned| {
+            if load && i == 0 {
+                l.load(&bytes).unwrap();
+            }
+        })
+    };
+    let (without, with) = (run(false), run(true));
+    assert!(without.bits() != with.bits());
+}
+
+/// Counts of the cache are those of the counters, and an iteration hands on what `carry` says. Killed by: samples that are
+/// counted and not logged, shards left out, statistics that decay once per shard.
+#[test]
+fn counts_agree_and_decay() {
+    let scene = blob(&cornell([16, 16]));
+    for shards in [1, 3] {
+        let carry = 0.75;
+        let mut s = Settings { shards, ..learns(&scene, "ears", 6) };
+        s.learning.carry = carry as f32;
+        let mut seen = Vec::new();
+        learning(&scene, &s, &[8, 4, 16, 0, 0], IN_ORDER, &mut |_, l: &mut dyn Learned| {
+            let c = l.counters();
+            seen.push((Oracle::new(&l.saved().unwrap()).total(0), c.samples_logged - c.samples_refused));
+        });
+        let (mut expected, mut before) = (0.0, 0);
+        for (i, (count, logged)) in seen.into_iter().enumerate() {
+            if i > 0 {
+                expected = carry * expected + (logged - before) as f64;
+            }
+            before = logged;
+            assert!((count - expected).abs() <= 1e-9 * expected, "after {i} iterations: {count} for {expected}");
+            assert!(i == 0 || count > 1000.0);
+        }
+    }
+}
+
+/// A bin takes so many samples of a shard in an iteration and no more; the others are counted. Killed by: a limit that looks
+/// at anything but the count, refusals that are not counted.
+#[test]
+fn full_bins_refuse_and_count() {
+    let scene = blob(&cornell([16, 16]));
+    let mut s = learns(&scene, "ears", 3);
+    s.learning.cache_bytes = 6500;
+    let limit = f64::from(BIN_LIMIT);
+    let mut seen = Vec::new();
+    learning(&scene, &s, &[600, 0], IN_ORDER, &mut |_, l: &mut dyn Learned| {
+        let counts: Vec<f64> = Oracle::new(&l.saved().unwrap()).leaves.iter().flatten().map(|b| b[0]).collect();
+        seen.push((counts, l.counters()));
+    });
+    let (counts, c) = &seen[1];
+    assert!(counts.iter().all(|n| *n <= limit) && counts.contains(&limit), "{counts:?}");
+    assert!(c.samples_refused > 10_000);
+    assert_eq!(counts.iter().sum::<f64>(), (c.samples_logged - c.samples_refused) as f64);
+}
+
+/// Statistics of other bounds are refused with what differs, and nothing has changed. Of other things within the same bounds
+/// they are taken: they change the noise, no mean (`learn_unbiased.rs` loads random ones). Killed by: bounds that are not
+/// looked at, a cache that is emptied before the bytes are checked.
+#[test]
+fn statistics_of_another_scene_are_refused() {
+    let scene = blob(&cornell([16, 16]));
+    let mut wide = cornell([16, 16]);
+    let grey_wall = wide.add_material("far", grey(0.5));
+    add_quad(&mut wide, "far", grey_wall, facing_z(1.0, -3.0, 1.0));
+    let wide = blob(&wide);
+    let foreign = taught(&wide, &learns(&wide, "ears", 5), &[8]);
+    let s = learns(&scene, "ears", 5);
+    let run = |load: bool| {
+        learning(&scene, &s, &[8, 8], IN_ORDER, &mut |i, l: &mut dyn Learned| {
+            if load && i == 1 {
+                let before = l.saved();
+                assert!(matches!(l.load(&foreign), Err(CacheError::Bounds { .. })));
+                assert!(l.saved() == before);
+            }
+        })
+    };
+    assert!(run(true).bits() == run(false).bits());
+}
+
+/// Statistics over the picture are of no use to another session: they are not offered. Killed by: bytes that say they are a
+/// tree and are none.
+#[test]
+fn statistics_of_the_picture_are_not_saved() {
+    let scene = blob(&cornell([16, 16]));
+    for (strategy, there) in [("bolin-meyer", false), ("none", false), ("classic:5:relative", false), ("ear", true)] {
+        let s = learns(&scene, strategy, 4);
+        learning(&scene, &s, &[4, 4], IN_ORDER, &mut |_, l: &mut dyn Learned| {
+            assert_eq!(l.saved().is_some(), there, "{strategy}");
+        });
+    }
+}
+
+/// Radiance that overflows in f32: the film leaves it out, and so do the statistics, whose sums stay finite. Killed by: a value
+/// that is logged before it is looked at, an infinity whose pair is a NaN.
+#[test]
+fn overflowing_radiance_is_not_learned() {
+    let mut s =
+        SceneDescription { camera: camera([0.0, 0.3, 0.4], [0.0; 3], 0.01, [12, 8]), ..SceneDescription::default() };
+    let floor = s.add_material("floor", grey(0.8));
+    let reflectance = Reflectance::Constant([1.0; 3]);
+    let metal = s.add_material("metal", Model::RoughConductor { eta: [0.2; 3], k: [3.0; 3], reflectance, alpha: 1e-4 });
+    let half = |x: f32| [[x - 1.0, 0.0, 1.0], [x, 0.0, 1.0], [x, 0.0, -1.0], [x - 1.0, 0.0, -1.0]];
+    add_quad(&mut s, "left", floor, half(0.0));
+    add_quad(&mut s, "right", metal, half(1.0));
+    let scale = 2f32.powi(-24);
+    place(&mut s, scale, 0.0);
+    s.emitters.push(Emitter::Point { position: [0.0, 0.6 * scale, -0.8 * scale], intensity: [1e18, 1.0, 0.0] });
+    let scene = blob(&s);
+    for (strategy, constant) in [("ears", Constant::Cached), ("ears:plain", Constant::Off), ("adrrs", Constant::Cached)] {
+        let s = Settings { constant, shadow_roulette: true, adaptive: true, ..learns(&scene, strategy, 3) };
+        let mut last = None;
+        let image = learning(&scene, &s, &[16, 16, 16, 0], IN_ORDER, &mut |_, l: &mut dyn Learned| {
+            let bytes = l.saved().unwrap();
+            let sums = Oracle::new(&bytes);
+            assert!(sums.leaves.iter().flatten().flatten().all(|x| x.is_finite() && *x >= 0.0), "{strategy}");
+            // as if it came from a file, which is checked
+            l.load(&bytes).unwrap();
+            last = Some((sums.total(0), l.statistics()));
+        });
+        let (count, statistics) = last.unwrap();
+        assert!(image.counters.non_finite > 100 && count > 100.0, "{strategy}: {:?}", image.counters);
+        assert!(statistics.iter().all(|p| p.variance.is_finite() && p.cost.is_finite()), "{statistics:?}");
+        assert!(image.pixels.iter().all(|p| p.sum.iter().chain(&p.sum_sqr).all(|x| x.is_finite())));
+    }
+}
+
+/// Statistics as large as bytes may say, all of them, in every bin. Killed by: an overflow on the way to a factor.
+#[test]
+fn extreme_statistics_do_no_harm() {
+    let scene = blob(&everything([16, 12]));
+    for sums in [[1e100; 12], [0.0; 12], [1e-300; 12], [1e100, 0.0, 0.0, 1e100, 0.0, 0.0, 1e100, 0.0, 0.0, 0.0, 0.0, 0.0]] {
+        for constant in [Constant::Off, Constant::Cached] {
+            let s = Settings { constant, ..learns(&scene, "ears:plain", 4) };
+            let image = learning(&scene, &s, &[1, 1, 1], IN_ORDER, &mut |_, l: &mut dyn Learned| {
+                let mut bytes = l.saved().unwrap();
+                overwrite(&mut bytes, || sums);
+                l.load(&bytes).unwrap();
+            });
+            assert_eq!(image.counters.camera_samples, 3 * 16 * 12);
+            assert!(image.mean().is_finite() && image.mean() > 0.05, "{sums:?}: {}", image.mean());
+            // a constant of 1e16 is a factor's worth of noise, not an infinity
+            assert!(constant == Constant::Cached || image.counters.non_finite == 0, "{sums:?}");
+        }
+    }
+}
+
+/// Everything at once in 256 KiB besides the film, and the mean is right. Killed by: a slab that is too small for its index, a
+/// cache that needs more than it was given.
+#[test]
+fn everything_fits_in_little_memory() {
+    let scene = blob(&cornell([32, 32]));
+    let mut s = learns(&scene, "ears", 6);
+    (s.adaptive, s.shadow_roulette, s.constant, s.ring) = (true, true, Constant::Cached, 128);
+    let small = Learning { cache_bytes: 96 << 10, ledger: 256, estimate: Estimate::Blocks, ..s.learning };
+    let s = Settings { learning: small, ..s };
+    let plan = Plan::new(&s).unwrap();
+    let pixels = 32 * 32;
+    // a shard has its own sums of its pixels, 64 bytes
+    let film = pixels * (size_of::<PixelStats>() + 64);
+    let rest = plan.session().size + plan.shard().size - film;
+    println!("{rest} bytes");
+    assert!(rest <= 256 << 10, "{rest} bytes besides the film");
+    assert!(size_of::<PixelAov>() > 0 && s.learning.cache_bytes < rest);
+    let image = scheduled(&scene, &s, &[8, 8, 16, 32, 64, 128, 256, 256, 256, 256, 256, 256], IN_ORDER);
+    let none = render(&scene, &Settings { strategy: Strategy::parse("none").unwrap(), seed: 9, ..learns(&scene, "none", 6) }, 3000);
+    let (d, error) = (image.mean() / none.mean() - 1.0, image.error_of_mean().hypot(none.error_of_mean()) / none.mean());
+    println!("{:+.4} % +- {:.4} %", 100.0 * d, 100.0 * error);
+    assert!(error < 0.0006 && equivalent(d, error, 0.002, 0.05), "{d} +- {error}");
+    assert!(image.counters.samples_logged > 100_000);
+}
+
+/// Killed by: a choice that is not checked, or checked where it does not matter.
+#[test]
+fn choices_that_make_no_sense_are_refused() {
+    let scene = blob(&cornell([16, 16]));
+    let with = |strategy: &str, change: &dyn Fn(&mut Settings)| {
+        let mut s = learns(&scene, strategy, 4);
+        change(&mut s);
+        Plan::new(&s).err()
+    };
+    for learning in [
+        Learning { ledger: 0, ..Learning::default() },
+        Learning { ledger: (1 << 24) + 1, ..Learning::default() },
+        Learning { split_count: 0.0, ..Learning::default() },
+        Learning { split_count: f32::NAN, ..Learning::default() },
+        Learning { carry: -0.1, ..Learning::default() },
+        Learning { carry: 1.1, ..Learning::default() },
+        Learning { carry: f32::NAN, ..Learning::default() },
+    ] {
+        assert_eq!(with("ears", &|s| s.learning = learning), Some(SettingsError::Learning), "{learning:?}");
+        assert_eq!(with("classic", &|s| s.learning = learning), None);
+    }
+    assert_eq!(with("ears", &|s| s.learning.cache_bytes = 6271), Some(SettingsError::Cache(6271)));
+    assert_eq!(with("ears", &|s| s.learning.cache_bytes = 6272), None);
+    assert_eq!(with("classic", &|s| s.learning.cache_bytes = 0), None);
+    for strategy in ["classic", "bolin-meyer", "fixed:2"] {
+        assert_eq!(with(strategy, &|s| s.constant = Constant::Cached), Some(SettingsError::Constant), "{strategy}");
+        assert_eq!(with(strategy, &|s| s.constant = Constant::Number(-1.0)), None);
+    }
+    for bad in [f32::NAN, f32::INFINITY] {
+        assert_eq!(with("ears", &|s| s.constant = Constant::Number(bad)), Some(SettingsError::Constant));
+    }
+}
