@@ -58,9 +58,9 @@ fn agrees_with_an_oracle(room: usize, least: u32) {
     assert!(leaves.len() as u32 > cache.leaves() / 2, "{} of {} leaves seen", leaves.len(), cache.leaves());
     let (nan, inf) = (f32::NAN, f32::INFINITY);
     for (p, same) in [([nan, inf, -inf], [-9.0, 9.0, -9.0]), ([f32::MAX, f32::MIN, nan], [9.0, -9.0, -9.0])] {
-        assert_eq!(find(&cache, true, p, [0.0, 0.0, 1.0]), find(&cache, true, same, [0.0, 0.0, 1.0]));
+        assert_eq!(find(&cache, 0, p, [0.0, 0.0, 1.0]), find(&cache, 0, same, [0.0, 0.0, 1.0]));
     }
-    assert!(find(&cache, false, [0.0; 3], [nan; 3]) < cache.bins());
+    assert!(find(&cache, 1, [0.0; 3], [nan; 3]) < cache.bins());
 }
 
 /// 4e6 uniform directions. Moving a border of a slab by 0.005 of the height (1 % of a bin's area) gives a non-central
@@ -72,7 +72,7 @@ fn direction_bins_have_equal_area() {
     let mut observed = [0u64; 16];
     for _ in 0..500_000 {
         let d = Vec3x8::from_fn(|_| rng.direction().map(|x| x as f32));
-        cache.find(ALL(), Vec3x8::ZERO, d, ALL()).to_array().iter().for_each(|b| observed[*b as usize] += 1);
+        cache.find(U32x8::splat(0), Vec3x8::ZERO, d, ALL()).to_array().iter().for_each(|b| observed[*b as usize] += 1);
     }
     let p = chi_square(&observed, &[250_000.0; 16], 5.0).p;
     assert!(p > sidak(FAMILY_ALPHA, 1), "p = {p}: {observed:?}");
@@ -80,10 +80,10 @@ fn direction_bins_have_equal_area() {
     let axes: Vec<_> = (0..6)
         .map(|k| {
             let axis: [f32; 3] = std::array::from_fn(|a| if a == k / 2 { [1.0, -1.0][k % 2] } else { 0.0 });
-            let bin = find(&cache, true, [0.0; 3], axis);
+            let bin = find(&cache, 0, [0.0; 3], axis);
             for _ in 0..100 {
                 let near = axis.map(|x| x + rng.range(-0.05, 0.05) as f32);
-                assert_eq!(find(&cache, true, [0.0; 3], near), bin);
+                assert_eq!(find(&cache, 0, [0.0; 3], near), bin);
             }
             bin
         })
@@ -103,20 +103,20 @@ fn jitter_stays_within_half_a_leaf() {
     for _ in 0..100_000 {
         let ((p, d), u) = (vertex(&mut rng), [(); 3].map(|()| rng.f32()));
         let q = p.map(f64::from);
-        let own = oracle.cell(false, q);
+        let own = oracle.cell(1, q);
         let moved = oracle.clamp(std::array::from_fn(|a| q[a] + (f64::from(u[a]) - 0.5) * own.edge));
         if oracle.ambiguous(q) || oracle.ambiguous(moved) {
             continue;
         }
         let [p8, d8] = [p, d].map(|v| Vec3x8::splat(v[0], v[1], v[2]));
-        let bin = cache.find_jittered(Mask8::NONE, p8, d8, u.map(F32x8::splat), ALL()).lane(2);
-        let leaf = oracle.cell(false, moved).leaf;
+        let bin = cache.find_jittered(U32x8::splat(1), p8, d8, u.map(F32x8::splat), ALL()).lane(2);
+        let leaf = oracle.cell(1, moved).leaf;
         assert_eq!(*leaf_of.entry(bin / 16).or_insert(leaf), leaf);
         seen += 1;
         moved_away += u32::from(leaf != own.leaf);
         // half is no movement
-        let still = cache.find_jittered(Mask8::NONE, p8, d8, [F32x8::splat(0.5); 3], ALL()).lane(2);
-        assert_eq!(still, find(&cache, false, p, d));
+        let still = cache.find_jittered(U32x8::splat(1), p8, d8, [F32x8::splat(0.5); 3], ALL()).lane(2);
+        assert_eq!(still, find(&cache, 1, p, d));
     }
     // each axis leaves the cell with probability 1/4
     let share = f64::from(moved_away) / f64::from(seen);
@@ -309,7 +309,7 @@ fn the_order_of_work_does_not_matter() {
                 shards[s].clear(cache.bins());
                 for _ in 0..3000 {
                     let (p, d) = vertex(&mut rng);
-                    let bin = find(&cache, true, p, d);
+                    let bin = find(&cache, 0, p, d);
                     shards[s].log(bin, [(); 3].map(|()| rng.f32()), rng.f32());
                 }
             }

@@ -84,7 +84,7 @@ fn statistics_are_saved_and_begun_with() {
 #[test]
 fn wrong_statistics_are_errors() {
     let good = rendered(&RenderOptions { save_cache: true, ..options("ears", 12) }).cache.unwrap();
-    let refused = |scene: &[u8], options: &RenderOptions| render(scene, options, &Stop(false)).err().expect("an error");
+    let refused = |scene: &[u8], options: &RenderOptions| render(scene, options, &Stop(false)).expect_err("an error");
     let with = |cache: &[u8]| RenderOptions { cache: Some(cache.to_vec()), ..options("ears", 2) };
     let mut flipped = good.clone();
     flipped[1000] ^= 1;
