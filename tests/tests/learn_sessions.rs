@@ -103,7 +103,7 @@ fn counts_agree_and_decay() {
 fn full_bins_refuse_and_count() {
     let scene = blob(&cornell([16, 16]));
     let mut s = learns(&scene, "ears", 3);
-    s.learning.cache_bytes = 6500;
+    s.learning.cache_bytes = 16_000;
     let limit = f64::from(BIN_LIMIT);
     let mut seen = Vec::new();
     learning(&scene, &s, &[600, 0], IN_ORDER, &mut |_, l: &mut dyn Learned| {
@@ -254,7 +254,7 @@ fn choices_that_make_no_sense_are_refused() {
         assert_eq!(with("classic", &|s| s.learning = learning), None);
     }
     assert_eq!(with("ears", &|s| s.learning.cache_bytes = 6271), Some(SettingsError::Cache(6271)));
-    assert_eq!(with("ears", &|s| s.learning.cache_bytes = 6272), None);
+    assert_eq!(with("ears", &|s| s.learning.cache_bytes = 13_000), None);
     assert_eq!(with("classic", &|s| s.learning.cache_bytes = 0), None);
     for strategy in ["classic", "bolin-meyer", "fixed:2"] {
         assert_eq!(with(strategy, &|s| s.constant = Constant::Cached), Some(SettingsError::Constant), "{strategy}");

@@ -146,7 +146,6 @@ fn learned(mean: f32, moment: f32, variance: f32, cost: f32) -> Vertices8 {
         variance: grey(variance),
         cost: F32x8::splat(cost),
         count: F32x8::splat(1e12),
-        ..Learned8::NONE
     };
     Vertices8 { beta: grey(1.0), albedo: grey(0.5), learned, ..vertices(1.0, 0.5, 1) }
 }
