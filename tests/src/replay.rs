@@ -224,12 +224,7 @@ impl Replay<'_, '_> {
         }
         if s.valid.lane(0) && s.weight.any_positive().lane(0) {
             let (radiance, rays) = self.fly(&Flight {
-                ray: Ray8 {
-                    o: offset(v.p, v.ng, v.error, s.wi),
-                    d: s.wi,
-                    tmin: F32x8::ZERO,
-                    tmax: F32x8::INFINITY,
-                },
+                ray: Ray8 { o: offset(v.p, v.ng, v.error, s.wi), d: s.wi, tmin: F32x8::ZERO, tmax: F32x8::INFINITY },
                 from: v.p,
                 normal: v.ng,
                 pdf: s.pdf,

@@ -5,7 +5,9 @@ use croupier::film::{PixelAov, PixelStats};
 use croupier::learn::PictureStatistics;
 use croupier::learn::cache::CacheError;
 use croupier::profile::{Full, Matte, Profile};
-use croupier::{Budget, Counters, ErrorEstimate, Plan, Progress, Scene, Session, SessionError, Settings, Shard, Strategy};
+use croupier::{
+    Budget, Counters, ErrorEstimate, Plan, Progress, Scene, Session, SessionError, Settings, Shard, Strategy,
+};
 use croupier_host::blob::AlignedBytes;
 
 use crate::stats::SplitMix;

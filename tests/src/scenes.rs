@@ -228,3 +228,27 @@ pub fn spot(rho: f32, size: [u32; 2]) -> SceneDescription {
     add_quad(&mut s, "floor", floor, facing_y(1.0, 0.0, 1.0));
     s
 }
+
+/// A closed diffuse box with a lamp, which the camera sees in its 4 x 4 pixels.
+pub fn lamp_box() -> SceneDescription {
+    let mut s = SceneDescription {
+        camera: camera([0.1, -0.1, 0.9], [0.1, 0.4, -1.0], 80.0, [4, 4]),
+        ..SceneDescription::default()
+    };
+    let wall = s.add_material("wall", diffuse([0.7, 0.5, 0.3]));
+    let lamp = s.add_material("lamp", grey(0.4));
+    add_box(&mut s, wall, [-1.0; 3], [1.0; 3], true);
+    add_quad(&mut s, "lamp", lamp, facing_y(0.3, 0.96, -1.0));
+    s.emitters.push(Emitter::Area { material: lamp, radiance: [5.0, 6.0, 7.0] });
+    s
+}
+
+/// The same with a mirror and a block of glass, whose caustics are rare and bright.
+pub fn mirror_and_glass() -> SceneDescription {
+    let mut s = lamp_box();
+    let mirror = s.add_material("mirror", Model::Mirror { reflectance: Reflectance::Constant([0.9, 0.8, 0.7]) });
+    let glass = s.add_material("glass", Model::Dielectric { int_ior: 1.5, ext_ior: 1.0 });
+    add_quad(&mut s, "mirror", mirror, facing_z(0.7, -0.9, 1.0));
+    add_box(&mut s, glass, [-0.6, -0.9, -0.4], [0.2, 0.1, 0.2], false);
+    s
+}

@@ -1,10 +1,10 @@
 //! The factors of EARS are those of least variance x cost: on the paper's two-dimensional example (section 4.1, figure 2)
 //! against a numerical minimum, and in the machine, where they settle.
 
+use croupier::Settings;
 use croupier::learn::Learning;
 use croupier::rrs::{Learned8, MAX_FACTOR, MIN_FACTOR, Norm, Strategy, Vertices8};
 use croupier::simd::{F32x8, U32x8, Vec3x8};
-use croupier::Settings;
 use croupier_tests::minimum::minimise;
 use croupier_tests::runner::{Learned, Schedule, learning, settings};
 use croupier_tests::scenes::{blob, cornell};

@@ -6,37 +6,13 @@ use croupier::learn::cache::{Cache, CacheSize};
 use croupier::learn::{Estimate, Learning, Objective};
 use croupier::{Scene, Settings};
 use croupier_host::blob::AlignedBytes;
-use croupier_host::description::{Emitter, Model, Reflectance, SceneDescription};
+use croupier_host::description::SceneDescription;
 use croupier_tests::cache::{Oracle, overwrite};
 use croupier_tests::replay::{Replay, Sums};
 use croupier_tests::runner::{Learned, Schedule, learning, scheduled, settings};
 use croupier_tests::scenes::*;
 
 const IN_ORDER: Schedule = Schedule::InOrder(1 << 20);
-
-/// A closed diffuse box with a lamp, which the camera sees.
-fn lamp_box() -> SceneDescription {
-    let mut s = SceneDescription {
-        camera: camera([0.1, -0.1, 0.9], [0.1, 0.4, -1.0], 80.0, [4, 4]),
-        ..SceneDescription::default()
-    };
-    let wall = s.add_material("wall", diffuse([0.7, 0.5, 0.3]));
-    let lamp = s.add_material("lamp", grey(0.4));
-    add_box(&mut s, wall, [-1.0; 3], [1.0; 3], true);
-    add_quad(&mut s, "lamp", lamp, facing_y(0.3, 0.96, -1.0));
-    s.emitters.push(Emitter::Area { material: lamp, radiance: [5.0, 6.0, 7.0] });
-    s
-}
-
-/// The same with a mirror and a block of glass.
-fn mirror_and_glass() -> SceneDescription {
-    let mut s = lamp_box();
-    let mirror = s.add_material("mirror", Model::Mirror { reflectance: Reflectance::Constant([0.9, 0.8, 0.7]) });
-    let glass = s.add_material("glass", Model::Dielectric { int_ior: 1.5, ext_ior: 1.0 });
-    add_quad(&mut s, "mirror", mirror, facing_z(0.7, -0.9, 1.0));
-    add_box(&mut s, glass, [-0.6, -0.9, -0.4], [0.2, 0.1, 0.2], false);
-    s
-}
 
 /// One leaf for every kind of vertices: bins stay what they are. Errors are absolute, so that values have the unit that the
 /// oracle gives them.
@@ -169,7 +145,10 @@ fn nested_splits_are_logged_as_recursion_has_them() {
     for (name, scene) in [("lamp", lamp_box()), ("mirror and glass", mirror_and_glass())] {
         for (max_depth, spp) in [(2, 12), (3, 8), (4, 1)] {
             let b = both(&scene, max_depth, &[4, spp]);
-            println!("{name}, depth {max_depth}: {} samples, pairs {:.4} of those in random order", b.counted[0][1], b.pairs);
+            println!(
+                "{name}, depth {max_depth}: {} samples, pairs {:.4} of those in random order",
+                b.counted[0][1], b.pairs
+            );
             assert!(b.counted[0][1] > 3000);
             check(&format!("{name}, depth {max_depth}, split"), &b);
             assert!((b.pairs - 1.0).abs() < 0.15, "{name}, depth {max_depth}: pairs {}", b.pairs);

@@ -92,10 +92,8 @@ impl Picture {
         s.variance /= f64::max(kept, 1.0);
         s.outliers /= n.max(1.0);
         s.limit = f64::from(outlier) * counters.camera_samples as f64 / n.max(1.0);
-        let c = counters;
-        let cost = [(c.camera_rays, COST_CAMERA), (c.scatter_rays, COST_BOUNCE), (c.shadow_rays, COST_SHADOW)];
-        let work: f64 = cost.iter().map(|&(rays, cost)| rays as f64 * f64::from(cost)).sum();
-        s.cost = work / c.camera_samples.max(1) as f64;
+        let (work, cost) = cost_of(counters);
+        s.cost = cost;
 
         let old = self.weight * f64::from(learning.carry);
         self.weight = old + work;
@@ -111,18 +109,29 @@ impl Picture {
         self.first.get_or_insert(s);
     }
 
-    /// What a sample of the iterations now weighs in the picture, one of the first iteration weighing 1: inverse variance.
+    /// What a sample of an iteration weighs in the picture, one of the first iteration weighing 1: inverse variance. To be
+    /// asked before the iteration is measured.
+    ///
     /// A variance is not taken at its word, though. With few samples of a heavy-tailed quantity it comes out too small, and
     /// trusted, the first iterations would have most weight. So equal work weighs equally at least, and more only if the
-    /// variance has fallen for it.
-    pub(super) fn sample_weight(&self) -> f64 {
+    /// variance has fallen for it. And it is that of the iterations before: bright iterations are the noisy ones, so one
+    /// weighted by its own variance makes the picture too dark (by 1 % in small pictures of caustics).
+    pub(super) fn sample_weight(&self, counters: &Counters) -> f64 {
         let (Some(first), b) = (self.first, &self.blended) else { return 1.0 };
-        if first.cost <= 0.0 || b.cost <= 0.0 || b.variance <= 0.0 {
+        let cost = cost_of(counters).1;
+        if first.cost <= 0.0 || cost <= 0.0 || b.cost <= 0.0 || b.variance <= 0.0 {
             return 1.0;
         }
         let gain = first.variance * first.cost / (b.variance * b.cost);
-        b.cost / first.cost * gain.clamp(1.0, LARGEST_GAIN)
+        cost / first.cost * gain.clamp(1.0, LARGEST_GAIN)
     }
+}
+
+/// Counted work in all and per camera sample.
+fn cost_of(c: &Counters) -> (f64, f64) {
+    let cost = [(c.camera_rays, COST_CAMERA), (c.scatter_rays, COST_BOUNCE), (c.shadow_rays, COST_SHADOW)];
+    let work: f64 = cost.iter().map(|&(rays, cost)| rays as f64 * f64::from(cost)).sum();
+    (work, work / c.camera_samples.max(1) as f64)
 }
 
 /// Mean error of a pixel's samples against its estimate, weighted by its importance, normed over the channels; over the

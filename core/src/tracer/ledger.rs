@@ -15,6 +15,9 @@ use bytemuck::{Pod, Zeroable};
 /// No record.
 pub(crate) const NO_RECORD: u32 = u32::MAX;
 
+/// The bin of vertices whose samples are not learned from.
+pub(crate) const NO_BIN: u32 = u32::MAX;
+
 /// Part of a sample's estimate is missing.
 const INCOMPLETE: u32 = 1 << 31;
 /// `last` holds a finished sample of the vertex.

@@ -1,6 +1,7 @@
 //! Stage `settle`: radiance goes to its root and its ledger record, finished samples to the statistics, finished roots to the
 //! film.
 
+use super::ledger::NO_BIN;
 use super::shard::Shard;
 use crate::film::REL_MSE_EPSILON;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -97,8 +98,8 @@ impl Shard<'_> {
     pub(super) fn settle_record(&mut self, record: u32) {
         let (training, counters) = (&mut self.training, &mut self.counters);
         self.ledger.close(record, |f| {
+            let Some(t) = training.as_mut().filter(|_| f.bin != NO_BIN) else { return };
             counters.samples_logged += 1;
-            let Some(t) = training else { return };
             if !t.log(f.bin, f.value, f.cost) {
                 counters.samples_refused += 1;
             } else if let Some(d) = f.pair {
