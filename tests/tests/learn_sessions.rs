@@ -3,7 +3,7 @@
 
 use croupier::film::{PixelAov, PixelStats};
 use croupier::learn::cache::{BIN_LIMIT, CacheError};
-use croupier::learn::{Constant, Estimate, Learning};
+use croupier::learn::{Constant, Estimate, Learning, Objective};
 use croupier::{Plan, Settings, SettingsError, Strategy};
 use croupier_host::description::*;
 use croupier_tests::cache::{Oracle, overwrite};
