@@ -261,9 +261,9 @@ fn random_statistics_do_not_bias() {
     let none = Known::of(&render(&scene, &Settings { seed: 8, ..learns(&scene, "none", 3) }, 14_000));
     for (strategy, constant, renders) in [
         ("ears:plain", Constant::Off, 700),
-        ("ears", Constant::Cached, 700),
+        ("ears", Constant::Cached, 1000),
         ("ear:plain", Constant::Off, 1500),
-        ("adrrs", Constant::Cached, 1000),
+        ("adrrs", Constant::Cached, 1200),
     ] {
         let (mut spread, mut count) = ([0u64; 2], 0);
         let one = |seed: u64| {
