@@ -90,7 +90,6 @@ impl Example {
                     variance: rgb(&|k, c| self.variance[k][c]),
                     cost: F32x8::from_fn(|k| self.cost[k] as f32),
                     count: F32x8::splat(1e6),
-                    ..Learned8::NONE
                 },
             });
             s = factors.to_array().map(f64::from).to_vec();

@@ -18,7 +18,13 @@ const IN_ORDER: Schedule = Schedule::InOrder(1 << 20);
 /// oracle gives them.
 fn whole_leaves(scene: &[u8], max_depth: u32) -> Settings {
     let s = settings(scene, "ears:plain");
-    let learning = Learning { cache_bytes: 16_000, ledger: 1 << 14, estimate: Estimate::Blocks, objective: Objective::Absolute, ..s.learning };
+    let learning = Learning {
+        cache_bytes: 16_000,
+        ledger: 1 << 14,
+        estimate: Estimate::Blocks,
+        objective: Objective::Absolute,
+        ..s.learning
+    };
     Settings { max_depth, learning, ring: 1 << 14, split_budget: 1 << 20, ..s }
 }
 

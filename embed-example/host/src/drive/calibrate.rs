@@ -30,7 +30,9 @@ pub(super) fn calibrate(cache: &Cache<'_>, space: Space, scene: &Scene<'_>) -> O
     let flat: Vec<_> = (0..PACKETS).map(|_| U32x8::new([(); 8].map(|()| random.below(cache.bins())))).collect();
     let all = Mask8::first(8);
     let bin = |i: usize| match space {
-        Space::Scene => cache.find_jittered(U32x8::splat(Kind::Matte as u32), vertices[i].p, vertices[i].n, vertices[i].jitter, all),
+        Space::Scene => {
+            cache.find_jittered(U32x8::splat(Kind::Matte as u32), vertices[i].p, vertices[i].n, vertices[i].jitter, all)
+        }
         // those are numbered by pixel and depth, not found
         Space::Image => flat[i],
     };
