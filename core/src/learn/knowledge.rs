@@ -177,7 +177,7 @@ impl<'m> Knowledge<'m> {
 
     /// Weight of the samples of an iteration whose pixels `visit` shows, measured against the estimate made before it.
     pub(crate) fn weigh(&mut self, counters: &Counters, visit: impl Visit) -> f64 {
-        let weight = self.picture.sample_weight(counters);
+        let weight = self.picture.sample_weight();
         if self.needed && self.pixels.known() {
             self.picture.measure(&self.learning, &self.pixels, &self.allotment, counters, visit);
         }

@@ -13,9 +13,6 @@ use crate::tracer::Counters;
 /// then made more such samples.
 const OUTLIERS: f64 = 1e-3;
 
-/// Iterations count at most this much more than their work says.
-const LARGEST_GAIN: f64 = 10.0;
-
 /// What is known of the picture's error and cost per camera sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PictureStatistics {
@@ -109,21 +106,19 @@ impl Picture {
         self.first.get_or_insert(s);
     }
 
-    /// What a sample of an iteration weighs in the picture, one of the first iteration weighing 1: inverse variance. To be
-    /// asked before the iteration is measured.
+    /// What a sample of the iteration now weighs in the picture, one of the first weighing 1: the work of the iteration before
+    /// over that of the first, per sample. That is inverse variance as far as work buys variance, which is what factors are
+    /// chosen for. To be asked before the iteration is measured.
     ///
-    /// A variance is not taken at its word, though. With few samples of a heavy-tailed quantity it comes out too small, and
-    /// trusted, the first iterations would have most weight. So equal work weighs equally at least, and more only if the
-    /// variance has fallen for it. And it is that of the iterations before: bright iterations are the noisy ones, so one
-    /// weighted by its own variance makes the picture too dark (by 1 % in small pictures of caustics).
-    pub(super) fn sample_weight(&self, counters: &Counters) -> f64 {
-        let (Some(first), b) = (self.first, &self.blended) else { return 1.0 };
-        let cost = cost_of(counters).1;
-        if first.cost <= 0.0 || cost <= 0.0 || b.cost <= 0.0 || b.variance <= 0.0 {
-            return 1.0;
+    /// Measured variances make worse weights. With few samples of a heavy-tailed quantity they come out too small, so that
+    /// the first iterations have most weight; and bright iterations are the noisy ones, so that the picture is too dark, by
+    /// 1 % in small pictures of caustics. Even an iteration's own work is not free of that (0.1 % there); the work before it
+    /// is.
+    pub(super) fn sample_weight(&self) -> f64 {
+        match self.first {
+            Some(first) if first.cost > 0.0 && self.last.cost > 0.0 => self.last.cost / first.cost,
+            _ => 1.0,
         }
-        let gain = first.variance * first.cost / (b.variance * b.cost);
-        cost / first.cost * gain.clamp(1.0, LARGEST_GAIN)
     }
 }
 
