@@ -78,8 +78,13 @@ pub enum SettingsError {
     Depth(u32),
     /// The ring has fewer than [`MIN_RING`] or more than 2^24 vertices.
     Ring(u32),
-    /// The bytes of the cache do not suffice for one leaf in the session and in every shard.
-    Cache(usize),
+    /// The bytes of the cache do not suffice for the roots of its trees in the session and in every shard.
+    Cache {
+        /// Bytes needed.
+        needed: usize,
+        /// Bytes given.
+        given: usize,
+    },
     /// The constant is not a finite number, or is to be the cached mean with a strategy that learns nothing of the scene.
     Constant,
     /// A choice of [`Learning`] is out of range.
@@ -95,7 +100,7 @@ impl fmt::Display for SettingsError {
             Self::Shards(n) => write!(f, "{n} shards: need 1 to 65536"),
             Self::Depth(n) => write!(f, "max_depth {n}: need at least 1"),
             Self::Ring(n) => write!(f, "ring of {n} vertices: need {MIN_RING} to 2^24"),
-            Self::Cache(n) => write!(f, "cache of {n} bytes: too small for one leaf per shard and the session"),
+            Self::Cache { needed, given } => write!(f, "cache of {given} bytes: with so many shards it needs {needed}"),
             Self::Constant => f.write_str("the constant of roulette must be finite, and the cached mean needs ear, ears, adrr or adrrs"),
             Self::Learning => f.write_str("learning: need a ledger of 1 to 2^24 records, a split count above 0, a carry of 0 to 1, factors around 1 in 0.05 to 20"),
             Self::Memory => f.write_str("these settings need more memory than can be addressed"),
@@ -187,5 +192,6 @@ fn cache_size(s: &Settings) -> Result<Option<CacheSize>, SettingsError> {
     if !fits {
         return Err(SettingsError::Learning);
     }
-    CacheSize::within(l.cache_bytes, s.shards).map(Some).ok_or(SettingsError::Cache(l.cache_bytes))
+    let needed = CacheSize::SMALLEST.bytes(s.shards).ok_or(SettingsError::Memory)?;
+    CacheSize::within(l.cache_bytes, s.shards).map(Some).ok_or(SettingsError::Cache { needed, given: l.cache_bytes })
 }

@@ -2,7 +2,7 @@
 //! the face of numbers that are none.
 
 use croupier::film::{PixelAov, PixelStats};
-use croupier::learn::cache::{BIN_LIMIT, CacheError};
+use croupier::learn::cache::{BIN_LIMIT, CacheError, CacheSize};
 use croupier::learn::{Constant, Estimate, Learning, Objective};
 use croupier::{Plan, Settings, SettingsError, Strategy};
 use croupier_host::description::*;
@@ -263,8 +263,11 @@ fn choices_that_make_no_sense_are_refused() {
         assert_eq!(with("ears", &|s| s.learning = learning), Some(SettingsError::Learning), "{learning:?}");
         assert_eq!(with("classic", &|s| s.learning = learning), None);
     }
-    assert_eq!(with("ears", &|s| s.learning.cache_bytes = 6271), Some(SettingsError::Cache(6271)));
-    assert_eq!(with("ears", &|s| s.learning.cache_bytes = 13_000), None);
+    let needed = CacheSize::SMALLEST.bytes(1).unwrap();
+    let few = SettingsError::Cache { needed, given: needed - 1 };
+    assert_eq!(with("ears", &|s| s.learning.cache_bytes = needed - 1), Some(few));
+    assert!(few.to_string().contains(&needed.to_string()));
+    assert_eq!(with("ears", &|s| s.learning.cache_bytes = needed), None);
     assert_eq!(with("classic", &|s| s.learning.cache_bytes = 0), None);
     for strategy in ["classic", "bolin-meyer", "fixed:2"] {
         assert_eq!(with(strategy, &|s| s.constant = Constant::Cached), Some(SettingsError::Constant), "{strategy}");

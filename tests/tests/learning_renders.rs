@@ -1,6 +1,7 @@
 //! What renders that learn take and give: saved statistics, denoised pictures, figures.
 
 use croupier::denoise::{Planes, scratch_len};
+use croupier::learn::cache::CacheSize;
 use croupier::learn::{Constant, Learning, Objective};
 use croupier::rrs::Norm;
 use croupier::{Scene, Settings};
@@ -28,9 +29,14 @@ fn options(strategy: &str, spp: u32) -> RenderOptions {
         target: Target::Spp(spp),
         threads: 1,
         shards: 2,
-        learning: Learning { cache_bytes: 1 << 20, ..Learning::default() },
+        learning: Learning { cache_bytes: 1 << 20, split_count: 1000.0, ..Learning::default() },
         ..RenderOptions::default()
     }
+}
+
+/// Bytes of a cache that cannot split.
+fn smallest() -> usize {
+    CacheSize::SMALLEST.bytes(2).unwrap()
 }
 
 /// Stops at once, or never.
@@ -101,7 +107,7 @@ fn wrong_statistics_are_errors() {
     }
     let e = refused(&blob(&everything([24, 16])), &with(&good));
     assert!(e.to_string().starts_with("statistics of another scene"), "{e}");
-    let few = Learning { cache_bytes: 10_000, ..Learning::default() };
+    let few = Learning { cache_bytes: smallest(), ..Learning::default() };
     let e = refused(scene(), &RenderOptions { learning: few, ..with(&good) });
     assert!(e.to_string().contains("there is room for"), "{e}");
     // bolin-meyer learns, but of the picture
@@ -128,7 +134,7 @@ fn every_option_changes_the_picture() {
         RenderOptions { constant: Constant::Number(0.25), ..base.clone() },
         RenderOptions { learning: Learning { objective: Objective::Absolute, ..l }, ..base.clone() },
         RenderOptions { learning: Learning { norm: Norm::Max, ..l }, ..base.clone() },
-        RenderOptions { learning: Learning { cache_bytes: 12_000, ..l }, ..base },
+        RenderOptions { learning: Learning { cache_bytes: smallest(), ..l }, ..base },
     ];
     let pictures = variants.each_ref().map(|o| rendered(o).picture.rgb("").unwrap());
     for i in 0..pictures.len() {
@@ -205,12 +211,12 @@ fn figures_fit_together() {
             if let (Some(v), Some(e)) = (i.variance, i.efficiency) {
                 near(v * i.cost * e, 1.0);
             }
-            assert_eq!(i.leaves.is_some(), learns);
+            assert_eq!(i.leaves.is_some(), strategy == "ears");
         }
         assert!(s.iterations[0].relmse_estimate.is_none() && s.iterations[1].relmse_estimate.is_some());
         near(s.iterations.last().unwrap().relmse_estimate.unwrap(), stats.relmse_estimate.unwrap());
         let (within, whole): (Vec<_>, Vec<_>) = s.time.iter().partition(|p| p.within_tracing);
-        assert_eq!(within.len(), if learns { 2 } else { 0 }, "{s}");
+        assert_eq!(within.len(), if strategy == "ears" { 2 } else { 0 }, "{s}");
         let sum = |parts: &[&croupier_host::statistics::Part]| parts.iter().map(|p| p.share).sum::<f64>();
         assert!(sum(&whole) <= 1.0 && sum(&whole) > 0.5, "{s}");
         assert!(within.iter().all(|p| p.seconds > 0.0) && sum(&within) < 1.0, "{s}");
@@ -224,7 +230,7 @@ fn figures_fit_together() {
         }
         let text = s.to_string();
         assert!(text.contains("path length") && text.contains("estimating pixels"), "{text}");
-        assert_eq!(text.contains("looking up"), learns);
+        assert_eq!(text.contains("looking up"), strategy == "ears");
     }
     // these learn of the picture, not of the scene
     let picture_alone = [RenderOptions { adaptive: true, ..options("classic", 3) }, options("classic:2:relative", 3)];

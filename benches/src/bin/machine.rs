@@ -47,15 +47,17 @@ const HEADER: &str = "scene,strategy,ring,scatter,trace,occlude,surface,peak,sha
 /// sample its whole split budget of deep paths.
 struct Load {
     strategy: &'static str,
-    spp: u32,
+    /// Samples per pixel of the iterations.
+    iterations: &'static [u32],
     max_depth: u32,
     split_budget: u32,
 }
 
-const LOADS: [Load; 3] = [
-    Load { strategy: "none", spp: 2, max_depth: 12, split_budget: 0 },
-    Load { strategy: "classic", spp: 4, max_depth: 40, split_budget: 0 },
-    Load { strategy: "fixed:3.3", spp: 1, max_depth: 6, split_budget: 16 },
+const LOADS: [Load; 4] = [
+    Load { strategy: "none", iterations: &[2], max_depth: 12, split_budget: 0 },
+    Load { strategy: "classic", iterations: &[4], max_depth: 40, split_budget: 0 },
+    Load { strategy: "fixed:3.3", iterations: &[1], max_depth: 6, split_budget: 16 },
+    Load { strategy: "ears", iterations: &[1, 1, 2, 4], max_depth: 40, split_budget: 4096 },
 ];
 
 /// One line of the tables.
@@ -104,11 +106,13 @@ impl<'a> Row<'a> {
         let shards = blocks.iter_mut().zip(0..).map(|(b, i)| Shard::new(plan, i, b.as_mut()));
         let mut shards = shards.collect::<Result<Vec<_>, _>>()?;
         let clock = Clock::start();
-        session.begin_iteration(self.load.spp);
-        for shard in &mut shards {
-            while shard.step(&session, Budget { rays: u64::MAX }) == Progress::More {}
+        for &samples in self.load.iterations {
+            session.begin_iteration(samples);
+            for shard in &mut shards {
+                while shard.step(&session, Budget { rays: u64::MAX }) == Progress::More {}
+            }
+            session.end_iteration(&shards)?;
         }
-        session.end_iteration(&shards)?;
         Ok((*session.counters(), clock.seconds()))
     }
 

@@ -78,7 +78,7 @@ struct Args {
 /// below 0 (with many more, the reference's own do the opposite).
 const SCENES: &[(&str, u32)] = &[
     ("cbox", 32),
-    ("kitchen", 64),
+    ("kitchen", 128),
     ("bathroom", 16),
     ("living_room", 24),
     ("pool", 64),

@@ -43,8 +43,11 @@ pub struct CacheSize {
 }
 
 impl CacheSize {
+    /// Trees that never split.
+    pub const SMALLEST: Self = Self { splits: 0 };
+
     /// The largest cache whose shared side and `shards` training sides fit in `bytes` together; `None` if none does.
-    /// The smallest, two leaves that never split, takes 4736 bytes and 1536 more for each shard.
+    /// The smallest, four leaves that never split, takes 9.3 KiB and 3 KiB more for each shard.
     pub fn within(bytes: usize, shards: u32) -> Option<Self> {
         let fits = |splits: u32| Self { splits }.bytes(shards).is_some_and(|b| b <= bytes);
         if !fits(0) {

@@ -287,7 +287,7 @@ pub fn drive_with<P: Profile + Send + Sync>(
     }
     let seconds = start.elapsed().as_secs_f64();
     let film = session.film();
-    let used = space.zip(session.cache());
+    let used = session.cache();
     Ok(Rendered {
         size: film.size(),
         pixels: film.pixels().to_vec(),
@@ -301,8 +301,8 @@ pub fn drive_with<P: Profile + Send + Sync>(
         stopped_early,
         threads: pool.current_num_threads().min(shards.len()),
         iterations,
-        cache: used.filter(|_| options.save_cache).map(|(_, c)| save(c)).transpose()?,
-        calibration: used.filter(|_| options.calibrate).and_then(|(s, c)| calibrate::calibrate(c, s, &scene)),
+        cache: used.filter(|_| options.save_cache).map(save).transpose()?,
+        calibration: used.filter(|_| options.calibrate).and_then(|c| calibrate::calibrate(c, &scene)),
     })
 }
 

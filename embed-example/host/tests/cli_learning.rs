@@ -156,10 +156,10 @@ fn every_flag_changes_the_picture() {
         &["--objective", "absolute"],
         &["--norm", "luminance"],
         &["--norm", "max"],
-        &["--cache-bytes", "12KiB"],
+        &["--cache-bytes", "16KiB"],
     ];
     let pictures = flags.map(|flags| {
-        json(&render(dir.path(), &[&["--rrs", "ears", "--spp", "48", "-o", "f.exr", "--json"], flags].concat()));
+        json(&render(dir.path(), &[&["--rrs", "ears", "--spp", "200", "-o", "f.exr", "--json"], flags].concat()));
         Picture::read_exr(&dir.path().join("f.exr")).unwrap().rgb("").unwrap()
     });
     for i in 0..pictures.len() {

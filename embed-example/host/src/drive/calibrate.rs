@@ -3,7 +3,6 @@
 use crate::blob::AlignedBytes;
 use croupier::Scene;
 use croupier::learn::cache::{Cache, Kind, Training};
-use croupier::rrs::Space;
 use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use std::hint::black_box;
 use std::time::Instant;
@@ -24,18 +23,12 @@ pub struct Calibration {
 }
 
 /// Measures at random places on the scene's triangles, facing as they do. Nothing if there is no memory for it.
-pub(super) fn calibrate(cache: &Cache<'_>, space: Space, scene: &Scene<'_>) -> Option<Calibration> {
+pub(super) fn calibrate(cache: &Cache<'_>, scene: &Scene<'_>) -> Option<Calibration> {
     let mut random = Random(scene.hash | 1);
     let vertices: Vec<_> = (0..PACKETS).map(|_| Packet::new(scene, &mut random)).collect();
-    let flat: Vec<_> = (0..PACKETS).map(|_| U32x8::new([(); 8].map(|()| random.below(cache.bins())))).collect();
     let all = Mask8::first(8);
-    let bin = |i: usize| match space {
-        Space::Scene => {
-            cache.find_jittered(U32x8::splat(Kind::Matte as u32), vertices[i].p, vertices[i].n, vertices[i].jitter, all)
-        }
-        // those are numbered by pixel and depth, not found
-        Space::Image => flat[i],
-    };
+    let matte = U32x8::splat(Kind::Matte as u32);
+    let bin = |i: usize| cache.find_jittered(matte, vertices[i].p, vertices[i].n, vertices[i].jitter, all);
     let look_up = seconds_of(|| {
         for i in 0..PACKETS {
             black_box(cache.local(bin(i), all));
