@@ -170,37 +170,61 @@ impl Film<'_> {
         if n == 0 {
             return ErrorEstimate::default();
         }
-        let discard = n / 10_000;
-        let limit = if discard == 0 {
-            f32::INFINITY
-        } else {
-            kth_largest(discard, |show| self.pixels.iter().for_each(|p| show(relative_error(p) as f32)))
-        };
-        let (mut all, mut kept, mut kept_sqr, mut count) = (0.0, 0.0, 0.0, 0u64);
-        for p in self.pixels.iter() {
-            let e = relative_error(p);
-            all += e;
-            if (e as f32) < limit {
-                kept += e;
-                kept_sqr += e * e;
-                count += 1;
-            }
-        }
-        let m = count.max(1) as f64;
-        let mean = kept / m;
-        let spread = ((kept_sqr / m - mean * mean).max(0.0) / m).sqrt_newton();
+        let t = trimmed(n / 10_000, |show| self.pixels.iter().for_each(|p| show(relative_error(p))));
+        let m = t.count.max(1) as f64;
+        let mean = t.sum / m;
+        let spread = ((t.sum_sqr / m - mean * mean).max(0.0) / m).sqrt_newton();
         ErrorEstimate {
             rel_mse: mean,
             low: (mean - 1.96 * spread).max(0.0),
             high: mean + 1.96 * spread,
-            rel_mse_all: all / n as f64,
+            rel_mse_all: (t.sum + t.rest) / n as f64,
         }
     }
 }
 
+/// Sums of values without the largest.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Trimmed {
+    /// Values that count.
+    pub count: u64,
+    /// Their sum.
+    pub sum: f64,
+    /// The sum of their squares.
+    pub sum_sqr: f64,
+    /// The sum of the others: two disjoint sums, nothing is ever subtracted (NUMERICS STA-4).
+    pub rest: f64,
+    /// The smallest of the others; infinite if there are none.
+    pub limit: f32,
+}
+
+/// Sums of the non-negative values that `visit` shows without the `k` largest, in `f32`. Of equal ones at the limit as many
+/// are left out as make `k`.
+pub(crate) fn trimmed(k: usize, mut visit: impl FnMut(&mut dyn FnMut(f64))) -> Trimmed {
+    let mut t = Trimmed { limit: f32::INFINITY, ..Trimmed::default() };
+    let mut out = k;
+    if k > 0 {
+        t.limit = kth_largest(k, |show| visit(&mut |x| show(x as f32)));
+        let limit = t.limit;
+        visit(&mut |x| out = out.saturating_sub(usize::from(x as f32 > limit)));
+    }
+    visit(&mut |x| {
+        let tied = x as f32 == t.limit && out > 0;
+        out -= usize::from(tied);
+        if x as f32 > t.limit || tied {
+            t.rest += x;
+        } else {
+            t.count += 1;
+            t.sum += x;
+            t.sum_sqr += x * x;
+        }
+    });
+    t
+}
+
 /// The `k`-th largest (k >= 1) of the non-negative values that `visit` shows, by radix selection on the float's bits: four
 /// visits, no memory. 0 if there are fewer.
-pub(crate) fn kth_largest(k: usize, mut visit: impl FnMut(&mut dyn FnMut(f32))) -> f32 {
+fn kth_largest(k: usize, mut visit: impl FnMut(&mut dyn FnMut(f32))) -> f32 {
     let (mut prefix, mut left) = (0u32, k);
     for shift in [24u32, 16, 8, 0] {
         let mut histogram = [0usize; 256];
@@ -245,5 +269,25 @@ impl SqrtNewton for f64 {
             y = 0.5 * (y + self / y);
         }
         y
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::trimmed;
+
+    /// Killed by: leaving out all that is equal to the limit, or none of it.
+    #[test]
+    fn the_largest_are_left_out_and_no_more() {
+        let of = |k: usize, values: &[f64]| {
+            let t = trimmed(k, |show| values.iter().for_each(|x| show(*x)));
+            (t.count, t.sum, t.rest)
+        };
+        assert_eq!(of(0, &[1.0, 3.0, 2.0]), (3, 6.0, 0.0));
+        assert_eq!(of(1, &[1.0, 3.0, 2.0]), (2, 3.0, 3.0));
+        assert_eq!(of(2, &[3.0, 3.0, 3.0, 1.0]), (2, 4.0, 6.0));
+        assert_eq!(of(3, &[9.0, 3.0, 3.0, 3.0, 1.0]), (2, 4.0, 15.0));
+        assert_eq!(of(1, &[0.0; 4]), (3, 0.0, 0.0));
+        assert_eq!(of(9, &[2.0, 1.0]), (0, 0.0, 3.0));
     }
 }

@@ -172,7 +172,7 @@ impl<'s, 'm, P: Profile, I: Intersector> Session<'s, 'm, P, I> {
             if s.settings() != self.plan.settings() {
                 return Err(SessionError::Plan { shard: s.index });
             }
-            if !s.is_done(self.iteration.number) {
+            if !s.is_done(self.identity()) {
                 return Err(SessionError::Unfinished { shard: s.index });
             }
             expected += 1;
@@ -255,6 +255,11 @@ impl<'s, 'm, P: Profile, I: Intersector> Session<'s, 'm, P, I> {
     /// The scene.
     pub fn scene(&self) -> &Scene<'s> {
         &self.scene
+    }
+
+    /// What tells a shard that its sums belong here.
+    pub(crate) fn identity(&self) -> (u64, Iteration) {
+        (self.scene.hash, self.iteration)
     }
 
     pub(crate) fn intersector(&self) -> &I {

@@ -41,7 +41,7 @@ impl Tiles {
     /// How many tiles a shard owns at the most.
     pub(crate) fn most_tiles(&self) -> usize {
         // per row of tiles the owners run through all shards in turn
-        self.rows as usize * self.columns.div_ceil(self.shards) as usize
+        (self.rows as usize).saturating_mul(self.columns.div_ceil(self.shards) as usize)
     }
 
     /// Picture coordinates of slot `slot` of `tile` (Morton order), if inside the picture.

@@ -335,3 +335,39 @@ fn a_stopped_iteration_is_unbiased_and_merges() {
     let light: f64 = truth.pixels.iter().map(|t| t.mean()[1]).sum::<f64>() / 64.0;
     assert!(error.sqrt() < 1000.0 * light, "the test could not see {} samples' light", error.sqrt() / light);
 }
+
+/// A shard that comes from another session, or from an iteration that was given up, draws what a new one draws. Killed by: a
+/// shard that looks at the iteration's number alone, vertices that wait across iterations.
+#[test]
+fn used_shards_begin_anew() {
+    let bytes = blob(&cornell([16, 16]));
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    let plan = Plan::new(&settings(&bytes, "ears")).unwrap();
+    let memory = || [plan.session(), plan.shard()].map(|l| AlignedBytes::zeroed(l.size));
+    let rendered = |used: &dyn Fn(&mut Session<'_, '_, Matte, WideBvh<'_>>, &mut Shard<'_>)| {
+        let [mut shared, mut block] = memory();
+        let mut session = start(&scene, &plan, shared.as_mut()).unwrap();
+        let mut shard = Shard::new(&plan, 0, block.as_mut()).unwrap();
+        used(&mut session, &mut shard);
+        session.begin_iteration(9);
+        finish(&session, &mut shard, 1 << 20);
+        session.end_iteration([&shard]).unwrap();
+        assert!(session.film().pixels().iter().all(|p| p.samples == 9));
+        film_of(&session)
+    };
+    let expected = rendered(&|_, _| ());
+    let elsewhere = rendered(&|_, shard| {
+        let mut shared = AlignedBytes::zeroed(plan.session().size);
+        let mut other = start(&scene, &plan, shared.as_mut()).unwrap();
+        other.begin_iteration(4);
+        finish(&other, shard, 1 << 20);
+        other.end_iteration([&*shard]).unwrap();
+    });
+    assert!(elsewhere == expected, "a shard kept what another session had it do");
+    for rays in [40, 1000] {
+        rendered(&|session, shard| {
+            session.begin_iteration(5);
+            assert_eq!(shard.step(session, Budget { rays }), Progress::More);
+        });
+    }
+}

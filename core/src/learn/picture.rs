@@ -4,7 +4,7 @@ use super::adaptive::Allotment;
 use super::estimate::Pixels;
 use super::settings::Learning;
 use super::{COST_BOUNCE, COST_CAMERA, COST_SHADOW};
-use crate::film::{PixelSums, kth_largest};
+use crate::film::{PixelSums, trimmed};
 use crate::rrs::Norm;
 use crate::tracer::Counters;
 
@@ -65,30 +65,22 @@ impl Picture {
         counters: &Counters,
         visit: impl Visit,
     ) {
-        let errors = |show: &mut dyn FnMut(f32)| {
+        let mut n = 0u64;
+        visit(&mut |_, sums| n += u64::from(sums.samples > 0));
+        let t = trimmed((n as f64 * OUTLIERS) as usize + 1, |show| {
             visit(&mut |film, sums| {
                 if sums.samples > 0 {
-                    show(error_of(film as u32, sums, learning.norm, pixels, allotment) as f32);
+                    show(error_of(film as u32, sums, learning.norm, pixels, allotment));
                 }
             });
-        };
-        let mut n = 0u64;
-        errors(&mut |_| n += 1);
-        let n = n as f64;
-        let outlier = kth_largest((n * OUTLIERS) as usize + 1, errors);
-        let (mut s, mut kept) = (PictureStatistics::default(), 0.0);
-        errors(&mut |e| {
-            // two disjoint sums: nothing is ever subtracted (NUMERICS STA-4)
-            if e < outlier {
-                s.variance += f64::from(e);
-                kept += 1.0;
-            } else {
-                s.outliers += f64::from(e);
-            }
         });
-        s.variance /= f64::max(kept, 1.0);
-        s.outliers /= n.max(1.0);
-        s.limit = f64::from(outlier) * counters.camera_samples as f64 / n.max(1.0);
+        let n = n.max(1) as f64;
+        let mut s = PictureStatistics {
+            variance: t.sum / t.count.max(1) as f64,
+            outliers: t.rest / n,
+            cost: 0.0,
+            limit: f64::from(t.limit) * counters.camera_samples as f64 / n,
+        };
         let (work, cost) = cost_of(counters);
         s.cost = cost;
 

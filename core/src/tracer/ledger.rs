@@ -82,6 +82,14 @@ impl<'m> Ledger<'m> {
         Ok(Self { records, free, free_len: capacity })
     }
 
+    /// Forgets all that is open.
+    pub(crate) fn reset(&mut self) {
+        for (i, f) in self.free.iter_mut().enumerate() {
+            *f = i as u32;
+        }
+        self.free_len = self.free.len();
+    }
+
     pub(crate) fn is_on(&self) -> bool {
         !self.records.is_empty()
     }

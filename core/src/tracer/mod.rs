@@ -43,7 +43,7 @@ fn ledger_capacity(settings: &Settings) -> usize {
 
 /// Pixel slots of one shard.
 fn pixel_slots(tiles: &Tiles) -> usize {
-    tiles.most_tiles() * TILE_PIXELS as usize
+    tiles.most_tiles().saturating_mul(TILE_PIXELS as usize)
 }
 
 /// Bytes of a shard's block; [`Shard::new`] carves in the same order.

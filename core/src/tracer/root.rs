@@ -45,6 +45,14 @@ impl<'m> Roots<'m> {
         Ok(Self { slots, free, free_len: capacity })
     }
 
+    /// Forgets all that is open.
+    pub(crate) fn reset(&mut self) {
+        for (i, f) in self.free.iter_mut().enumerate() {
+            *f = i as u32;
+        }
+        self.free_len = self.free.len();
+    }
+
     /// A new root with one open lane. `None` cannot happen while roots outnumber vertices by two packets.
     pub(crate) fn open(&mut self, pixel: u32, film: u32, importance: [f32; 3]) -> Option<u32> {
         self.free_len = self.free_len.checked_sub(1)?;

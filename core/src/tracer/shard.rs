@@ -11,7 +11,7 @@ use crate::film::{PixelAov, PixelSums};
 use crate::learn::cache::Training;
 use crate::memory::{Carver, MemoryError};
 use crate::profile::Profile;
-use crate::session::Session;
+use crate::session::{Iteration, Session};
 use crate::settings::{Plan, Settings};
 use crate::tiles::TILE_PIXELS;
 use core::fmt;
@@ -59,13 +59,14 @@ impl fmt::Display for ShardError {
 
 impl core::error::Error for ShardError {}
 
-/// All state of one unit of work, in the caller's block.
+/// All state of one unit of work, in the caller's block. It works for one session: another one of the same scene and plan
+/// needs shards of its own, unless it is to continue with equal iterations.
 #[derive(Debug)]
 pub struct Shard<'m> {
     pub(super) plan: Plan,
     pub(crate) index: u32,
-    /// Iteration that the accumulators belong to; 0 is none.
-    iteration: u64,
+    /// Scene and iteration that the accumulators belong to; iteration 0 is none.
+    joined: (u64, Iteration),
     pub(super) cursor: Cursor,
     pub(super) pool: Pool<'m>,
     pub(super) roots: Roots<'m>,
@@ -93,7 +94,7 @@ impl<'m> Shard<'m> {
         Ok(Self {
             plan: *plan,
             index,
-            iteration: 0,
+            joined: (0, Iteration::default()),
             cursor: Cursor::finished(),
             pool: Pool::carve(&mut c, s.ring as usize).map_err(memory)?,
             roots: Roots::carve(&mut c, roots_capacity(s)).map_err(memory)?,
@@ -126,7 +127,7 @@ impl<'m> Shard<'m> {
 
     /// Works until the budget is used or the iteration is finished. Many small steps and one big step give the same bits.
     pub fn step<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>, budget: Budget) -> Progress {
-        if self.iteration != session.iteration().number {
+        if self.joined != session.identity() {
             self.begin(session);
         }
         let start = self.counters.rays();
@@ -140,7 +141,11 @@ impl<'m> Shard<'m> {
 
     fn begin<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>) {
         let iteration = session.iteration();
-        self.iteration = iteration.number;
+        self.joined = session.identity();
+        // what an iteration that was given up has left
+        self.pool.reset();
+        self.roots.reset();
+        self.ledger.reset();
         self.cursor = Cursor::new(&self.plan.tiles, self.index, iteration.samples);
         self.counters = Counters::default();
         self.pixels.fill(PixelSums::default());
@@ -184,9 +189,9 @@ impl<'m> Shard<'m> {
         self.plan.settings()
     }
 
-    /// Has it finished the iteration of this number?
-    pub(crate) fn is_done(&self, iteration: u64) -> bool {
-        self.iteration == iteration && self.cursor.is_finished() && self.pool.fullest().1 == 0
+    /// Has it finished this iteration of this scene?
+    pub(crate) fn is_done(&self, identity: (u64, Iteration)) -> bool {
+        self.joined == identity && self.cursor.is_finished() && self.pool.fullest().1 == 0
     }
 
     /// Calls `f(film index, sums, auxiliary sums)` for each of its pixels.

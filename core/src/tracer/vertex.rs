@@ -216,6 +216,18 @@ impl<'m> Pool<'m> {
         Ok(Self { records, free, free_len: capacity, rings, pending: [0; CLASSES] })
     }
 
+    /// Forgets all that waits.
+    pub(crate) fn reset(&mut self) {
+        for (i, f) in self.free.iter_mut().enumerate() {
+            *f = i as u32;
+        }
+        self.free_len = self.free.len();
+        for r in &mut self.rings {
+            (r.head, r.len) = (0, 0);
+        }
+        self.pending = [0; CLASSES];
+    }
+
     /// Empty slots.
     pub(crate) fn free(&self) -> usize {
         self.free_len

@@ -23,6 +23,14 @@ impl AlignedBytes {
         Self { lines: vec![Line::zeroed(); length.div_ceil(ALIGN)], length }
     }
 
+    /// The same, or `None` where that much memory is not to be had.
+    pub fn try_zeroed(length: usize) -> Option<Self> {
+        let mut lines = Vec::new();
+        lines.try_reserve_exact(length.div_ceil(ALIGN)).ok()?;
+        lines.resize(length.div_ceil(ALIGN), Line::zeroed());
+        Some(Self { lines, length })
+    }
+
     /// A copy of `bytes`.
     pub fn copy_of(bytes: &[u8]) -> Self {
         let mut copy = Self::zeroed(bytes.len());

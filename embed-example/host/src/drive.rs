@@ -172,6 +172,8 @@ pub enum DriveError {
     Cache(CacheError),
     /// A cache is to be loaded or saved with this strategy, which learns nothing of the scene.
     NoCache(&'static str),
+    /// A block of so many bytes is not to be had.
+    Memory(usize),
     /// The thread pool cannot start.
     Threads(rayon::ThreadPoolBuildError),
 }
@@ -192,6 +194,7 @@ impl fmt::Display for DriveError {
                     "roulette strategy `{strategy}` learns nothing of the scene: there is no cache to load or save"
                 )
             }
+            Self::Memory(bytes) => write!(f, "no memory for a block of {bytes} bytes"),
             Self::Threads(e) => write!(f, "cannot start threads: {e}"),
         }
     }
@@ -236,8 +239,9 @@ pub fn drive_with<P: Profile + Send + Sync>(
         return Err(DriveError::NoCache(settings.strategy.name()));
     }
     let plan = Plan::new(settings)?;
-    let mut shared = AlignedBytes::zeroed(plan.session().size);
-    let mut blocks: Vec<_> = (0..settings.shards).map(|_| AlignedBytes::zeroed(plan.shard().size)).collect();
+    let block = |size: usize| AlignedBytes::try_zeroed(size).ok_or(DriveError::Memory(size));
+    let mut shared = block(plan.session().size)?;
+    let mut blocks = (0..settings.shards).map(|_| block(plan.shard().size)).collect::<Result<Vec<_>, _>>()?;
     let mut session = Session::<P, _>::new(scene, WideBvh::new(&scene), &plan, shared.as_mut())?;
     let mut shards = Vec::with_capacity(blocks.len());
     for (i, b) in blocks.iter_mut().enumerate() {
