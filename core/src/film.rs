@@ -30,8 +30,7 @@ impl PixelSums {
 }
 
 /// Weighted sums over the camera samples of one pixel. All samples of an iteration have the same weight `w`: 1, or for
-/// strategies that learn the work of a sample, which stands in for the inverse variance of the iteration's picture: early
-/// iterations do not spoil late ones.
+/// strategies that learn less in the first iteration, in which nothing is learned yet.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct PixelStats {

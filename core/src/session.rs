@@ -62,7 +62,9 @@ impl fmt::Display for SessionError {
             }
             Self::Unfinished { shard } => write!(f, "shard {shard} has not finished the iteration"),
             Self::Plan { shard } => write!(f, "shard {shard} was made for another plan"),
-            Self::Estimate { given } => write!(f, "an estimate of {given} values does not fit the settings"),
+            Self::Estimate { given } => {
+                write!(f, "an estimate of {given} values does not fit the settings, or comes while an iteration runs")
+            }
             Self::NoIteration => f.write_str("no iteration has begun"),
         }
     }
@@ -233,9 +235,13 @@ impl<'s, 'm, P: Profile, I: Intersector> Session<'s, 'm, P, I> {
     /// Replaces the built-in estimate of the pixels by the host's, row by row, for good. It changes efficiency only.
     ///
     /// # Errors
-    /// [`SessionError::Estimate`] if there is not one value per pixel or the settings have no estimate per pixel.
+    /// [`SessionError::Estimate`] if there is not one value per pixel, the settings have no estimate per pixel, or an
+    /// iteration runs.
     pub fn give_estimate(&mut self, rgb: &[[f32; 3]]) -> Result<(), SessionError> {
-        if self.knowledge.give_estimate(rgb) { Ok(()) } else { Err(SessionError::Estimate { given: rgb.len() }) }
+        if self.running || !self.knowledge.give_estimate(rgb) {
+            return Err(SessionError::Estimate { given: rgb.len() });
+        }
+        Ok(())
     }
 
     pub(crate) fn knowledge(&self) -> &Knowledge<'m> {

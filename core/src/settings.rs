@@ -85,7 +85,7 @@ pub enum SettingsError {
         /// Bytes given.
         given: usize,
     },
-    /// The constant is not a finite number, or is to be the cached mean with a strategy that learns nothing of the scene.
+    /// The constant is not a finite number, is for `threshold`, or is to be the cached mean with a strategy that learns nothing of the scene.
     Constant,
     /// A choice of [`Learning`] is out of range.
     Learning,
@@ -101,7 +101,7 @@ impl fmt::Display for SettingsError {
             Self::Depth(n) => write!(f, "max_depth {n}: need at least 1"),
             Self::Ring(n) => write!(f, "ring of {n} vertices: need {MIN_RING} to 2^24"),
             Self::Cache { needed, given } => write!(f, "cache of {given} bytes: with so many shards it needs {needed}"),
-            Self::Constant => f.write_str("the constant of roulette must be finite, and the cached mean needs ear, ears, adrr or adrrs"),
+            Self::Constant => f.write_str("the constant of roulette must be finite and cannot serve threshold; the cached mean needs ear, ears, adrr or adrrs"),
             Self::Learning => f.write_str("learning: need a ledger of 1 to 2^24 records, a split count above 0, a carry of 0 to 1, factors around 1 in 0.05 to 20"),
             Self::Memory => f.write_str("these settings need more memory than can be addressed"),
         }
@@ -174,7 +174,7 @@ fn cache_size(s: &Settings) -> Result<Option<CacheSize>, SettingsError> {
     let fits = match s.constant {
         Constant::Off => true,
         Constant::Cached => s.strategy.space() == Some(Space::Scene),
-        Constant::Number(x) => x.is_finite(),
+        Constant::Number(x) => x.is_finite() && !s.strategy.is_biased(),
     };
     if !fits {
         return Err(SettingsError::Constant);

@@ -68,7 +68,7 @@ impl CacheSize {
         Cache::layout(self)?.size.checked_add(training)
     }
 
-    /// Leaves of both octrees.
+    /// Leaves of all octrees.
     pub fn leaves(self) -> u32 {
         ROOTS + 7 * self.splits
     }
@@ -277,7 +277,7 @@ impl<'m> Cache<'m> {
         self.leaves() * BINS as u32
     }
 
-    /// Leaves in use, of both octrees.
+    /// Leaves in use, of all octrees.
     pub fn leaves(&self) -> u32 {
         self.flat.unwrap_or_else(|| self.tree.leaves())
     }

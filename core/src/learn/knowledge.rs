@@ -17,6 +17,13 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 /// Bins of path lengths per block of pixels, for statistics over the picture.
 const DEPTHS: u32 = 16;
 
+/// What a sample of the first iteration weighs, in which factors are not learned yet, if those of all others weigh 1.
+///
+/// Weights are constants because others make pictures wrong. EARS merges iterations by inverse variance, but bright iterations
+/// are the noisy ones: pictures of 16 pixels with caustics came out 0.9 % too dark, and with weights by the variance or the
+/// work of earlier iterations up to 2 % too bright. As lengths double, little is lost: about 1 % of error.
+const FIRST_WEIGHT: f64 = 0.25;
+
 /// Everything learned.
 #[derive(Debug)]
 pub(crate) struct Knowledge<'m> {
@@ -131,6 +138,11 @@ impl<'m> Knowledge<'m> {
         if limit > 0.0 { limit as f32 } else { f32::INFINITY }
     }
 
+    /// The same, however many samples the pixel has.
+    pub(crate) fn pixel_importance(&self, film: u32) -> [f32; 3] {
+        self.pixels.importance(film)
+    }
+
     /// What is known of the picture, for vertices of pixels of this importance.
     #[inline]
     pub(crate) fn image8(&self, importance: Vec3x8) -> Learned8 {
@@ -177,7 +189,7 @@ impl<'m> Knowledge<'m> {
 
     /// Weight of the samples of an iteration whose pixels `visit` shows, measured against the estimate made before it.
     pub(crate) fn weigh(&mut self, counters: &Counters, visit: impl Visit) -> f64 {
-        let weight = self.picture.sample_weight();
+        let weight = if self.cache.is_some() && !self.picture.known() { FIRST_WEIGHT } else { 1.0 };
         if self.needed && self.pixels.known() {
             self.picture.measure(&self.learning, &self.pixels, &self.allotment, counters, visit);
         }

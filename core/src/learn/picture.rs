@@ -1,4 +1,4 @@
-//! Error and cost of the picture per camera sample (EARS, eqs. 33 and 34), and what an iteration's picture weighs.
+//! Error and cost of the picture per camera sample (EARS, eqs. 33 and 34).
 
 use super::adaptive::Allotment;
 use super::estimate::Pixels;
@@ -67,7 +67,8 @@ impl Picture {
     ) {
         let mut n = 0u64;
         visit(&mut |_, sums| n += u64::from(sums.samples > 0));
-        let t = trimmed((n as f64 * OUTLIERS) as usize + 1, |show| {
+        let outliers = (n as f64 * OUTLIERS) as u64 + 1;
+        let t = trimmed(outliers.min(n.saturating_sub(1)) as usize, |show| {
             visit(&mut |film, sums| {
                 if sums.samples > 0 {
                     show(error_of(film as u32, sums, learning.norm, pixels, allotment));
@@ -96,21 +97,6 @@ impl Picture {
         };
         self.last = s;
         self.first.get_or_insert(s);
-    }
-
-    /// What a sample of the iteration now weighs in the picture, one of the first weighing 1: the work of the iteration before
-    /// over that of the first, per sample. That is inverse variance as far as work buys variance, which is what factors are
-    /// chosen for. To be asked before the iteration is measured.
-    ///
-    /// Measured variances make worse weights. With few samples of a heavy-tailed quantity they come out too small, so that
-    /// the first iterations have most weight; and bright iterations are the noisy ones, so that the picture is too dark, by
-    /// 1 % in small pictures of caustics. Even an iteration's own work is not free of that (0.1 % there); the work before it
-    /// is.
-    pub(super) fn sample_weight(&self) -> f64 {
-        match self.first {
-            Some(first) if first.cost > 0.0 && self.last.cost > 0.0 => self.last.cost / first.cost,
-            _ => 1.0,
-        }
     }
 }
 

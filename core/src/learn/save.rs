@@ -210,7 +210,7 @@ impl<'b> Saved<'b> {
     }
 }
 
-/// Are there two trees, one after the other, in exactly these bytes?
+/// Are there trees, one after the other, in exactly these bytes?
 fn check_shape(shape: &[u8], expected: [u32; 2]) -> Result<(), CacheError> {
     // nodes still to come at every depth
     let mut open = [0u32; MAX_DEPTH as usize + 1];

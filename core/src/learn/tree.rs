@@ -81,7 +81,7 @@ impl<'m> Tree<'m> {
         Ok(tree)
     }
 
-    /// Two roots, both leaves.
+    /// The roots, all leaves.
     pub(super) fn reset(&mut self) {
         self.nodes.iter_mut().zip(0..ROOTS).for_each(|(n, root)| *n = LEAF | root);
         (self.used, self.leaves) = (FIRST_CHILD, ROOTS);

@@ -56,7 +56,7 @@ pub struct Learned8 {
     pub cost_over_variance: F32x8,
     /// Mean of one sample's reflected radiance (eq. 36).
     pub mean: Vec3x8,
-    /// Mean of its square (eq. 35), freed of the constant that stands in for skipped samples.
+    /// Mean of its square (eq. 35).
     pub moment: Vec3x8,
     /// Its variance at a point (eq. 37).
     pub variance: Vec3x8,

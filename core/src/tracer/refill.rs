@@ -62,9 +62,6 @@ impl Cursor {
     }
 }
 
-/// Samples of a pixel in one iteration with adaptive sampling: numbers of this many bits.
-const ADAPTIVE_BITS: u32 = 20;
-
 impl Shard<'_> {
     /// Up to eight camera rays. `None` when the cursor ran out within empty slots.
     pub(super) fn camera_rays<P: Profile, I: Intersector>(
@@ -73,8 +70,11 @@ impl Shard<'_> {
     ) -> Option<Flight8> {
         let iteration = session.iteration();
         // numbers of one pixel must not come back in another iteration, however many samples it had
-        let adaptive = self.plan.settings().adaptive;
-        let first_sample = if adaptive { (iteration.number as u32) << ADAPTIVE_BITS } else { iteration.first_sample };
+        let settings = self.plan.settings();
+        let (seed, first_sample) = match settings.adaptive {
+            true => (settings.seed ^ iteration.number.wrapping_mul(0x9e37_79b9_7f4a_7c15), 0),
+            false => (settings.seed, iteration.first_sample),
+        };
         let tiles = self.plan.tiles;
         let (mut x, mut y, mut pixel, mut sample, mut root) = ([0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8]);
         let mut ledger = [NO_RECORD; 8];
@@ -99,7 +99,7 @@ impl Shard<'_> {
         if lanes == 0 {
             return None;
         }
-        let key = Key8::camera(self.plan.settings().seed, U32x8::new(pixel), U32x8::new(sample));
+        let key = Key8::camera(seed, U32x8::new(pixel), U32x8::new(sample));
         let [u0, u1, u2, u3] = key.uniforms(0);
         let px = F32x8::from_fn(|i| x[i] as f32) + u0;
         let py = F32x8::from_fn(|i| y[i] as f32) + u1;

@@ -102,7 +102,6 @@ fn place<P: Profile, I: Intersector>(
     session: &Session<'_, '_, P, I>,
     a: &Arrival8,
     albedo: Vec3x8,
-    importance: Vec3x8,
     space: Space,
     mut root_film: impl FnMut(usize) -> u32,
 ) -> Place8 {
@@ -121,7 +120,12 @@ fn place<P: Profile, I: Intersector>(
             let known = if knowledge.weighs_pixels() { a.active } else { a.active.and_not(seen) };
             let bin = knowledge.scene_bins(kind, v.p, dir, [u0, u1, u2], known);
             // in one cell bright pixels see bright samples: only their ratio is alike
-            let pixel = inverse(importance, f32::MIN_POSITIVE);
+            // however many samples the pixel has in this iteration
+            let own: [_; 8] = core::array::from_fn(|i| match seen.lane(i) && a.active.lane(i) {
+                true => knowledge.pixel_importance(root_film(i)),
+                false => [1.0; 3],
+            });
+            let pixel = inverse(Vec3x8::from_fn(|i| own[i]), f32::MIN_POSITIVE);
             let pixel = Vec3x8::new(pixel.x.sqrt(), pixel.y.sqrt(), pixel.z.sqrt());
             let unscale = Vec3x8::select(seen, pixel, albedo);
             Place8 { bin, scale: inverse(unscale, DARKEST), unscale }
@@ -167,7 +171,7 @@ impl Shard<'_> {
         }
         if let Some(space) = strategy.space() {
             let root = v.root.to_array();
-            let found = place(session, &a, albedo, learned.importance, space, |i| self.roots.get(root[i]).film);
+            let found = place(session, &a, albedo, space, |i| self.roots.get(root[i]).film);
             knowledge.local8(&mut learned, found.bin, found.unscale, a.active);
             self.counters.look_ups.count(a.active.count());
             logged = Some(found);

@@ -207,7 +207,8 @@ impl Shard<'_> {
         if ratio <= 0.0 {
             return mask;
         }
-        let error = (found.pixel * found.pixel).dot(self.importance(s.vertex.root, mask));
+        let norm = self.plan.settings().learning.norm;
+        let error = norm.of(found.pixel * found.pixel * self.importance(s.vertex.root, mask));
         let p = (error * F32x8::splat(ratio / COST_SHADOW)).sqrt();
         let p = p.is_finite().select(p, F32x8::ONE).clamp(MIN_FACTOR, 1.0);
         let [u, ..] = s.key.uniforms(SHADOW_BLOCK);

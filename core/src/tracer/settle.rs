@@ -58,7 +58,7 @@ impl Shard<'_> {
         if (mask & most.gt(limit)).none() {
             return F32x8::ONE;
         }
-        let error = (square * self.importance(root, mask)).mean();
+        let error = self.plan.settings().learning.norm.of(square * self.importance(root, mask));
         error.gt(limit).select((limit / error).sqrt(), F32x8::ONE)
     }
 
