@@ -73,8 +73,24 @@ impl Run {
     }
 }
 
-/// Renders with one thread. `noise` is subtracted from every error.
-pub fn render(subject: &Subject, strategy: &str, seed: u64, target: Target, noise: f64) -> Result<Run, Box<dyn Error>> {
+/// How a subject is rendered.
+#[derive(Clone, Copy, Debug)]
+pub struct Task<'a> {
+    /// Roulette strategy.
+    pub strategy: &'a str,
+    /// Seed.
+    pub seed: u64,
+    /// When to stop.
+    pub target: Target,
+    /// Subtracted from every error.
+    pub noise: f64,
+    /// Strategies that learn are told the true pixels.
+    pub truth: bool,
+}
+
+/// Renders with one thread.
+pub fn render(subject: &Subject, task: &Task<'_>) -> Result<Run, Box<dyn Error>> {
+    let Task { strategy, seed, target, noise, truth } = *task;
     let scene = Scene::from_bytes(&subject.baked.bytes)?;
     let settings = Settings {
         size: [subject.image.width as u32, subject.image.height as u32],
@@ -85,7 +101,6 @@ pub fn render(subject: &Subject, strategy: &str, seed: u64, target: Target, nois
         ..Settings::for_scene(&scene)
     };
     let watch = Watch { reference: &subject.image, noise, start: cpu_seconds(), state: Mutex::default() };
-    let truth = std::env::var_os("TRUTH").is_some();
     let estimate = truth.then_some(&*subject.image.pixels);
     drive_scene(scene, &Options { threads: 1, estimate, ..Options::new(settings, target) }, &watch)?;
     let snapshots = watch.state.into_inner().unwrap_or_else(PoisonError::into_inner).snapshots;

@@ -29,8 +29,8 @@ impl PixelSums {
     }
 }
 
-/// Weighted sums over the camera samples of one pixel. All samples of an iteration have the same weight `w`: 1, or for
-/// strategies that learn less in the first iteration, in which nothing is learned yet.
+/// Weighted sums over the camera samples of one pixel. All samples of the pixel in an iteration have the same
+/// weight `w`: 1, less in the first iteration of strategies that learn, and less where adaptive sampling took more.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct PixelStats {

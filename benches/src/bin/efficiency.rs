@@ -20,7 +20,7 @@
 
 use clap::Parser;
 use croupier::Strategy;
-use croupier_benches::measure::{Run, Snapshot, render};
+use croupier_benches::measure::{Run, Snapshot, Task, render};
 use croupier_benches::stats::{Median, coverage, digits, geometric_mean};
 use croupier_benches::subject::Subject;
 use croupier_host::render::Target;
@@ -69,6 +69,9 @@ struct Args {
     /// Subtract the expected share of the reference's noise from every error; what is not above it counts as unknown.
     #[arg(long)]
     subtract_noise: bool,
+    /// Tell strategies that learn the true pixels instead of denoised ones: what the denoiser costs.
+    #[arg(long)]
+    truth: bool,
     /// Fewer seeds and seconds.
     #[arg(long)]
     quick: bool,
@@ -128,7 +131,10 @@ impl Group {
                 }
                 let seed = args.first_seed.wrapping_add(i as u64);
                 let name = format!("{}, {}, seed {seed}", subject.name, strategies[s]);
-                let run = render(subject, &strategies[s], seed, args.target(), noise);
+                let run = render(
+                    subject,
+                    &Task { strategy: &strategies[s], seed, target: args.target(), noise, truth: args.truth },
+                );
                 let run = run.map_err(|e| format!("{name}: {e}"))?;
                 let [spp, seconds, error] = [run.spp(), run.end.core_seconds, run.end.error].map(digits);
                 eprintln!("{name}: {spp} spp, {seconds} core-s, relMSE {error}");

@@ -50,9 +50,7 @@ pub struct Counters {
     pub budget_capped: u64,
     /// Shadow rays that roulette spared.
     pub shadow_kills: u64,
-    /// Paths that ended.
-    pub paths: u64,
-    /// Sum of the segments of those paths, shared ones counted for each.
+    /// Sum of the segments of all paths, shared ones counted for each.
     pub path_segments: u64,
     /// Samples whose estimates were learned from.
     pub samples_logged: u64,
@@ -84,6 +82,11 @@ impl Counters {
         self.camera_rays + self.scatter_rays + self.shadow_rays
     }
 
+    /// Paths: camera samples and what splitting added.
+    pub fn paths(&self) -> u64 {
+        self.camera_samples + self.splits
+    }
+
     /// Adds another shard's counts.
     pub fn merge(&mut self, o: &Self) {
         self.camera_rays += o.camera_rays;
@@ -96,7 +99,6 @@ impl Counters {
         self.ring_capped += o.ring_capped;
         self.budget_capped += o.budget_capped;
         self.shadow_kills += o.shadow_kills;
-        self.paths += o.paths;
         self.path_segments += o.path_segments;
         self.samples_logged += o.samples_logged;
         self.samples_refused += o.samples_refused;

@@ -9,6 +9,7 @@
 //! When the slab is full a sample gets no record: it and what follows are not learned from, and the samples that contain
 //! it are incomplete, so they are not logged either. Nothing else changes; the image never passes through here.
 
+use super::free_list::FreeList;
 use crate::memory::{Carver, Measure, MemoryError};
 use bytemuck::{Pod, Zeroable};
 
@@ -64,30 +65,22 @@ pub(crate) struct Finished {
 #[derive(Debug)]
 pub(crate) struct Ledger<'m> {
     records: &'m mut [Record],
-    free: &'m mut [u32],
-    free_len: usize,
+    free: FreeList<'m>,
 }
 
 impl<'m> Ledger<'m> {
     pub(crate) fn measure(m: Measure, capacity: usize) -> Measure {
-        m.add::<Record>(capacity).add::<u32>(capacity)
+        FreeList::measure(m.add::<Record>(capacity), capacity)
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, capacity: usize) -> Result<Self, MemoryError> {
         let records = c.take(capacity)?;
-        let free: &mut [u32] = c.take(capacity)?;
-        for (i, f) in free.iter_mut().enumerate() {
-            *f = i as u32;
-        }
-        Ok(Self { records, free, free_len: capacity })
+        Ok(Self { records, free: FreeList::carve(c, capacity)? })
     }
 
     /// Forgets all that is open.
     pub(crate) fn reset(&mut self) {
-        for (i, f) in self.free.iter_mut().enumerate() {
-            *f = i as u32;
-        }
-        self.free_len = self.free.len();
+        self.free.reset();
     }
 
     pub(crate) fn is_on(&self) -> bool {
@@ -96,9 +89,7 @@ impl<'m> Ledger<'m> {
 
     /// A record for a sample with one open lane; [`NO_RECORD`] if the slab is full.
     pub(crate) fn open(&mut self, parent: u32) -> u32 {
-        let Some(len) = self.free_len.checked_sub(1) else { return NO_RECORD };
-        self.free_len = len;
-        let slot = self.free[len];
+        let Some(slot) = self.free.take() else { return NO_RECORD };
         self.records[slot as usize] = Record { parent, open: 1, ..Zeroable::zeroed() };
         slot
     }
@@ -157,8 +148,7 @@ impl<'m> Ledger<'m> {
                 return;
             }
             let done = *r;
-            self.free[self.free_len] = slot;
-            self.free_len += 1;
+            self.free.give(slot);
             let Some(p) = self.records.get_mut(done.parent as usize) else { return };
             p.cost += done.cost;
             if done.open & INCOMPLETE != 0 {
@@ -376,7 +366,7 @@ mod tests {
                     let all = forest.samples[s].children.len();
                     part += usize::from(refused > 0 && !found.is_empty() && found.len() < all);
                 }
-                assert_eq!(ledger.free_len, capacity, "round {round}: slots that were not given back");
+                assert_eq!(ledger.free.len(), capacity, "round {round}: slots that were not given back");
             });
         }
         assert!(pairs > 10_000 && refusals > 1000 && part > 1000, "{pairs} pairs, {refusals} refusals, {part} parts");

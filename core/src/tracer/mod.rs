@@ -7,8 +7,10 @@
 
 mod counters;
 mod flight;
+mod free_list;
 mod ledger;
 mod occlude;
+mod place;
 mod refill;
 mod root;
 mod roulette;

@@ -1,5 +1,6 @@
 //! One record per camera sample in flight: what its whole tree of paths has gathered.
 
+use super::free_list::FreeList;
 use crate::memory::{Carver, Measure, MemoryError};
 use bytemuck::{Pod, Zeroable};
 
@@ -27,36 +28,27 @@ pub(crate) struct Root {
 #[derive(Debug)]
 pub(crate) struct Roots<'m> {
     slots: &'m mut [Root],
-    free: &'m mut [u32],
-    free_len: usize,
+    free: FreeList<'m>,
 }
 
 impl<'m> Roots<'m> {
     pub(crate) fn measure(m: Measure, capacity: usize) -> Measure {
-        m.add::<Root>(capacity).add::<u32>(capacity)
+        FreeList::measure(m.add::<Root>(capacity), capacity)
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, capacity: usize) -> Result<Self, MemoryError> {
         let slots = c.take(capacity)?;
-        let free: &mut [u32] = c.take(capacity)?;
-        for (i, f) in free.iter_mut().enumerate() {
-            *f = i as u32;
-        }
-        Ok(Self { slots, free, free_len: capacity })
+        Ok(Self { slots, free: FreeList::carve(c, capacity)? })
     }
 
     /// Forgets all that is open.
     pub(crate) fn reset(&mut self) {
-        for (i, f) in self.free.iter_mut().enumerate() {
-            *f = i as u32;
-        }
-        self.free_len = self.free.len();
+        self.free.reset();
     }
 
     /// A new root with one open lane. `None` cannot happen while roots outnumber vertices by two packets.
     pub(crate) fn open(&mut self, pixel: u32, film: u32, importance: [f32; 3]) -> Option<u32> {
-        self.free_len = self.free_len.checked_sub(1)?;
-        let slot = self.free[self.free_len];
+        let slot = self.free.take()?;
         self.slots[slot as usize] = Root { pixel, film, importance, open: 1, ..Zeroable::zeroed() };
         Some(slot)
     }
@@ -73,8 +65,7 @@ impl<'m> Roots<'m> {
             return None;
         }
         let done = *root;
-        self.free[self.free_len] = slot;
-        self.free_len += 1;
+        self.free.give(slot);
         Some(done)
     }
 }

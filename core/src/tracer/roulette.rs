@@ -1,21 +1,18 @@
 //! Stage `roulette`: how many samples each arrived vertex gets. The masks n = 0 (the path ends) and n >= 1 (it waits with
 //! n samples) are the packet's roulette masks; one comb rounds the whole packet.
 
+use super::place::{Place8, place};
 use super::settle::Found8;
 use super::shard::Shard;
 use super::vertex::{RESERVE, Vertex8};
 use crate::accel::Intersector;
 use crate::bsdf::{self, Bsdf, Inputs8, Visitor};
-use crate::learn::cache::Kind;
 use crate::profile::Profile;
-use crate::rrs::{self, Learned8, Space, Vertices8};
+use crate::rrs::{self, Learned8, Vertices8};
 use crate::scene::Scene;
 use crate::scene::blob::MaterialKind;
 use crate::session::Session;
 use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
-
-/// Albedos below this are taken for this when samples are logged.
-const DARKEST: f32 = 1e-3;
 
 /// Phong exponent of a perfect mirror.
 const MIRROR_SHININESS: f32 = 1e4;
@@ -62,83 +59,6 @@ fn albedo<P: Profile>(scene: &Scene<'_>, a: &Arrival8) -> Vec3x8 {
         out = Vec3x8::select(mask, of.unwrap_or(Vec3x8::ONE), out);
     }
     out
-}
-
-/// Blocks of a vertex's random numbers beyond those of its samples, see `scatter`.
-const JITTER_BLOCK: u32 = 3;
-
-/// Where a vertex's samples are logged, and how its bin's values become its own.
-struct Place8 {
-    bin: U32x8,
-    /// Samples are logged times this.
-    scale: Vec3x8,
-    /// What was logged counts times this here.
-    unscale: Vec3x8,
-}
-
-/// Kinds without a preferred direction but the normal.
-const MATTE: u32 = 1 << MaterialKind::Diffuse as u32;
-
-/// Kinds that light passes through: what they show hangs on the viewing direction.
-const THROUGH: u32 = 1 << MaterialKind::Dielectric as u32
-    | 1 << MaterialKind::RoughDielectric as u32
-    | 1 << MaterialKind::ThinDielectric as u32
-    | 1 << MaterialKind::Null as u32;
-
-fn lanes_of(kinds: u32, a: &Arrival8) -> Mask8 {
-    Mask8::from_bits((0..8).fold(0, |m, i| m | (kinds >> (a.kind[i] & 31) & 1) << i))
-}
-
-/// 1 / x where x is at least `floor`, 0 elsewhere.
-fn inverse(x: Vec3x8, floor: f32) -> Vec3x8 {
-    let one = |x: F32x8| x.ge(F32x8::splat(floor)).zero_unless(F32x8::ONE / x.max(F32x8::splat(floor)));
-    Vec3x8::new(one(x.x), one(x.y), one(x.z))
-}
-
-/// The bins of arrived vertices. What matte surfaces reflect hangs on where they face; what shiny ones reflect on the
-/// mirrored direction; what others let through on the viewing direction. Samples are logged over the albedo, so that a
-/// texture or a black and a white thing in one cell do not pass for noise.
-fn place<P: Profile, I: Intersector>(
-    session: &Session<'_, '_, P, I>,
-    a: &Arrival8,
-    albedo: Vec3x8,
-    space: Space,
-    mut root_film: impl FnMut(usize) -> u32,
-) -> Place8 {
-    let v = &a.vertex;
-    let knowledge = session.knowledge();
-    match space {
-        Space::Scene => {
-            let [u0, u1, u2, _] = v.key.uniforms(JITTER_BLOCK);
-            let mirrored = v.ns * (v.ns.dot(v.wo) * F32x8::splat(2.0)) - v.wo;
-            let matte = lanes_of(MATTE, a);
-            let dir = Vec3x8::select(lanes_of(THROUGH, a), v.wo, Vec3x8::select(matte, v.ns, mirrored));
-            let seen = v.depth.eq(U32x8::splat(1));
-            let kind = U32x8::select(matte, U32x8::splat(Kind::Matte as u32), U32x8::splat(Kind::Shiny as u32));
-            let first = U32x8::splat(Kind::FirstMatte as u32 - Kind::Matte as u32);
-            let kind = kind + U32x8::select(seen, first, U32x8::splat(0));
-            let known = if knowledge.weighs_pixels() { a.active } else { a.active.and_not(seen) };
-            let bin = knowledge.scene_bins(kind, v.p, dir, [u0, u1, u2], known);
-            // in one cell bright pixels see bright samples: only their ratio is alike
-            // however many samples the pixel has in this iteration
-            let own: [_; 8] = core::array::from_fn(|i| match seen.lane(i) && a.active.lane(i) {
-                true => knowledge.pixel_importance(root_film(i)),
-                false => [1.0; 3],
-            });
-            let pixel = inverse(Vec3x8::from_fn(|i| own[i]), f32::MIN_POSITIVE);
-            let pixel = Vec3x8::new(pixel.x.sqrt(), pixel.y.sqrt(), pixel.z.sqrt());
-            let unscale = Vec3x8::select(seen, pixel, albedo);
-            Place8 { bin, scale: inverse(unscale, DARKEST), unscale }
-        }
-        Space::Image => {
-            let depth = v.depth.to_array();
-            let mut bin = [0; 8];
-            for i in a.active.lanes() {
-                bin[i] = knowledge.image_bin(root_film(i), depth[i]);
-            }
-            Place8 { bin: U32x8::new(bin), scale: v.beta, unscale: inverse(v.beta, f32::MIN_POSITIVE) }
-        }
-    }
 }
 
 /// Phong exponents that correspond to the materials' GGX widths: 2 / alpha^2 - 2.

@@ -112,7 +112,6 @@ impl Shard<'_> {
     /// goes to its pixel.
     #[inline]
     pub(super) fn close(&mut self, root: u32, ledger: u32, depth: u32) {
-        self.counters.paths += 1;
         self.counters.path_segments += u64::from(depth);
         self.settle_record(ledger);
         if let Some(done) = self.roots.close(root) {

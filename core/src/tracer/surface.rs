@@ -15,7 +15,7 @@ use crate::texture;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Kinds that scatter from behind as well.
-const TRANSMISSIVE: u32 = 1 << MaterialKind::Dielectric as u32
+pub(super) const TRANSMISSIVE: u32 = 1 << MaterialKind::Dielectric as u32
     | 1 << MaterialKind::RoughDielectric as u32
     | 1 << MaterialKind::ThinDielectric as u32
     | 1 << MaterialKind::Null as u32;

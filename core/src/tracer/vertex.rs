@@ -1,5 +1,6 @@
 //! A path vertex that waits for its samples, and the fixed pool of them.
 
+use super::free_list::FreeList;
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::rng::Key8;
 use crate::scene::blob::MaterialKind;
@@ -188,8 +189,7 @@ pub(crate) struct Batch {
 #[derive(Debug)]
 pub(crate) struct Pool<'m> {
     records: &'m mut [Vertex],
-    free: &'m mut [u32],
-    free_len: usize,
+    free: FreeList<'m>,
     rings: [Ring<'m>; CLASSES],
     /// Samples waiting per class.
     pending: [u64; CLASSES],
@@ -200,28 +200,22 @@ pub(crate) const RESERVE: usize = 8;
 
 impl<'m> Pool<'m> {
     pub(crate) fn measure(m: Measure, capacity: usize) -> Measure {
-        (0..CLASSES).fold(m.add::<Vertex>(capacity).add::<u32>(capacity), |m, _| m.add::<u32>(capacity))
+        (0..CLASSES).fold(FreeList::measure(m.add::<Vertex>(capacity), capacity), |m, _| m.add::<u32>(capacity))
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, capacity: usize) -> Result<Self, MemoryError> {
         let records = c.take(capacity)?;
-        let free: &mut [u32] = c.take(capacity)?;
-        for (i, f) in free.iter_mut().enumerate() {
-            *f = i as u32;
-        }
+        let free = FreeList::carve(c, capacity)?;
         let mut rings = core::array::from_fn(|_| Ring { slots: &mut [], head: 0, len: 0 });
         for r in &mut rings {
             r.slots = c.take(capacity)?;
         }
-        Ok(Self { records, free, free_len: capacity, rings, pending: [0; CLASSES] })
+        Ok(Self { records, free, rings, pending: [0; CLASSES] })
     }
 
     /// Forgets all that waits.
     pub(crate) fn reset(&mut self) {
-        for (i, f) in self.free.iter_mut().enumerate() {
-            *f = i as u32;
-        }
-        self.free_len = self.free.len();
+        self.free.reset();
         for r in &mut self.rings {
             (r.head, r.len) = (0, 0);
         }
@@ -230,7 +224,7 @@ impl<'m> Pool<'m> {
 
     /// Empty slots.
     pub(crate) fn free(&self) -> usize {
-        self.free_len
+        self.free.len()
     }
 
     /// The class with most samples waiting, and how many.
@@ -246,9 +240,7 @@ impl<'m> Pool<'m> {
 
     /// Stores a vertex with `count` samples; the caller has made sure that a slot is free.
     pub(crate) fn push(&mut self, class: usize, v: Vertex) {
-        let Some(len) = self.free_len.checked_sub(1) else { return };
-        self.free_len = len;
-        let slot = self.free[len];
+        let Some(slot) = self.free.take() else { return };
         self.records[slot as usize] = v;
         self.rings[class].push(slot);
         self.pending[class] += u64::from(v.count());
@@ -260,7 +252,7 @@ impl<'m> Pool<'m> {
         let mut slot = [0u32; 8];
         let mut sample = [0u32; 8];
         let mut lanes = 0usize;
-        let mut room = self.free_len;
+        let mut room = self.free.len();
         let ring = &mut self.rings[class];
         while lanes < 8 {
             let Some(s) = ring.newest() else { break };
@@ -288,8 +280,7 @@ impl<'m> Pool<'m> {
             taken(v, m, drained);
             if drained {
                 ring.pop_newest();
-                self.free[self.free_len] = s;
-                self.free_len += 1;
+                self.free.give(s);
             }
         }
         if lanes == 0 {

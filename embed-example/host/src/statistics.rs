@@ -82,8 +82,8 @@ impl Statistics {
         Self {
             paths: Paths {
                 spp: over(c.camera_samples, pixels),
-                path_length: over(c.path_segments, c.paths),
-                paths_per_sample: over(c.paths, c.camera_samples),
+                path_length: over(c.path_segments, c.paths()),
+                paths_per_sample: over(c.paths(), c.camera_samples),
                 first_factor: (hits > 0.0).then(|| first(|a| a.factor[0]) / hits),
             },
             iterations: iterations.collect(),

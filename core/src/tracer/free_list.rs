@@ -1,0 +1,47 @@
+//! Which slots of a slab are free. The one given back last is taken first, so that few slots stay in the processor's caches.
+
+use crate::memory::{Carver, Measure, MemoryError};
+
+/// Numbers of free slots.
+#[derive(Debug)]
+pub(crate) struct FreeList<'m> {
+    slots: &'m mut [u32],
+    len: usize,
+}
+
+impl<'m> FreeList<'m> {
+    pub(crate) fn measure(m: Measure, capacity: usize) -> Measure {
+        m.add::<u32>(capacity)
+    }
+
+    pub(crate) fn carve(c: &mut Carver<'m>, capacity: usize) -> Result<Self, MemoryError> {
+        let mut list = Self { slots: c.take(capacity)?, len: 0 };
+        list.reset();
+        Ok(list)
+    }
+
+    /// All slots are free.
+    pub(crate) fn reset(&mut self) {
+        self.len = self.slots.len();
+        self.slots.iter_mut().zip(0..).for_each(|(s, i)| *s = i);
+    }
+
+    /// How many are free.
+    pub(crate) fn len(&self) -> usize {
+        self.len
+    }
+
+    /// A free slot, which is not free any more.
+    #[inline(always)]
+    pub(crate) fn take(&mut self) -> Option<u32> {
+        self.len = self.len.checked_sub(1)?;
+        Some(self.slots[self.len])
+    }
+
+    /// Gives back a slot that was taken.
+    #[inline(always)]
+    pub(crate) fn give(&mut self, slot: u32) {
+        self.slots[self.len] = slot;
+        self.len += 1;
+    }
+}

@@ -1,0 +1,85 @@
+//! Where in the statistics the samples of arrived vertices belong.
+
+use super::roulette::Arrival8;
+use super::surface::TRANSMISSIVE;
+use crate::accel::Intersector;
+use crate::learn::cache::Kind;
+use crate::profile::Profile;
+use crate::rrs::Space;
+use crate::scene::blob::MaterialKind;
+use crate::session::Session;
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+
+/// Channels that reflect less than this are not learned from: the quotient would be noise.
+const DARKEST: f32 = 1e-3;
+
+/// Block of a vertex's random numbers, beyond those of its samples (`scatter`).
+const JITTER_BLOCK: u32 = 3;
+
+/// Where a vertex's samples are logged, and how its bin's values become its own.
+pub(super) struct Place8 {
+    /// Bins.
+    pub bin: U32x8,
+    /// Samples are logged times this.
+    pub scale: Vec3x8,
+    /// What was logged counts times this here.
+    pub unscale: Vec3x8,
+}
+
+/// Kinds without a preferred direction but the normal.
+const MATTE: u32 = 1 << MaterialKind::Diffuse as u32;
+
+fn lanes_of(kinds: u32, a: &Arrival8) -> Mask8 {
+    Mask8::from_bits((0..8).fold(0, |m, i| m | (kinds >> (a.kind[i] & 31) & 1) << i))
+}
+
+/// 1 / x where x is at least `floor`, 0 elsewhere.
+fn inverse(x: Vec3x8, floor: f32) -> Vec3x8 {
+    let one = |x: F32x8| x.ge(F32x8::splat(floor)).zero_unless(F32x8::ONE / x.max(F32x8::splat(floor)));
+    Vec3x8::new(one(x.x), one(x.y), one(x.z))
+}
+
+/// The bins of arrived vertices. What matte surfaces reflect hangs on where they face; what shiny ones reflect on the
+/// mirrored direction; what others let through on the viewing direction. Samples are logged over the albedo, so that a
+/// texture or a black and a white thing in one cell do not pass for noise.
+pub(super) fn place<P: Profile, I: Intersector>(
+    session: &Session<'_, '_, P, I>,
+    a: &Arrival8,
+    albedo: Vec3x8,
+    space: Space,
+    mut root_film: impl FnMut(usize) -> u32,
+) -> Place8 {
+    let v = &a.vertex;
+    let knowledge = session.knowledge();
+    match space {
+        Space::Scene => {
+            let [u0, u1, u2, _] = v.key.uniforms(JITTER_BLOCK);
+            let mirrored = v.ns * (v.ns.dot(v.wo) * F32x8::splat(2.0)) - v.wo;
+            let matte = lanes_of(MATTE, a);
+            let dir = Vec3x8::select(lanes_of(TRANSMISSIVE, a), v.wo, Vec3x8::select(matte, v.ns, mirrored));
+            let seen = v.depth.eq(U32x8::splat(1));
+            let kind = U32x8::select(matte, U32x8::splat(Kind::Matte as u32), U32x8::splat(Kind::Shiny as u32));
+            let first = U32x8::splat(Kind::FirstMatte as u32 - Kind::Matte as u32);
+            let kind = kind + U32x8::select(seen, first, U32x8::splat(0));
+            let known = if knowledge.weighs_pixels() { a.active } else { a.active.and_not(seen) };
+            let bin = knowledge.scene_bins(kind, v.p, dir, [u0, u1, u2], known);
+            // in one cell bright pixels see bright samples: only their ratio is alike, however many samples a pixel has
+            let own: [_; 8] = core::array::from_fn(|i| match seen.lane(i) && a.active.lane(i) {
+                true => knowledge.pixel_importance(root_film(i)),
+                false => [1.0; 3],
+            });
+            let pixel = inverse(Vec3x8::from_fn(|i| own[i]), f32::MIN_POSITIVE);
+            let pixel = Vec3x8::new(pixel.x.sqrt(), pixel.y.sqrt(), pixel.z.sqrt());
+            let unscale = Vec3x8::select(seen, pixel, albedo);
+            Place8 { bin, scale: inverse(unscale, DARKEST), unscale }
+        }
+        Space::Image => {
+            let depth = v.depth.to_array();
+            let mut bin = [0; 8];
+            for i in a.active.lanes() {
+                bin[i] = knowledge.image_bin(root_film(i), depth[i]);
+            }
+            Place8 { bin: U32x8::new(bin), scale: v.beta, unscale: inverse(v.beta, f32::MIN_POSITIVE) }
+        }
+    }
+}
