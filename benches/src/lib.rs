@@ -4,3 +4,4 @@ pub mod clock;
 pub mod measure;
 pub mod stats;
 pub mod subject;
+pub mod variant;

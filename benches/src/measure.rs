@@ -3,9 +3,10 @@
 use crate::clock::cpu_seconds;
 use crate::stats::time_to;
 use crate::subject::Subject;
+use crate::variant::Variant;
 use croupier::film::PixelStats;
-use croupier::{Film, Scene, Settings, Strategy};
-use croupier_host::compare::{CompareError, relmse, relmse_without};
+use croupier::{Film, Scene, Settings};
+use croupier_host::compare::{CompareError, relmse};
 use croupier_host::drive::{Options, drive_scene};
 use croupier_host::image::Rgb;
 use croupier_host::render::{Observer, Progress, Target};
@@ -29,7 +30,7 @@ pub struct Snapshot {
     pub rays: u64,
     /// relMSE without the worst 0.01 % of the pixels.
     pub error: f64,
-    /// relMSE without the worst part [`ROBUST`].
+    /// relMSE without the worst part [`ROBUST`] of the pixels and without what the reference's noise adds in the others.
     pub robust: f64,
 }
 
@@ -67,42 +68,21 @@ impl Run {
         self.end.rays as f64 / self.end.samples as f64
     }
 
-    /// Core-seconds until relMSE came down to `level`; `None` if it did not.
+    /// Core-seconds until the robust relMSE came down to `level`; `None` if it did not.
     pub fn seconds_to(&self, level: f64) -> Option<f64> {
-        time_to(&self.snapshots.iter().map(|s| (s.core_seconds, s.error)).collect::<Vec<_>>(), level)
+        time_to(&self.snapshots.iter().map(|s| (s.core_seconds, s.robust)).collect::<Vec<_>>(), level)
     }
 }
 
-/// How a subject is rendered.
-#[derive(Clone, Copy, Debug)]
-pub struct Task<'a> {
-    /// Roulette strategy.
-    pub strategy: &'a str,
-    /// Seed.
-    pub seed: u64,
-    /// When to stop.
-    pub target: Target,
-    /// Subtracted from every error.
-    pub noise: f64,
-    /// Strategies that learn are told the true pixels.
-    pub truth: bool,
-}
-
 /// Renders with one thread.
-pub fn render(subject: &Subject, task: &Task<'_>) -> Result<Run, Box<dyn Error>> {
-    let Task { strategy, seed, target, noise, truth } = *task;
+pub fn render(subject: &Subject, variant: &Variant, seed: u64, target: Target) -> Result<Run, Box<dyn Error>> {
     let scene = Scene::from_bytes(&subject.baked.bytes)?;
-    let settings = Settings {
-        size: [subject.image.width as u32, subject.image.height as u32],
-        seed,
-        shards: 16,
-        strategy: Strategy::parse(strategy)?,
-        aovs: true,
-        ..Settings::for_scene(&scene)
-    };
-    let watch = Watch { reference: &subject.image, noise, start: cpu_seconds(), state: Mutex::default() };
-    let estimate = truth.then_some(&*subject.image.pixels);
-    drive_scene(scene, &Options { threads: 1, estimate, ..Options::new(settings, target) }, &watch)?;
+    let size = [subject.image.width as u32, subject.image.height as u32];
+    let settings = Settings { size, seed, shards: 16, aovs: true, ..Settings::for_scene(&scene) };
+    let watch = Watch { subject, start: cpu_seconds(), state: Mutex::default() };
+    let estimate = variant.truth().then_some(&*subject.image.pixels);
+    let options = Options { threads: 1, estimate, ..Options::new(variant.apply(settings), target) };
+    drive_scene(scene, &options, &watch)?;
     let snapshots = watch.state.into_inner().unwrap_or_else(PoisonError::into_inner).snapshots;
     let snapshots = snapshots.into_iter().collect::<Result<Vec<_>, _>>()?;
     let end = *snapshots.last().ok_or("a render without an iteration")?;
@@ -111,8 +91,7 @@ pub fn render(subject: &Subject, task: &Task<'_>) -> Result<Run, Box<dyn Error>>
 
 /// Takes the snapshots.
 struct Watch<'a> {
-    reference: &'a Rgb,
-    noise: f64,
+    subject: &'a Subject,
     /// CPU time of the calling thread at the start.
     start: Option<f64>,
     state: Mutex<State>,
@@ -138,8 +117,8 @@ impl Watch<'_> {
             wall_seconds,
             samples: sum(|p| p.samples),
             rays: sum(|p| p.rays),
-            error: relmse(&image, self.reference, false)?.value - self.noise,
-            robust: relmse_without(&image, self.reference, ROBUST)?.value - self.noise,
+            error: relmse(&image, &self.subject.image, false)?.value,
+            robust: self.subject.error_beyond_noise(&image, ROBUST)?,
         })
     }
 }

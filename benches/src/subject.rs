@@ -1,7 +1,7 @@
 //! A shared scene, baked, with the picture it should give.
 
 use croupier_host::bake::{BakeOptions, Baked, bake};
-use croupier_host::compare::{Estimate, relmse_of};
+use croupier_host::compare::{CompareError, Estimate, relmse_of, relmse_of_per_pixel, relmse_per_pixel};
 use croupier_host::image::Rgb;
 use croupier_host::load::load;
 use std::error::Error;
@@ -29,6 +29,17 @@ impl Subject {
         let stderr = Rgb::read_exr(&folder.join("reference_stderr.exr"))?;
         let reference = Estimate::from_image(&image, Some(&stderr))?;
         Ok(Self { name: name.into(), baked, image, reference })
+    }
+
+    /// relMSE of an image without the worst part `outliers` of the pixels, less the share of the reference's noise in the
+    /// others: what it would be against a reference without noise.
+    pub fn error_beyond_noise(&self, image: &Rgb, outliers: f64) -> Result<f64, CompareError> {
+        let errors = relmse_per_pixel(image, &self.image)?;
+        let noise = relmse_of_per_pixel(&self.reference);
+        let mut both: Vec<(f64, f64)> = errors.into_iter().zip(noise).collect();
+        both.sort_by(|a, b| a.0.total_cmp(&b.0));
+        both.truncate(both.len() - (both.len() as f64 * outliers) as usize);
+        Ok(both.iter().map(|(e, n)| e - n).sum::<f64>() / both.len() as f64)
     }
 
     /// What the noise of the reference adds to every relMSE.

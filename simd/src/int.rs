@@ -107,8 +107,13 @@ impl U32x8 {
     /// A float on the grid of 2^-24 in [0, 1 - 2^-24], from the upper 24 bits (NUMERICS SMP-1).
     #[inline(always)]
     pub fn to_unit(self) -> F32x8 {
-        let i: I32x8 = bytemuck::cast(self >> 8);
-        i.to_f32() * (1.0 / 16_777_216.0)
+        (self >> 8).to_i32().to_f32() * (1.0 / 16_777_216.0)
+    }
+
+    /// The same bits as signed numbers.
+    #[inline(always)]
+    pub fn to_i32(self) -> I32x8 {
+        bytemuck::cast(self)
     }
 }
 

@@ -3,26 +3,27 @@
 //!
 //! Every (scene, seed, strategy) is one render with one thread ([`croupier_benches::measure`]). It ends after a wall-clock
 //! time; its cost is the CPU time of its threads, everything inside: setting up, learning, estimating errors. Its error
-//! is relMSE against the scene's reference, without the worst 0.01 % of the pixels, and in a second, robust figure
-//! without the worst 0.1 %: small pictures keep fireflies in the first. relMSE falls as 1 / cost, so that their product
-//! hardly depends on when the render ended, until it comes near the noise of the reference, which every relMSE contains.
-//! That noise has a column; it is subtracted only on demand. Where a few bright samples carry the error, leaving pixels
-//! out flatters the render with fewer samples, which has met fewer of them: compare such rows at equal samples.
+//! is relMSE against the scene's reference, without the worst 0.01 % of the pixels. It has two faults: small pictures keep
+//! fireflies in it, and it contains the noise of the reference, which pulls all ratios to 1 and has a column. So a second
+//! figure, with a star, leaves the worst 0.1 % of the pixels out and subtracts, in those that are left, the variance that
+//! the reference states for itself. relMSE falls as 1 / cost, so that their product hardly depends on when the render
+//! ended. Where a few bright samples carry the error, leaving pixels out flatters the render with fewer samples, which
+//! has met fewer of them: compare such rows at equal samples.
 //!
 //! Figures are medians over the seeds, with the interval of [`Median`]. Speed-ups are ratios of the products of two
 //! strategies with the same seed, then their median; over all scenes, the geometric mean of these ratios per seed, then
 //! its median. Renders of one seed follow each other, in another order for each seed, so that what else the machine does
-//! hits all strategies. A time to an error is read from the errors after the iterations ([`time_to`]).
+//! hits all strategies. A time to an error is read from the errors with a star after the iterations ([`time_to`]).
 //!
 //! `--equal-samples N` renders N samples per pixel and takes rays as the cost: its tables are the same on every machine.
 //!
 //! [`time_to`]: croupier_benches::stats::time_to
 
 use clap::Parser;
-use croupier::Strategy;
-use croupier_benches::measure::{Run, Snapshot, Task, render};
+use croupier_benches::measure::{Run, Snapshot, render};
 use croupier_benches::stats::{Median, coverage, digits, geometric_mean};
 use croupier_benches::subject::Subject;
+use croupier_benches::variant::Variant;
 use croupier_host::render::Target;
 use serde_json::{Value, json};
 use std::error::Error;
@@ -31,13 +32,39 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 const SCENES: [&str; 7] = ["kitchen", "bathroom", "living_room", "pool", "water_caustic", "cbox", "veach_mis"];
-/// Those of them that the core knows.
-const STRATEGIES: [&str; 5] = ["classic", "throughput", "adrrs", "ear", "ears"];
+const STRATEGIES: [&str; 7] = ["classic", "classic:5:relative", "throughput", "adrrs", "ear", "ears", "ears+adaptive"];
+/// With `--all`.
+const ALL: [&str; 26] = [
+    "none",
+    "threshold",
+    "contribution",
+    "throughput",
+    "throughput:luminance",
+    "throughput:mean",
+    "albedo",
+    "albedo:product",
+    "classic",
+    "classic:5:relative",
+    "winners",
+    "bolin-meyer",
+    "adrr",
+    "adrrs",
+    "ear",
+    "ears",
+    "classic+adaptive",
+    "classic+shadow",
+    "adrrs+adaptive",
+    "ears+adaptive",
+    "ears+shadow",
+    "ears+constant",
+    "ears+small",
+    "ears+truth",
+    "fixed:1",
+    "ears+idle",
+];
 const BASELINES: [&str; 2] = ["classic", "adrrs"];
 /// Errors to which times are stated.
 const LEVELS: [f64; 3] = [0.1, 0.03, 0.01];
-/// Errors below this many times the reference's noise are worth a remark.
-const CLEAR_OF_NOISE: f64 = 10.0;
 
 #[derive(Parser)]
 #[command(about = "Table of error times cost of roulette strategies")]
@@ -48,7 +75,8 @@ struct Args {
     /// Only these scenes (any of the folder); several with commas.
     #[arg(long = "scene", value_name = "NAME", value_delimiter = ',', default_values = SCENES)]
     only: Vec<String>,
-    /// Only these strategies (any that `croupier render --rrs` knows, with options); several with commas.
+    /// Only these strategies (any that `croupier render --rrs` knows, with options, and behind a `+` other choices:
+    /// adaptive, shadow, constant, small, truth, idle); several with commas.
     #[arg(long = "strategy", value_name = "NAME", value_delimiter = ',', conflicts_with = "all")]
     strategies: Vec<String>,
     /// Every strategy that needs no options.
@@ -66,12 +94,6 @@ struct Args {
     /// Samples per pixel of each render, instead of a time.
     #[arg(long, value_name = "N", conflicts_with = "seconds", value_parser = clap::value_parser!(u32).range(1..))]
     equal_samples: Option<u32>,
-    /// Subtract the expected share of the reference's noise from every error; what is not above it counts as unknown.
-    #[arg(long)]
-    subtract_noise: bool,
-    /// Tell strategies that learn the true pixels instead of denoised ones: what the denoiser costs.
-    #[arg(long)]
-    truth: bool,
     /// Fewer seeds and seconds.
     #[arg(long)]
     quick: bool,
@@ -96,15 +118,13 @@ impl Args {
         self.equal_samples.map_or(Target::Seconds(self.seconds()), Target::Spp)
     }
 
-    fn strategies(&self) -> Result<Vec<String>, String> {
-        let parse = |s: &str| Strategy::parse(s).map(|_| s.to_string()).map_err(|e| format!("{s}: {e}"));
+    fn strategies(&self) -> Result<Vec<Variant>, String> {
         let names: Vec<&str> = match (self.all, self.strategies.is_empty()) {
-            (false, false) => return self.strategies.iter().map(|s| parse(s)).collect(),
+            (false, false) => self.strategies.iter().map(|s| &**s).collect(),
             (false, true) => STRATEGIES.to_vec(),
-            (true, _) => Strategy::TABLE.iter().map(|t| t.0).collect(),
+            (true, _) => ALL.to_vec(),
         };
-        let left_out = |e: &String| eprintln!("left out: {e}");
-        Ok(names.into_iter().filter_map(|s| parse(s).inspect_err(left_out).ok()).collect())
+        names.into_iter().map(Variant::parse).collect()
     }
 }
 
@@ -117,9 +137,8 @@ struct Group {
 }
 
 impl Group {
-    fn render(subject: &Subject, strategies: &[String], args: &Args) -> Result<Self, String> {
+    fn render(subject: &Subject, strategies: &[Variant], args: &Args) -> Result<Self, String> {
         let (n, seeds) = (strategies.len(), args.seeds() as usize);
-        let noise = if args.subtract_noise { subject.reference_noise() } else { 0.0 };
         let next = AtomicUsize::new(0);
         let work = || -> Result<Vec<(usize, Run)>, String> {
             let mut done = Vec::new();
@@ -130,12 +149,8 @@ impl Group {
                     return Ok(done);
                 }
                 let seed = args.first_seed.wrapping_add(i as u64);
-                let name = format!("{}, {}, seed {seed}", subject.name, strategies[s]);
-                let run = render(
-                    subject,
-                    &Task { strategy: &strategies[s], seed, target: args.target(), noise, truth: args.truth },
-                );
-                let run = run.map_err(|e| format!("{name}: {e}"))?;
+                let name = format!("{}, {}, seed {seed}", subject.name, strategies[s].name);
+                let run = render(subject, &strategies[s], seed, args.target()).map_err(|e| format!("{name}: {e}"))?;
                 let [spp, seconds, error] = [run.spp(), run.end.core_seconds, run.end.error].map(digits);
                 eprintln!("{name}: {spp} spp, {seconds} core-s, relMSE {error}");
                 done.push((s, run));
@@ -183,7 +198,7 @@ impl Product {
 
 struct Report<'a> {
     args: &'a Args,
-    strategies: Vec<String>,
+    strategies: Vec<Variant>,
     groups: Vec<Group>,
 }
 
@@ -193,7 +208,7 @@ impl Report<'_> {
     }
 
     fn baselines(&self) -> [Option<usize>; 2] {
-        BASELINES.map(|b| self.strategies.iter().position(|s| s == b))
+        BASELINES.map(|b| self.strategies.iter().position(|s| s.name == b))
     }
 
     /// Speed-ups over the baselines, with the plain error and with the robust one.
@@ -220,14 +235,13 @@ impl Report<'_> {
             || format!("{} s, one thread", digits(self.args.seconds())),
             |n| format!("{n} samples per pixel"),
         );
-        let noise = if self.args.subtract_noise { "the reference's noise is subtracted" } else { "nothing subtracted" };
         let n = self.args.seeds();
         format!(
             "# Error times cost\n\n\
              Made by `cargo run --release -p croupier-benches --bin efficiency`; what the figures are is said in\n\
-             `benches/src/bin/efficiency.rs`. {n} seeds, {what}; {noise}.\nMedians [intervals] over the seeds: the \
-             chance that the true median lies inside is {:.0} %. A star: without the worst 0.1 % of\nthe pixels, else \
-             without 0.01 %.",
+             `benches/src/bin/efficiency.rs`. {n} seeds, {what}.\nMedians [intervals] over the seeds: the \
+             chance that the true median lies inside is {:.0} %. A star: without the worst 0.1 % of\nthe pixels and \
+             without the reference's noise; else without 0.01 % and with it.",
             100.0 * coverage(n as usize)
         )
     }
@@ -239,15 +253,14 @@ impl Report<'_> {
              over classic | over adrrs | over classic* | over adrrs*"
         } else {
             "strategy | spp | rays/sample | Mrays/s | relMSE | relMSE* | reference noise | relMSE x core-s | \
-             over classic | over adrrs | over classic* | over adrrs* | s to 0.1 | s to 0.03 | s to 0.01"
+             over classic | over adrrs | over classic* | over adrrs* | s to 0.1* | s to 0.03* | s to 0.01*"
         };
         let mut text = format!("\n## {}\n\n{}", g.scene, table_head(columns));
-        let mut noisy = false;
-        for (s, name) in self.strategies.iter().enumerate() {
+        for (s, variant) in self.strategies.iter().enumerate() {
             let middle = |f: &dyn Fn(&Run) -> f64| known(g.median(s, f), |m| digits(m.median));
             let with_interval = |f: &dyn Fn(&Run) -> f64| known(g.median(s, f), |m| m.to_string());
             let product = |r: &Run| self.product(false).of(r);
-            let mut cells = vec![marked(name), middle(&Run::spp), middle(&Run::rays_per_sample)];
+            let mut cells = vec![marked(variant), middle(&Run::spp), middle(&Run::rays_per_sample)];
             if by_rays {
                 cells.extend([
                     with_interval(&|r| r.end.error * r.spp()),
@@ -272,11 +285,6 @@ impl Report<'_> {
                 cells.extend(LEVELS.map(|level| reached(time(level))));
             }
             text += &format!("| {} |\n", cells.join(" | "));
-            noisy |= g.median(s, |r| r.end.error).is_some_and(|m| m.median < CLEAR_OF_NOISE * g.noise);
-        }
-        if noisy && !self.args.subtract_noise {
-            text += "\nSome errors are less than ten times the reference's noise, which they contain: speed-ups are \
-                     pulled to 1, and\nlower errors cannot be reached. See `--subtract-noise`.\n";
         }
         text
     }
@@ -285,8 +293,8 @@ impl Report<'_> {
         let columns = "strategy | over classic | over adrrs | over classic* | over adrrs*";
         let mut text = format!("\n## Geometric mean over the scenes ({})\n\n", self.groups.len());
         text += &table_head(columns);
-        for (s, name) in self.strategies.iter().enumerate() {
-            text += &format!("| {} | {} |\n", marked(name), self.in_all(s).map(speed_up).join(" | "));
+        for (s, variant) in self.strategies.iter().enumerate() {
+            text += &format!("| {} | {} |\n", marked(variant), self.in_all(s).map(speed_up).join(" | "));
         }
         text
     }
@@ -302,16 +310,16 @@ impl Report<'_> {
         };
         let row = |g: &Group, s: usize| {
             let runs = g.runs[s].iter().map(run).collect::<Vec<_>>();
-            json!({ "strategy": self.strategies[s], "over": medians(self.in_scene(g, s)), "runs": runs })
+            json!({ "strategy": self.strategies[s].name, "over": medians(self.in_scene(g, s)), "runs": runs })
         };
         let strategies = 0..self.strategies.len();
         let rows = |g: &Group| strategies.clone().map(|s| row(g, s)).collect::<Vec<_>>();
         let group = |g: &Group| json!({ "scene": g.scene, "reference_noise": g.noise, "strategies": rows(g) });
-        let mean = |s: usize| json!({ "strategy": self.strategies[s], "over": medians(self.in_all(s)) });
+        let mean = |s: usize| json!({ "strategy": self.strategies[s].name, "over": medians(self.in_all(s)) });
         json!({
             "seeds": self.args.seeds(), "coverage": coverage(self.args.seeds() as usize),
             "seconds": self.args.equal_samples.is_none().then(|| self.args.seconds()),
-            "equal_samples": self.args.equal_samples, "subtract_noise": self.args.subtract_noise,
+            "equal_samples": self.args.equal_samples,
             "over": ["classic", "adrrs", "classic, robust", "adrrs, robust"], "levels": LEVELS,
             "scenes": self.groups.iter().map(group).collect::<Vec<_>>(),
             "geometric_means": strategies.clone().map(mean).collect::<Vec<_>>(),
@@ -324,9 +332,8 @@ fn table_head(columns: &str) -> String {
 }
 
 /// A strategy's name. What ends paths for ever is quick, and its relMSE hides that while noise is larger.
-fn marked(strategy: &str) -> String {
-    let biased = Strategy::parse(strategy).is_ok_and(|s| s.is_biased());
-    format!("{strategy}{}", if biased { " (biased)" } else { "" })
+fn marked(variant: &Variant) -> String {
+    format!("{}{}", variant.name, if variant.strategy.is_biased() { " (biased)" } else { "" })
 }
 
 /// A cell of a table; `-` if there is nothing to say.

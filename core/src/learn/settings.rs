@@ -48,6 +48,9 @@ pub struct Learning {
     pub cache_bytes: usize,
     /// Samples in flight per shard that can be learned from.
     pub ledger: u32,
+    /// Camera samples of a pixel that are learned from in every iteration, the first ones. More make statistics better
+    /// where iterations are long, and all of them slower.
+    pub samples: u32,
     /// Samples in a leaf of the octree at which it is divided (EARS: 40,000).
     pub split_count: f32,
     /// Part of the statistics that an iteration hands on to the next, in [0, 1].
@@ -67,6 +70,7 @@ impl Default for Learning {
         Self {
             cache_bytes: 24 << 20,
             ledger: 2048,
+            samples: 16,
             split_count: 10_000.0,
             carry: 0.75,
             estimate: Estimate::Denoised,

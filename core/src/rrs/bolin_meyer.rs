@@ -22,6 +22,6 @@ impl RrsStrategy for BolinMeyer {
     fn factor(&self, v: &Vertices8) -> F32x8 {
         let l = &v.learned;
         let known = l.count.gt(F32x8::ZERO) & l.cost_over_variance.gt(F32x8::ZERO);
-        known.select(ears::split_or_kill(l.efficient(v.beta, l.moment), l.efficient(v.beta, l.variance)), F32x8::ONE)
+        known.select(ears::split_or_kill(l, v.beta), F32x8::ONE)
     }
 }

@@ -11,13 +11,15 @@
 //! | [`TRUST_MOMENT`] | samples of a bin | 256 |
 //! | [`MOST_THROUGHPUT`] | throughput after roulette | 10 |
 
-use super::{Classic, MAX_FACTOR, MIN_FACTOR, RrsStrategy, Space, Vertices8, adrrs};
-use croupier_simd::F32x8;
+use super::{Classic, Learned8, MAX_FACTOR, MIN_FACTOR, RrsStrategy, Space, Vertices8, adrrs};
+use croupier_simd::{F32x8, I32x8, Vec3x8};
 
 /// Samples at which the mean counts half.
 const TRUST_MEAN: f32 = 32.0;
 /// Samples at which the second moment counts half.
 const TRUST_MOMENT: f32 = 256.0;
+/// Bits of 1.
+const ONE: i32 = 0x3F80_0000;
 /// Throughput (times albedo) that roulette may lead to.
 const MOST_THROUGHPUT: f32 = 10.0;
 
@@ -44,9 +46,23 @@ pub(super) fn parse_plain(options: &str) -> Option<bool> {
 
 /// Eq. 27, robust where moment and variance disagree: roulette by the moment, splitting by the variance, else neither.
 #[inline(always)]
-pub(super) fn split_or_kill(by_moment: F32x8, by_variance: F32x8) -> F32x8 {
+pub(super) fn split_or_kill(l: &Learned8, beta: Vec3x8) -> F32x8 {
     let one = F32x8::ONE;
-    by_moment.le(one).select(by_moment, by_variance.max(one))
+    let (kill, split) = (l.efficient_square(beta, l.moment), l.efficient_square(beta, l.variance));
+    kill.le(one).select(kill, split.max(one)).sqrt()
+}
+
+/// Steps of a float from 1 to a factor: 2^23 times its logarithm to base 2, linear between powers of 2. Means of levels are
+/// geometric means within 6 %, exact at both ends, and take no logarithm.
+#[inline(always)]
+fn level(s: F32x8) -> F32x8 {
+    (s.clamp(MIN_FACTOR, MAX_FACTOR).to_bits().to_i32() - I32x8::splat(ONE)).to_f32()
+}
+
+/// The factor of a [`level`].
+#[inline(always)]
+fn from_level(level: F32x8) -> F32x8 {
+    F32x8::from_bits((level.to_i32() + I32x8::splat(ONE)).to_u32())
 }
 
 /// `s` where much is known, simpler rules where less is.
@@ -58,11 +74,10 @@ pub(super) fn grown(v: &Vertices8, s: F32x8, plain: bool) -> F32x8 {
     if plain {
         return known.select(s, classic);
     }
-    let log = |x: F32x8| x.clamp(MIN_FACTOR, MAX_FACTOR).ln();
     let blend = |a: F32x8, b: F32x8, t: F32x8| a + (b - a) * t;
     let window = adrrs::window(l.contribution(v.beta));
-    let learned = blend(log(window), log(s), l.trust(TRUST_MOMENT));
-    let s = known.select(blend(log(classic), learned, l.trust(TRUST_MEAN)).exp(), classic);
+    let learned = blend(level(window), level(s), l.trust(TRUST_MOMENT));
+    let s = known.select(from_level(blend(level(classic), learned, l.trust(TRUST_MEAN))), classic);
     // what is killed out of ignorance comes back as a few samples of enormous weight: no factor below 1 brings the
     // throughput over the limit
     s.max(((v.beta * v.albedo).max_component() / MOST_THROUGHPUT).min(F32x8::ONE))
@@ -74,8 +89,6 @@ impl RrsStrategy for Ears {
 
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
-        let l = &v.learned;
-        let s = split_or_kill(l.efficient(v.beta, l.moment), l.efficient(v.beta, l.variance));
-        grown(v, s, self.plain)
+        grown(v, split_or_kill(&v.learned, v.beta), self.plain)
     }
 }

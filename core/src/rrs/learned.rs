@@ -79,11 +79,12 @@ impl Learned8 {
         count: F32x8::ZERO,
     };
 
-    /// The factor that is best for samples whose square is expected to be `r`: eq. 32 for prefix weight `beta`.
+    /// The square of the factor that is best for samples whose square is expected to be `r`: eq. 32 for prefix weight
+    /// `beta`.
     #[inline(always)]
-    pub fn efficient(&self, beta: Vec3x8, r: Vec3x8) -> F32x8 {
+    pub fn efficient_square(&self, beta: Vec3x8, r: Vec3x8) -> F32x8 {
         let error = self.norm.of(beta * beta * self.importance * r);
-        (error * self.cost_over_variance / self.cost).sqrt()
+        error * self.cost_over_variance / self.cost
     }
 
     /// The expected contribution of a vertex in units of its pixel, mean over the channels.

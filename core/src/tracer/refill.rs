@@ -90,7 +90,7 @@ impl Shard<'_> {
             pixel[lanes] = film;
             sample[lanes] = first_sample.wrapping_add(s);
             root[lanes] = r;
-            if self.ledger.is_on() {
+            if self.ledger.is_on() && s < settings.learning.samples {
                 ledger[lanes] = self.ledger.open(NO_RECORD);
                 self.counters.ledger_full += u64::from(ledger[lanes] == NO_RECORD);
             }

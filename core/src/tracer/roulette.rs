@@ -1,6 +1,7 @@
 //! Stage `roulette`: how many samples each arrived vertex gets. The masks n = 0 (the path ends) and n >= 1 (it waits with
 //! n samples) are the packet's roulette masks; one comb rounds the whole packet.
 
+use super::ledger::NO_RECORD;
 use super::place::{Place8, place};
 use super::settle::Found8;
 use super::shard::Shard;
@@ -151,6 +152,7 @@ impl Shard<'_> {
 
     /// Tells the samples that led here where the vertex's samples are logged and what they count.
     fn record_places(&mut self, active: Mask8, v: &Vertex8, place: &Place8, inner: Vec3x8) {
+        let active = active.and_not(v.ledger.eq(U32x8::splat(NO_RECORD)));
         let (ledger, bin) = (v.ledger.to_array(), place.bin.to_array());
         for i in active.lanes() {
             self.ledger.arrive(ledger[i], bin[i], place.scale.lane(i), inner.lane(i));

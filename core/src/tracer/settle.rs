@@ -1,7 +1,7 @@
 //! Stage `settle`: radiance goes to its root and its ledger record, finished samples to the statistics, finished roots to the
 //! film.
 
-use super::ledger::NO_BIN;
+use super::ledger::{NO_BIN, NO_RECORD};
 use super::shard::Shard;
 use crate::film::REL_MSE_EPSILON;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -35,11 +35,12 @@ impl Shard<'_> {
         for i in mask.and_not(good).lanes() {
             self.count_non_finite(root[i]);
         }
-        if self.ledger.is_on() {
+        let logged = mask.and_not(ledger.eq(U32x8::splat(NO_RECORD)));
+        if logged.any() {
             let x = found.local * self.tamed(good, radiance, U32x8::new(root));
             let (r, g, b) = (x.x.to_array(), x.y.to_array(), x.z.to_array());
             let ledger = ledger.to_array();
-            for i in good.lanes() {
+            for i in (good & logged).lanes() {
                 self.ledger.gather(ledger[i], [r[i], g[i], b[i]]);
             }
             for i in mask.and_not(good).lanes() {
@@ -77,9 +78,10 @@ impl Shard<'_> {
         for i in mask.lanes() {
             self.roots.get(root[i]).rays += 1;
         }
-        if self.ledger.is_on() {
+        let logged = mask.and_not(ledger.eq(U32x8::splat(NO_RECORD)));
+        if logged.any() {
             let ledger = ledger.to_array();
-            for i in mask.lanes() {
+            for i in logged.lanes() {
                 self.ledger.charge(ledger[i], cost);
             }
         }

@@ -74,26 +74,29 @@ pub fn relmse(image: &Rgb, reference: &Rgb, keep_outliers: bool) -> Result<Pixel
 
 /// [`relmse`] with another part of the pixels left out, in [0, 1): the more, the less a few fireflies count.
 pub fn relmse_without(image: &Rgb, reference: &Rgb, outliers: f64) -> Result<PixelError, CompareError> {
-    mean_error(image, reference, outliers, |x, r| (x - r) * (x - r) / (r * r + RELMSE_EPSILON))
+    mean_error(image, relmse_per_pixel(image, reference)?, outliers)
 }
 
 /// MSE: the mean over all pixels and channels of (x - ref)².
 pub fn mse(image: &Rgb, reference: &Rgb) -> Result<PixelError, CompareError> {
-    mean_error(image, reference, 0.0, |x, r| (x - r) * (x - r))
+    mean_error(image, per_pixel(image, reference, |x, r| (x - r) * (x - r))?, 0.0)
 }
 
-fn mean_error(
-    image: &Rgb,
-    reference: &Rgb,
-    outliers: f64,
-    error: impl Fn(f64, f64) -> f64,
-) -> Result<PixelError, CompareError> {
+/// What every pixel adds to relMSE, mean over its channels; infinite where the image is not finite.
+pub fn relmse_per_pixel(image: &Rgb, reference: &Rgb) -> Result<Vec<f64>, CompareError> {
+    per_pixel(image, reference, |x, r| (x - r) * (x - r) / (r * r + RELMSE_EPSILON))
+}
+
+fn per_pixel(image: &Rgb, reference: &Rgb, error: impl Fn(f64, f64) -> f64) -> Result<Vec<f64>, CompareError> {
     same_size(image, reference)?;
     let of_pixel = |(x, r): (&[f32; 3], &[f32; 3])| {
         let e: f64 = x.iter().zip(r).map(|(&x, &r)| error(f64::from(x), f64::from(r))).sum();
         if e.is_finite() { e / 3.0 } else { f64::INFINITY }
     };
-    let mut errors: Vec<f64> = image.pixels.iter().zip(&reference.pixels).map(of_pixel).collect();
+    Ok(image.pixels.iter().zip(&reference.pixels).map(of_pixel).collect())
+}
+
+fn mean_error(image: &Rgb, mut errors: Vec<f64>, outliers: f64) -> Result<PixelError, CompareError> {
     let nonfinite = image.pixels.iter().filter(|p| p.iter().any(|x| !x.is_finite())).count();
     let discarded = (errors.len() as f64 * outliers) as usize;
     errors.sort_by(f64::total_cmp);
@@ -294,9 +297,14 @@ pub fn compare(inputs: &Inputs<'_>, options: &CompareOptions) -> Result<Comparis
 
 /// Expected relMSE of an estimate against the truth, from its variance, over all pixels.
 pub fn relmse_of(estimate: &Estimate) -> f64 {
-    let per_pixel =
+    mean(&relmse_of_per_pixel(estimate))
+}
+
+/// What the noise of every pixel adds to [`relmse_of`].
+pub fn relmse_of_per_pixel(estimate: &Estimate) -> Vec<f64> {
+    let of_pixel =
         |(m, v): (&[f64; 3], &[f64; 3])| m.iter().zip(v).map(|(m, v)| v / (m * m + RELMSE_EPSILON)).sum::<f64>() / 3.0;
-    mean(&estimate.mean.iter().zip(&estimate.variance).map(per_pixel).collect::<Vec<_>>())
+    estimate.mean.iter().zip(&estimate.variance).map(of_pixel).collect()
 }
 
 fn same_size(a: &Rgb, b: &Rgb) -> Result<(), CompareError> {

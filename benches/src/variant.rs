@@ -1,0 +1,67 @@
+//! What a row of a table renders with: a roulette strategy, and perhaps other choices.
+
+use croupier::learn::{Constant, Estimate, Learning};
+use croupier::{Settings, Strategy};
+
+/// Other choices by name, and what they are.
+pub const MODIFIERS: &[(&str, &str)] = &[
+    ("adaptive", "adaptive sampling"),
+    ("shadow", "roulette of shadow rays"),
+    ("constant", "the cached mean stands in for what roulette skips"),
+    ("small", "one shard, and less than 256 KiB for all that is learned"),
+    ("truth", "strategies that learn are told the true pixels instead of denoised ones"),
+    ("idle", "learned factors are all 1: what learning costs where paths are as with `fixed:1`"),
+];
+
+/// A strategy and choices, written `ears`, `ears+adaptive`, `ears+small+truth`.
+#[derive(Clone, Debug)]
+pub struct Variant {
+    /// As it was written.
+    pub name: String,
+    /// Roulette strategy.
+    pub strategy: Strategy,
+    modifiers: Vec<&'static str>,
+}
+
+impl Variant {
+    /// Reads a name; an error says what is wrong with it.
+    pub fn parse(name: &str) -> Result<Self, String> {
+        let mut parts = name.split('+');
+        let strategy = Strategy::parse(parts.next().unwrap_or("")).map_err(|e| format!("{name}: {e}"))?;
+        let known = |text: &str| {
+            let found = MODIFIERS.iter().find(|m| m.0 == text);
+            found.map(|m| m.0).ok_or_else(|| {
+                let all: Vec<_> = MODIFIERS.iter().map(|m| m.0).collect();
+                format!("{name}: no '{text}'; there are: {}", all.join(", "))
+            })
+        };
+        Ok(Self { name: name.into(), strategy, modifiers: parts.map(known).collect::<Result<_, _>>()? })
+    }
+
+    fn has(&self, modifier: &str) -> bool {
+        self.modifiers.contains(&modifier)
+    }
+
+    /// Is the true picture told?
+    pub fn truth(&self) -> bool {
+        self.has("truth")
+    }
+
+    /// The settings with these choices.
+    pub fn apply(&self, mut s: Settings) -> Settings {
+        s.strategy = self.strategy;
+        s.adaptive |= self.has("adaptive");
+        s.shadow_roulette |= self.has("shadow");
+        if self.has("constant") {
+            s.constant = Constant::Cached;
+        }
+        if self.has("idle") {
+            s.learning.factors = [1.0, 1.0];
+        }
+        if self.has("small") {
+            s.shards = 1;
+            s.learning = Learning { cache_bytes: 192 << 10, ledger: 256, estimate: Estimate::Blocks, ..s.learning };
+        }
+        s
+    }
+}
