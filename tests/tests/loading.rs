@@ -56,6 +56,17 @@ fn obj_dialects() {
     assert!(bake(&scene, &BakeOptions::default(), |_, _| {}).is_ok());
 }
 
+/// A last line that ends in a backslash counts all the same, as a face and as an error. Killed by: joined lines that are read
+/// when the next one comes.
+#[test]
+fn the_last_line_may_promise_another() {
+    let (scene, _) = load_obj(&format!("{}\\", TRIANGLE.trim_end()), "newmtl m\nKd 1 0 0 \\");
+    assert_eq!((scene.triangles.len(), scene.materials.len()), (1, 1));
+    let folder = folder(&[("a.obj", "v 0 0 0\nv 1 \\\n2 \\")]);
+    let error = load(&folder.path().join("a.obj")).unwrap_err().to_string();
+    assert!(error.contains("a.obj:3: `v` needs 3 numbers"), "{error}");
+}
+
 const TRIANGLE: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n";
 
 /// The table of `load/mtl.rs`, row by row. Killed by: swapping any two rows; alpha without the square.

@@ -223,6 +223,8 @@ fn prepare(path: &Path, text: &str) -> Result<Prepared, LoadError> {
             joined.clear();
         }
     }
+    // a last line that promises another
+    checker.check(&joined)?;
     Ok(checker.out)
 }
 
