@@ -105,7 +105,9 @@ pub struct Progress {
     pub rays: u64,
     /// Wall-clock seconds so far.
     pub seconds: f64,
-    /// Estimated relMSE of the image so far, as soon as there are two iterations to compare.
+    /// Estimated relMSE of the picture after the last finished iteration ([`croupier::ErrorEstimate::rel_mse`]): the samples
+    /// of the iteration under way are not in it. `None` while the first is under way. Where a pixel has a single sample, its
+    /// square stands in for its squared error, so that after an iteration of one sample the estimate is far too large.
     pub relmse_estimate: Option<f64>,
 }
 
