@@ -133,9 +133,9 @@ pub struct RenderStats {
     pub seconds: f64,
     /// 1e-6 rays / second.
     pub mrays_per_s: f64,
-    /// Estimated relMSE of the whole image.
+    /// Estimated relMSE of the whole image; `None` below two samples per pixel.
     pub relmse_estimate: Option<f64>,
-    /// Its 95 % interval.
+    /// Its 95 % interval. See [`croupier::ErrorEstimate`] for what both mean with roulette and splitting.
     pub relmse_interval: Option<[f64; 2]>,
     /// Part of the eight lanes that did work, by stage.
     pub lane_utilisation: BTreeMap<&'static str, f64>,
