@@ -2,6 +2,7 @@
 
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::description::*;
+use croupier_host::image::Picture;
 use croupier_host::load::{LoadReport, load};
 use std::fs;
 use std::path::Path;
@@ -227,6 +228,30 @@ fn scene_json_is_read_whole() {
     assert_eq!(report.files.len(), 3);
 }
 
+/// An environment map is what every reader of pictures here takes for the picture: the unnamed layer, or the first with
+/// channels R, G, B. Killed by: a decoder of its own that takes the first layer, one that wants no others.
+#[test]
+fn environment_maps_are_pictures() {
+    let read = |layers: &[(&str, f32)]| {
+        let folder = folder(&[
+            ("scene.json", &scene_json(M, r#", "emitters": [{"type": "envmap", "file": "e.exr"}]"#)),
+            ("a.obj", TRIANGLE),
+        ]);
+        let mut picture = Picture::new(2, 2);
+        picture.add1("depth", "Z", &[7.0; 4]);
+        layers.iter().for_each(|(name, x)| picture.add3(name, ["R", "G", "B"], &[[*x; 3]; 4]));
+        picture.write_exr(&folder.path().join("e.exr")).unwrap();
+        load(folder.path()).map(|(scene, _)| match scene.environment {
+            Some(Environment::Map { texels, .. }) => texels[3],
+            other => panic!("{other:?}"),
+        })
+    };
+    assert_eq!(read(&[("albedo", 1.0), ("", 2.0)]).unwrap(), [2.0; 3]);
+    assert_eq!(read(&[("sky", 3.0)]).unwrap(), [3.0; 3]);
+    let error = read(&[]).unwrap_err().to_string();
+    assert!(error.contains("e.exr") && error.contains("no layer with channels R, G and B"), "{error}");
+}
+
 /// One thing wrong at a time: files, where to load from, and what the message must hold.
 /// Killed by: any check left to `tobj` (it states no line), or left out.
 #[test]
@@ -316,7 +341,7 @@ fn every_wrong_input_is_told_where() {
         (
             scene(json(M, ", \"emitters\": [{\"type\": \"envmap\", \"file\": \"a.obj\"}]")),
             "",
-            &["cannot use the image", "a.obj", "not a readable RGB EXR"],
+            &["cannot use the image", "a.obj", "not a readable EXR"],
         ),
         (
             scene(json(

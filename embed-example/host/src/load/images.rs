@@ -1,6 +1,7 @@
 //! Decoders: PNG textures, EXR environment maps. Errors are texts; the caller knows the file.
 
 use crate::description::{Environment, Texture};
+use crate::image::{Picture, Rgb};
 use png::{BitDepth, ColorType, Transformations};
 use std::io::Cursor;
 
@@ -30,29 +31,11 @@ pub(super) fn png(bytes: &[u8]) -> Result<Texture, String> {
     Ok(Texture { name: String::new(), width: info.width, height: info.height, texels })
 }
 
-/// The first RGB(A) layer of an EXR as an unscaled, unrotated environment map, and how many negative or NaN numbers
-/// (filters leave them behind) became 0.
-pub(super) fn exr(bytes: Vec<u8>) -> Result<(Environment, usize), String> {
-    use exr::prelude::{ReadChannels, ReadLayers, Vec2, read};
-    struct Pixels {
-        width: usize,
-        texels: Vec<[f32; 3]>,
-    }
-    let image = read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .rgba_channels(
-            |size: Vec2<usize>, _: &_| Pixels { width: size.width(), texels: vec![[0.0; 3]; size.area()] },
-            |p: &mut Pixels, at: Vec2<usize>, (r, g, b, _): (f32, f32, f32, f32)| {
-                p.texels[at.y() * p.width + at.x()] = [r, g, b];
-            },
-        )
-        .first_valid_layer()
-        .all_attributes()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(|e| format!("not a readable RGB EXR: {e}"))?;
-    let size = image.layer_data.size;
-    let mut texels = image.layer_data.channel_data.pixels.texels;
+/// The RGB picture of an EXR as an unscaled, unrotated environment map, and how many negative or NaN numbers (filters leave
+/// them behind) became 0.
+pub(super) fn exr(bytes: &[u8]) -> Result<(Environment, usize), String> {
+    let picture = Picture::decode_exr(Cursor::new(bytes)).map_err(|e| format!("not a readable EXR: {e}"))?;
+    let Rgb { width, height, pixels: mut texels } = picture.main().ok_or("no layer with channels R, G and B")?;
     let mut clamped = 0;
     for x in texels.iter_mut().flatten() {
         if x.is_nan() || *x < 0.0 {
@@ -60,7 +43,7 @@ pub(super) fn exr(bytes: Vec<u8>) -> Result<(Environment, usize), String> {
             clamped += 1;
         }
     }
-    let (width, height) = (size.width() as u32, size.height() as u32);
+    let (width, height) = (width as u32, height as u32);
     if height < 2 {
         return Err(format!("an environment map of {width} x {height} pixels needs 2 rows"));
     }

@@ -95,7 +95,7 @@ impl Loader {
     /// The environment map in `path`, unscaled and unrotated.
     fn environment(&mut self, path: &Path, referrer: &Path) -> Result<Environment, LoadError> {
         let bytes = self.read(path, Some(referrer))?;
-        let (map, clamped) = images::exr(bytes).map_err(|what| LoadError::image(path, referrer, what))?;
+        let (map, clamped) = images::exr(&bytes).map_err(|what| LoadError::image(path, referrer, what))?;
         if clamped > 0 {
             self.note(format!("{}: {clamped} negative or NaN numbers were taken as 0", path.display()));
         }
