@@ -121,6 +121,11 @@ pub struct Film<'m> {
 }
 
 /// relMSE that the picture is estimated to have against its own expectation.
+///
+/// It takes camera samples as independent. They are without roulette, and nearly with strategies that begin it late
+/// (`classic`). Where roulette or splitting meets every path, one comb rounds the samples of a packet together, which makes
+/// the picture better than that: estimate and interval are then those of an upper bound. In a diffuse box, `ears` states
+/// 1.15 times the true relMSE, `fixed:3.3` 1.35 times, `classic:1` 2.3 times.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ErrorEstimate {
     /// Mean over pixels and channels of variance / (mean^2 + 0.01), without the worst 0.01 % of pixels.

@@ -4,7 +4,7 @@ use crate::accel::Intersector;
 use crate::film::{Film, PixelSums};
 use crate::learn::cache::Cache;
 use crate::learn::{Knowledge, PictureStatistics};
-use crate::light::PowerSelector;
+use crate::light::{LightSelector, PowerSelector};
 use crate::memory::{Carver, MemoryError};
 use crate::profile::Profile;
 use crate::scene::{Effects, Scene};
@@ -94,13 +94,13 @@ pub enum Phase {
     Learned,
 }
 
-/// The shared side of a render: scene, intersector and film.
+/// The shared side of a render: scene, intersector, light choice and film.
 #[derive(Debug)]
-pub struct Session<'s, 'm, P: Profile, I: Intersector> {
+pub struct Session<'s, 'm, P: Profile, I: Intersector, L: LightSelector = PowerSelector<'s>> {
     scene: Scene<'s>,
     plan: Plan,
     intersector: I,
-    selector: PowerSelector<'s>,
+    selector: L,
     film: Film<'m>,
     counters: Counters,
     knowledge: Knowledge<'m>,
@@ -111,8 +111,21 @@ pub struct Session<'s, 'm, P: Profile, I: Intersector> {
 }
 
 impl<'s, 'm, P: Profile, I: Intersector> Session<'s, 'm, P, I> {
-    /// Carves the shared block of at least `plan.session()`.
+    /// Carves the shared block of at least `plan.session()`. Lights are chosen by power.
     pub fn new(scene: Scene<'s>, intersector: I, plan: &Plan, block: &'m mut [u8]) -> Result<Self, SessionError> {
+        Self::with_selector(scene, intersector, PowerSelector(scene), plan, block)
+    }
+}
+
+impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I, L> {
+    /// [`Session::new`] with another choice of lights.
+    pub fn with_selector(
+        scene: Scene<'s>,
+        intersector: I,
+        selector: L,
+        plan: &Plan,
+        block: &'m mut [u8],
+    ) -> Result<Self, SessionError> {
         if !P::EFFECTS.contains(scene.effects) {
             return Err(SessionError::Profile { missing: Effects(scene.effects.0 & !P::EFFECTS.0) });
         }
@@ -123,7 +136,7 @@ impl<'s, 'm, P: Profile, I: Intersector> Session<'s, 'm, P, I> {
             scene,
             plan: *plan,
             intersector,
-            selector: PowerSelector(scene),
+            selector,
             film: Film {
                 size: s.size,
                 pixels: c.take(pixels).map_err(SessionError::Memory)?,
@@ -272,7 +285,7 @@ impl<'s, 'm, P: Profile, I: Intersector> Session<'s, 'm, P, I> {
         &self.intersector
     }
 
-    pub(crate) fn selector(&self) -> &PowerSelector<'s> {
+    pub(crate) fn selector(&self) -> &L {
         &self.selector
     }
 

@@ -2,6 +2,7 @@
 
 use crate::stats::SplitMix;
 use bytemuck::{Pod, Zeroable};
+use croupier::learn::Objective;
 use croupier::learn::cache::{Cache, CacheSize, Local8, Training};
 use croupier::scene::blob::content_hash;
 use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -38,7 +39,8 @@ impl Blocks {
 
     /// Carves all of it; the bounds are `lo` to `hi`.
     pub fn carve(&mut self, lo: [f32; 3], hi: [f32; 3]) -> (Cache<'_>, Vec<Training<'_>>) {
-        let cache = Cache::new(self.size, lo, hi, bytemuck::cast_slice_mut(&mut self.shared)).unwrap();
+        let block = bytemuck::cast_slice_mut(&mut self.shared);
+        let cache = Cache::new(self.size, [lo, hi], Objective::Relative, block).unwrap();
         let training = |b| Training::new(self.size, bytemuck::cast_slice_mut(b)).unwrap();
         (cache, self.shards.iter_mut().map(|b: &mut Vec<Line>| training(b)).collect())
     }

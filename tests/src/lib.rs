@@ -7,7 +7,6 @@ pub mod geometry;
 pub mod jacobian;
 pub mod light_oracle;
 pub mod light_scene;
-pub mod light_stats;
 pub mod math;
 pub mod minimum;
 pub mod quadrature;

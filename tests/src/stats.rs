@@ -21,6 +21,11 @@ impl SplitMix {
         z ^ (z >> 31)
     }
 
+    /// 32 random bits.
+    pub fn word(&mut self) -> u32 {
+        (self.bits() >> 32) as u32
+    }
+
     /// Uniform in [0, 1) on the grid of 2^-53.
     pub fn f64(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
@@ -172,6 +177,28 @@ pub fn chi_square(observed: &[u64], expected: &[f64], pool_below: f64) -> ChiSqu
         (false, _) => chi_square_tail(statistic, dof),
     };
     ChiSquare { statistic, dof, p }
+}
+
+/// P of counts this far from expected ones. Cells are pooled with those that follow until each expects at least 5: where
+/// most expect few and neighbours are alike, that tells more than [`chi_square`]'s one pool.
+///
+/// # Panics
+/// If a cell that expects nothing has a count, or the sums differ by more than 1e-3 of the total.
+pub fn chi_square_in_order(observed: &[u64], expected: &[f64]) -> f64 {
+    assert_eq!(observed.len(), expected.len());
+    let (total, sum) = (observed.iter().sum::<u64>() as f64, expected.iter().sum::<f64>());
+    assert!((total - sum).abs() <= 1e-3 * total, "{total} samples, {sum} expected");
+    let (mut statistic, mut cells, mut o, mut e) = (0.0, 0usize, 0.0, 0.0);
+    for (count, want) in observed.iter().zip(expected) {
+        assert!(*want > 0.0 || *count == 0, "{count} samples where none can be");
+        (o, e) = (o + *count as f64, e + want);
+        if e >= 5.0 {
+            statistic += (o - e) * (o - e) / e;
+            (o, e, cells) = (0.0, 0.0, cells + 1);
+        }
+    }
+    let rest = if e > 0.0 { (o - e) * (o - e) / e.max(1.0) } else { 0.0 };
+    chi_square_tail(statistic + rest, cells.max(2) - 1)
 }
 
 /// Mean and standard error of the mean.

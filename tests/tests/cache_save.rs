@@ -1,5 +1,6 @@
 //! The statistics cache as bytes: round trips, merging, and what happens to bytes that are wrong.
 
+use croupier::learn::Objective;
 use croupier::learn::cache::CacheError;
 use croupier_tests::cache::*;
 use croupier_tests::stats::SplitMix;
@@ -127,6 +128,11 @@ fn damage_is_named() {
     assert!(matches!(try_load(&|b| b[24..28].fill(0xff), true), CacheError::Length { .. }));
     assert!(matches!(try_load(&|b| b[32] ^= 1, true), CacheError::Bounds { index: 1, .. }));
     assert!(matches!(try_load(&|b| b[40] ^= 1, true), CacheError::Bounds { index: 3, .. }));
+    for (found, said) in [(2, "the objective absolute, need relative"), (0, "an unknown objective, 0, need relative")] {
+        let e = try_load(&|b| b[44] = found, true);
+        assert_eq!(e, CacheError::Objective { expected: Objective::Relative, found: found.into() });
+        assert!(format!("{e}").ends_with(said), "{e}");
+    }
     assert!(matches!(try_load(&|b| b[65] = 2, true), CacheError::Node { index: 1, found: 2, depth: 1 }));
     assert!(matches!(try_load(&|b| b[64] = 0, true), CacheError::Shape { .. }));
     // as many bytes as before, all inner: too deep

@@ -4,7 +4,7 @@ use croupier::camera::{concentric_disk, generate};
 use croupier::scene::blob::Camera;
 use croupier::simd::F32x8;
 use croupier_tests::light_oracle::{cross, dot, length, sub, unit, wide};
-use croupier_tests::light_stats::{Rng, chi_square};
+use croupier_tests::stats::{SplitMix, chi_square_in_order};
 
 const SIZE: [u32; 2] = [320, 180];
 
@@ -37,12 +37,12 @@ fn axes(c: &Camera) -> [[f64; 3]; 3] {
 fn pixels_map_to_the_image_plane() {
     let (c, [forward, right, down]) = camera(44.0, 0.0, 0.0);
     let half = 22f64.to_radians().tan();
-    let mut rng = Rng(3);
+    let mut rng = SplitMix(3);
     for size in [SIZE, [640, 360], [180, 320], [1, 1], [4096, 16]] {
         let [w, h] = size.map(f64::from);
         for _ in 0..2000 {
-            let x = F32x8::from_fn(|i| (rng.unit() * w) as f32 * f32::from(u8::from(i != 0)));
-            let y = F32x8::from_fn(|i| (rng.unit() * h) as f32 * f32::from(u8::from(i != 1)));
+            let x = F32x8::from_fn(|i| (rng.f64() * w) as f32 * f32::from(u8::from(i != 0)));
+            let y = F32x8::from_fn(|i| (rng.f64() * h) as f32 * f32::from(u8::from(i != 1)));
             let (o, d) = generate(&c, size, x, y, [F32x8::splat(f32::NAN); 2]);
             for i in 0..8 {
                 let d = wide(d.lane(i));
@@ -65,14 +65,14 @@ fn pixels_map_to_the_image_plane() {
 #[test]
 fn lens_rays_meet_in_the_plane_in_focus() {
     let (pinhole, _) = camera(60.0, 0.0, 0.0);
-    let mut rng = Rng(4);
+    let mut rng = SplitMix(4);
     for (radius, focus) in [(0.05f32, 3.0f32), (0.5, 1.5), (0.01, 80.0)] {
         let (c, _) = camera(60.0, radius, focus);
         let [forward, right, down] = axes(&c);
         for _ in 0..2000 {
-            let x = F32x8::splat((rng.unit() * 320.0) as f32);
-            let y = F32x8::splat((rng.unit() * 180.0) as f32);
-            let u = [F32x8::from_fn(|_| rng.unit() as f32), F32x8::from_fn(|_| rng.unit() as f32)];
+            let x = F32x8::splat((rng.f64() * 320.0) as f32);
+            let y = F32x8::splat((rng.f64() * 180.0) as f32);
+            let u = [F32x8::from_fn(|_| rng.f64() as f32), F32x8::from_fn(|_| rng.f64() as f32)];
             let (po, pd) = generate(&pinhole, SIZE, x, y, u);
             let (o, d) = generate(&c, SIZE, x, y, u);
             let meet = |o: [f32; 3], d: [f32; 3]| {
@@ -99,9 +99,9 @@ fn lens_rays_meet_in_the_plane_in_focus() {
 fn lens_samples_are_uniform() {
     let (rings, sectors, n) = (8usize, 16usize, 400_000u64);
     let mut counts = vec![0u64; rings * sectors];
-    let mut rng = Rng(5);
+    let mut rng = SplitMix(5);
     for _ in 0..n / 8 {
-        let u = [F32x8::from_fn(|_| rng.unit() as f32), F32x8::from_fn(|_| rng.unit() as f32)];
+        let u = [F32x8::from_fn(|_| rng.f64() as f32), F32x8::from_fn(|_| rng.f64() as f32)];
         let [a, b] = concentric_disk(u);
         for i in 0..8 {
             let (a, b) = (f64::from(a.lane(i)), f64::from(b.lane(i)));
@@ -110,7 +110,7 @@ fn lens_samples_are_uniform() {
             counts[ring * sectors + ((turn * sectors as f64) as usize).min(sectors - 1)] += 1;
         }
     }
-    let p = chi_square(&counts, &vec![n as f64 / (rings * sectors) as f64; rings * sectors]);
+    let p = chi_square_in_order(&counts, &vec![n as f64 / (rings * sectors) as f64; rings * sectors]);
     println!("p = {p:.3}");
     assert!(p > 1e-6, "p = {p}");
 }

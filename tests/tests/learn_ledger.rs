@@ -71,7 +71,8 @@ fn both(description: &SceneDescription, max_depth: u32, iterations: &[u32]) -> B
     let size = CacheSize::within(s.learning.cache_bytes, 1).unwrap();
     assert_eq!(size.leaves(), 4);
     let mut block = AlignedBytes::zeroed(Cache::layout(size).unwrap().size);
-    let cache = Cache::new(size, scene.info.bounds_min, scene.info.bounds_max, block.as_mut()).unwrap();
+    let bounds = [scene.info.bounds_min, scene.info.bounds_max];
+    let cache = Cache::new(size, bounds, s.learning.objective, block.as_mut()).unwrap();
     let mut replay = Replay {
         scene,
         bvh: WideBvh::new(&scene),

@@ -4,6 +4,7 @@
 use croupier::film::{PixelAov, PixelStats};
 use croupier::learn::cache::{BIN_LIMIT, CacheError, CacheSize};
 use croupier::learn::{Constant, Estimate, Learning, Objective};
+use croupier::rrs::Norm;
 use croupier::{Plan, Settings, SettingsError, Strategy};
 use croupier_host::description::*;
 use croupier_tests::cache::{Oracle, overwrite};
@@ -140,6 +141,25 @@ fn statistics_of_another_scene_are_refused() {
         })
     };
     assert!(run(true).bits() == run(false).bits());
+}
+
+/// Values of first vertices are in units of their pixel or not, as the objective wants: statistics say which, and a session
+/// with the other refuses them. What else differs is no reason to. Killed by: a cache that is told a fixed objective.
+#[test]
+fn statistics_of_another_objective_are_refused() {
+    let scene = blob(&cornell([16, 16]));
+    let relative = learns(&scene, "ears", 5);
+    let of = |objective| Settings { learning: Learning { objective, ..relative.learning }, ..relative };
+    let absolute = of(Objective::Absolute);
+    let norm = Settings { learning: Learning { norm: Norm::Max, ..absolute.learning }, max_depth: 3, ..absolute };
+    for (from, to, fits) in [(relative, absolute, false), (absolute, relative, false), (absolute, norm, true)] {
+        let bytes = taught(&scene, &from, &[8]);
+        learning(&scene, &to, &[1], IN_ORDER, &mut |_, l: &mut dyn Learned| {
+            let refused =
+                CacheError::Objective { expected: to.learning.objective, found: from.learning.objective as u32 };
+            assert_eq!(l.load(&bytes), if fits { Ok(()) } else { Err(refused) });
+        });
+    }
 }
 
 /// Statistics over the picture are of no use to another session: they are not offered. Killed by: bytes that say they are a

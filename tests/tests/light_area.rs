@@ -6,20 +6,20 @@ use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_tests::light_oracle as oracle;
 use croupier_tests::light_oracle::{cross, dot, length, sub, unit, wide};
 use croupier_tests::light_scene::LightScene;
-use croupier_tests::light_stats::{Rng, chi_square};
+use croupier_tests::stats::{SplitMix, chi_square_in_order};
 
 const UP: Vec3x8 = Vec3x8::splat(0.0, 1.0, 0.0);
 
-fn words(rng: &mut Rng) -> [U32x8; 4] {
+fn words(rng: &mut SplitMix) -> [U32x8; 4] {
     std::array::from_fn(|_| U32x8::from_fn(|_| rng.word()))
 }
 
-fn draw(owner: &LightScene, p: Vec3x8, rng: &mut Rng) -> LightSample8 {
+fn draw(owner: &LightScene, p: Vec3x8, rng: &mut SplitMix) -> LightSample8 {
     let scene = owner.scene();
     sample(&scene, &PowerSelector(scene), p, UP, words(rng), Mask8::all_lanes())
 }
 
-fn random_triangle(rng: &mut Rng, size: f64) -> [[f32; 3]; 3] {
+fn random_triangle(rng: &mut SplitMix, size: f64) -> [[f32; 3]; 3] {
     let centre: [f64; 3] = std::array::from_fn(|_| rng.range(-2.0, 2.0));
     std::array::from_fn(|_| std::array::from_fn(|k| (centre[k] + rng.range(-size, size)) as f32))
 }
@@ -28,7 +28,7 @@ fn random_triangle(rng: &mut Rng, size: f64) -> [[f32; 3]; 3] {
 /// there. Killed by: the density without cos, with |cos|, with the wrong light's area or selection probability.
 #[test]
 fn a_ray_that_finds_the_light_gets_the_sampler_density() {
-    let mut rng = Rng(20);
+    let mut rng = SplitMix(20);
     let (mut worst, mut compared) = (0.0f64, 0u32);
     for round in 0..400 {
         let size = 10f64.powf(rng.range(-2.0, 1.0));
@@ -110,7 +110,7 @@ fn normal(t: [[f32; 3]; 3]) -> [f32; 3] {
 /// uniform on the triangle.
 #[test]
 fn inverse_density_integrates_to_the_solid_angle() {
-    let mut rng = Rng(21);
+    let mut rng = SplitMix(21);
     for round in 0..12 {
         let t = random_triangle(&mut rng, 1.5);
         let owner = LightScene::default().triangle(t, Some([1.0; 3])).finish();
@@ -139,7 +139,7 @@ fn inverse_density_integrates_to_the_solid_angle() {
 fn points_are_uniform_on_the_triangle() {
     let owner =
         LightScene::default().triangle([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], Some([1.0; 3])).finish();
-    let mut rng = Rng(22);
+    let mut rng = SplitMix(22);
     let n = 8usize;
     let mut counts = vec![0u64; n * n];
     for _ in 0..50_000 {
@@ -154,7 +154,7 @@ fn points_are_uniform_on_the_triangle() {
             counts[i.min(n - 1) * n + j.min(n - 1)] += 1;
         }
     }
-    let p = chi_square(&counts, &vec![400_000.0 / (n * n) as f64; n * n]);
+    let p = chi_square_in_order(&counts, &vec![400_000.0 / (n * n) as f64; n * n]);
     println!("p = {p:.3}");
     assert!(p > 1e-6, "p = {p}");
 }
@@ -166,7 +166,7 @@ fn the_back_is_dark() {
     let t = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     let owner = LightScene::default().triangle(t, Some([1.0; 3])).finish();
     let scene = owner.scene();
-    let mut rng = Rng(23);
+    let mut rng = SplitMix(23);
     assert!(draw(&owner, Vec3x8::splat(0.2, 0.2, -1.0), &mut rng).valid.none());
     assert!(draw(&owner, Vec3x8::splat(0.2, 0.2, 1.0), &mut rng).valid.all());
     let (zero, all) = (U32x8::splat(0), Mask8::all_lanes());
@@ -204,7 +204,7 @@ fn extreme_geometry_gives_no_bad_numbers() {
         [[0.0; 3]; 3],
         [[1.0, 1.0, 1.0], [1.000_000_1, 1.0, 1.0], [1.0, 1.0, 2.0]],
     ];
-    let mut rng = Rng(24);
+    let mut rng = SplitMix(24);
     for t in triangles {
         let owner = LightScene::default().triangle(t, Some([1.0; 3])).select_by(&[1.0]);
         let scene = owner.scene();
@@ -234,7 +234,7 @@ fn point_error_is_the_stated_bound() {
     let owner = LightScene::default().triangle(t, Some([1.0; 3])).finish();
     let [a, b, c] = t.map(wide);
     let n = unit(cross(sub(b, a), sub(c, a)));
-    let mut rng = Rng(25);
+    let mut rng = SplitMix(25);
     let p: [f32; 3] = std::array::from_fn(|k| (a[k] + 2.0 * n[k]) as f32);
     let s = draw(&owner, Vec3x8::splat(p[0], p[1], p[2]), &mut rng);
     assert!(s.valid.all());
@@ -258,7 +258,7 @@ fn delta_lights_have_their_closed_forms() {
         .delta(LightKind::Point, [1.0, 2.0, 3.0], [8.0, 4.0, 2.0])
         .delta(LightKind::Directional, [0.6, 0.0, -0.8], [0.5, 0.25, 1.0])
         .select_by(&[1.0, 3.0]);
-    let mut rng = Rng(26);
+    let mut rng = SplitMix(26);
     let mut seen = [0; 2];
     for _ in 0..1000 {
         let p = Vec3x8::from_fn(|_| std::array::from_fn(|_| rng.range(-9.0, 9.0) as f32));
@@ -282,7 +282,7 @@ fn delta_lights_have_their_closed_forms() {
             }
         }
     }
-    assert!(chi_square(&seen, &[2000.0, 6000.0]) > 1e-6);
+    assert!(chi_square_in_order(&seen, &[2000.0, 6000.0]) > 1e-6);
     // At the light itself no direction; nearby a clamped irradiance; far away none.
     for (offset, valid) in [(0.0, false), (1e-11, true), (1e6, true), (1e25, false)] {
         let owner = LightScene::default().delta(LightKind::Point, [0.0; 3], [1.0; 3]).finish();
@@ -303,7 +303,7 @@ fn garbage_lanes_are_harmless() {
         .finish();
     let scene = owner.scene();
     let selector = PowerSelector(scene);
-    let mut rng = Rng(27);
+    let mut rng = SplitMix(27);
     for bits in 0..256 {
         let mask = Mask8::from_bits(bits);
         let w = words(&mut rng);

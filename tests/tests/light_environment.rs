@@ -4,7 +4,7 @@ use croupier::light::{LightSample8, PowerSelector, environment_pdf, environment_
 use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_tests::light_oracle::{Map, V, dot, length, luminance, wide};
 use croupier_tests::light_scene::{IDENTITY, LightScene};
-use croupier_tests::light_stats::{Rng, chi_square};
+use croupier_tests::stats::{SplitMix, chi_square_in_order};
 use std::f64::consts::{PI, TAU};
 
 const SCALE: f32 = 1.5;
@@ -63,10 +63,10 @@ impl Case {
 }
 
 fn cases() -> Vec<Case> {
-    let mut rng = Rng(30);
-    let mut noise = move |n: i32| -> [f32; 3] { std::array::from_fn(|_| rng.unit().powi(n) as f32) };
-    let mut hot = Rng(31);
-    let mut dim = move || -> [f32; 3] { [(0.1 + 0.1 * hot.unit()) as f32; 3] };
+    let mut rng = SplitMix(30);
+    let mut noise = move |n: i32| -> [f32; 3] { std::array::from_fn(|_| rng.f64().powi(n) as f32) };
+    let mut hot = SplitMix(31);
+    let mut dim = move || -> [f32; 3] { [(0.1 + 0.1 * hot.f64()) as f32; 3] };
     vec![
         Case::new("noise", 16, 9, TURNED, |_, _| noise(2)),
         Case::new("sun", 32, 17, TURNED, |i, j| if (i, j) == (31, 5) { [5e4, 4e4, 3e4] } else { dim() }),
@@ -79,7 +79,7 @@ fn cases() -> Vec<Case> {
 }
 
 /// Directions in map space, the hard ones first.
-fn directions(rng: &mut Rng, n: usize) -> Vec<V> {
+fn directions(rng: &mut SplitMix, n: usize) -> Vec<V> {
     let mut out = vec![[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [-0.0, 0.0, 1.0]];
     for e in [1e-30, 1e-20, 1e-10, 1e-7, 1e-5, 1e-3] {
         for y in [1.0, -1.0] {
@@ -100,7 +100,7 @@ fn directions(rng: &mut Rng, n: usize) -> Vec<V> {
 /// the scale left out.
 #[test]
 fn radiance_agrees_with_the_oracle() {
-    let mut rng = Rng(32);
+    let mut rng = SplitMix(32);
     for case in cases() {
         let [w, h] = case.map.cells().map(|n| n as f64);
         let mut worst = 0.0f64;
@@ -213,7 +213,7 @@ fn density_is_accurate_near_the_poles_of_a_fine_map() {
     println!("largest relative error {worst:.1e}");
 }
 
-fn random_words(rng: &mut Rng) -> [U32x8; 4] {
+fn random_words(rng: &mut SplitMix) -> [U32x8; 4] {
     std::array::from_fn(|_| U32x8::from_fn(|_| rng.word()))
 }
 
@@ -221,7 +221,7 @@ fn random_words(rng: &mut Rng) -> [U32x8; 4] {
 /// exchanging its corners, the wrong pole in `Band`, tables of another row.
 #[test]
 fn samples_follow_the_density() {
-    let mut rng = Rng(33);
+    let mut rng = SplitMix(33);
     let parts = 3usize;
     for case in cases().iter().filter(|c| c.name != "fine") {
         let [w, h] = case.map.cells();
@@ -248,7 +248,7 @@ fn samples_follow_the_density() {
         // A direction on the edge of a cell may round across it.
         let strays: u64 = counts.iter().zip(&expected).filter(|(_, e)| **e == 0.0).map(|(c, _)| c).sum();
         assert_eq!(strays, 0, "{}: samples in black cells", case.name);
-        let p = chi_square(&counts, &expected);
+        let p = chi_square_in_order(&counts, &expected);
         println!("{}: {total} samples, p = {p:.3}", case.name);
         assert!(p > 1e-6, "{}: p = {p}", case.name);
         // Three quarters choose the environment, and every one of these gives a sample.
@@ -261,7 +261,7 @@ fn samples_follow_the_density() {
 /// leaving out the selection probability on one side.
 #[test]
 fn samples_state_what_their_direction_gives() {
-    let mut rng = Rng(34);
+    let mut rng = SplitMix(34);
     for case in cases() {
         let [w, h] = case.map.cells();
         let (mut sum, mut sqr, n) = (0.0, 0.0, 160_000.0);
@@ -341,7 +341,7 @@ fn a_black_map_is_never_sampled() {
     assert!(owner.env_alias.is_empty());
     let unlit = LightScene::default().map(vec![[0.0; 3]; 12], [4, 3], 1.0, IDENTITY).finish();
     assert!(unlit.light_alias.is_empty());
-    let mut rng = Rng(35);
+    let mut rng = SplitMix(35);
     for owner in [owner, unlit] {
         let scene = owner.scene();
         let selector = PowerSelector(scene);
@@ -363,7 +363,7 @@ fn the_constant_environment_is_a_uniform_sphere() {
     let owner = LightScene::default().constant([0.5, 1.0, 2.0]).finish();
     let scene = owner.scene();
     let selector = PowerSelector(scene);
-    let mut rng = Rng(36);
+    let mut rng = SplitMix(36);
     let mut counts = vec![0u64; 144];
     for _ in 0..40_000 {
         let s = sample(&scene, &selector, HERE, HERE, random_words(&mut rng), Mask8::all_lanes());
@@ -379,7 +379,7 @@ fn the_constant_environment_is_a_uniform_sphere() {
             counts[band * 12 + sector] += 1;
         }
     }
-    let p = chi_square(&counts, &[320_000.0 / 144.0; 144]);
+    let p = chi_square_in_order(&counts, &[320_000.0 / 144.0; 144]);
     println!("p = {p:.3}");
     assert!(p > 1e-6, "p = {p}");
     let some = environment_radiance(&scene, Vec3x8::splat(f32::NAN, 0.0, 0.0), Mask8::from_bits(2));

@@ -7,13 +7,13 @@ use croupier::simd::{Mask8, U32x8, Vec3x8};
 use croupier_host::{alias, environment};
 use croupier_tests::light_oracle::{Map, luminance, wide};
 use croupier_tests::light_scene::{IDENTITY, LightScene};
-use croupier_tests::light_stats::Rng;
+use croupier_tests::stats::SplitMix;
 
 const RANGE: u64 = 1 << 32;
 
 /// n weights over many magnitudes, a third of them 0.
-fn weights(n: usize, rng: &mut Rng) -> Vec<f64> {
-    (0..n).map(|i| if i % 3 == 1 { 0.0 } else { rng.unit().powi(4) * 3.7 }).collect()
+fn weights(n: usize, rng: &mut SplitMix) -> Vec<f64> {
+    (0..n).map(|i| if i % 3 == 1 { 0.0 } else { rng.f64().powi(4) * 3.7 }).collect()
 }
 
 fn owner(weights: &[f64]) -> LightScene {
@@ -50,7 +50,7 @@ fn count(owner: &LightScene, n: usize) -> Vec<u64> {
 /// Killed by: threshold off by one, `<=` in the pick, probabilities from the weights, slots of equal capacity.
 #[test]
 fn every_random_number_is_accounted_for() {
-    let mut rng = Rng(10);
+    let mut rng = SplitMix(10);
     let tables: Vec<Vec<f64>> = [1, 2, 3, 5, 7, 64, 1000, 1024]
         .into_iter()
         .flat_map(|n| [weights(n, &mut rng), (0..n).map(|i| 1e-12 + (i % 2) as f64).collect(), vec![0.3; n]])
@@ -72,7 +72,7 @@ fn every_random_number_is_accounted_for() {
 /// out the rest to one item, f32 sums.
 #[test]
 fn widths_follow_the_weights() {
-    let mut rng = Rng(11);
+    let mut rng = SplitMix(11);
     for n in [1usize, 2, 3, 1024, 1 << 20] {
         let w = weights(n, &mut rng);
         let total: f64 = w.iter().sum();
@@ -108,12 +108,12 @@ fn nothing_to_choose_gives_an_empty_table_and_no_light() {
 /// rows of a cell, no wrap in the last column, not counting a row's weight in the first table.
 #[test]
 fn map_tables_follow_the_integral_of_the_luminance() {
-    let mut rng = Rng(12);
+    let mut rng = SplitMix(12);
     for [w, h] in [[1usize, 2usize], [2, 2], [4, 3], [7, 6], [16, 9]] {
         let texels: Vec<[f32; 3]> = (0..w * h)
             .map(|_| {
                 std::array::from_fn(
-                    |_| if rng.word().is_multiple_of(3) { 0.0 } else { rng.unit().powi(3) as f32 * 90.0 },
+                    |_| if rng.word().is_multiple_of(3) { 0.0 } else { rng.f64().powi(3) as f32 * 90.0 },
                 )
             })
             .collect();
@@ -134,9 +134,9 @@ fn map_tables_follow_the_integral_of_the_luminance() {
 #[test]
 fn lights_weigh_their_power() {
     use std::f64::consts::PI;
-    let mut rng = Rng(13);
+    let mut rng = SplitMix(13);
     let (w, h) = (6usize, 5usize);
-    let texels: Vec<[f32; 3]> = (0..w * h).map(|_| std::array::from_fn(|_| rng.unit() as f32)).collect();
+    let texels: Vec<[f32; 3]> = (0..w * h).map(|_| std::array::from_fn(|_| rng.f64() as f32)).collect();
     let map = Map::new(&texels, w, h);
     let n = 600;
     let mut integral = 0.0;

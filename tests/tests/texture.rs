@@ -3,13 +3,13 @@
 use croupier::simd::{F32x8, Mask8, U32x8};
 use croupier::texture::{SRGB_TO_LINEAR, lookup};
 use croupier_tests::light_scene::LightScene;
-use croupier_tests::light_stats::Rng;
+use croupier_tests::stats::SplitMix;
 use croupier_tests::texture_oracle as oracle;
 
 const SIZES: [[u32; 2]; 5] = [[1, 1], [2, 1], [3, 5], [16, 8], [257, 31]];
 
 fn scene() -> (LightScene, Vec<Vec<[u8; 3]>>) {
-    let mut rng = Rng(1);
+    let mut rng = SplitMix(1);
     let mut scene = LightScene::default();
     let mut plain = Vec::new();
     for [width, height] in SIZES {
@@ -35,15 +35,15 @@ fn srgb_table_is_exact() {
 fn look_up_agrees_with_the_oracle() {
     let (owner, plain) = scene();
     let scene = owner.scene();
-    let mut rng = Rng(2);
+    let mut rng = SplitMix(2);
     let mut worst = 0.0f64;
     for _ in 0..20_000 {
         let texture: [u32; 8] = std::array::from_fn(|_| rng.word() % SIZES.len() as u32);
         // A third of the coordinates on texel edges and centres, where rows and columns change.
-        let coordinate = |rng: &mut Rng| match rng.word() % 3 {
+        let coordinate = |rng: &mut SplitMix| match rng.word() % 3 {
             0 => (f64::from(rng.word() % 129) - 64.0) as f32 / 16.0,
             1 => rng.range(-4.0, 4.0) as f32,
-            _ => rng.unit() as f32,
+            _ => rng.f64() as f32,
         };
         let u = F32x8::from_fn(|_| coordinate(&mut rng));
         let v = F32x8::from_fn(|_| coordinate(&mut rng));

@@ -5,8 +5,14 @@
 //! asserted to be below 0.06 %, so that equal means pass. The pictures are small and their light is soft, because noise
 //! costs time and bias does not depend on size.
 
-use croupier::Settings;
+use croupier::accel::WideBvh;
+use croupier::light::LightSelector;
+use croupier::profile::Full;
+use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::{Budget, Plan, Progress, Scene, Session, Settings, Shard};
+use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin;
+use croupier_host::description::Emitter;
 use croupier_host::load::load;
 use croupier_tests::runner::{Image, render, settings};
 use croupier_tests::scenes::{blob, cornell};
@@ -139,6 +145,63 @@ fn cut_paths_are_found_out() {
         assert!(d + 8.0 * error < -DELTA, "{what}: {d} +- {error} should have shown");
         assert!(!equivalent(d, error, DELTA, 0.05));
     }
+}
+
+/// All lights alike; `stated` times the true probability is what [`LightSelector::select`] says.
+#[derive(Debug)]
+struct Uniform {
+    lights: u32,
+    stated: f32,
+}
+
+impl LightSelector for Uniform {
+    fn select(&self, _: Vec3x8, _: Vec3x8, r: U32x8) -> (U32x8, F32x8) {
+        let pick = |r: u32| ((u64::from(r) * u64::from(self.lights)) >> 32) as u32;
+        (U32x8::new(r.to_array().map(pick)), F32x8::splat(self.stated / self.lights as f32))
+    }
+
+    fn probability(&self, _: Vec3x8, _: Vec3x8, _: U32x8, mask: Mask8) -> F32x8 {
+        mask.zero_unless(F32x8::splat(1.0 / self.lights as f32))
+    }
+}
+
+/// A render whose host chooses the lights.
+fn chosen_uniformly(scene: &[u8], s: &Settings, spp: u32, stated: f32) -> Image {
+    let scene = Scene::from_bytes(scene).unwrap();
+    let plan = Plan::new(s).unwrap();
+    let [mut shared, mut block] = [plan.session(), plan.shard()].map(|l| AlignedBytes::zeroed(l.size));
+    let uniform = Uniform { lights: scene.lights.len() as u32, stated };
+    let bvh = WideBvh::new(&scene);
+    let mut session = Session::<Full, _, _>::with_selector(scene, bvh, uniform, &plan, shared.as_mut()).unwrap();
+    let mut shard = Shard::new(&plan, 0, block.as_mut()).unwrap();
+    session.begin_iteration(spp);
+    while shard.step(&session, Budget { rays: 1 << 20 }) == Progress::More {}
+    session.end_iteration([&shard]).unwrap();
+    let film = session.film();
+    Image {
+        size: film.size(),
+        pixels: film.pixels().to_vec(),
+        aovs: Vec::new(),
+        counters: *session.counters(),
+        error: film.error_estimate(),
+    }
+}
+
+/// A host that chooses lights in its own way, of a lamp and a point light of quite different powers, gets the same picture
+/// with other noise. Killed by: a session that uses its own choice for light samples or for what scattered rays find.
+#[test]
+fn hosts_may_choose_the_lights() {
+    let mut scene = cornell([16, 16]);
+    scene.emitters.push(Emitter::Point { position: [0.2, 0.1, 0.3], intensity: [0.1, 0.2, 0.4] });
+    let scene = blob(&scene);
+    let case = Case::new(&scene, 3);
+    let power = case.render("none", 51, 9000, |_| ());
+    let s = Settings { seed: 52, ..case.base };
+    assert_equivalent("lights chosen uniformly", &chosen_uniformly(&scene, &s, 16_000, 1.0), &power);
+    let (d, error) = difference(&chosen_uniformly(&scene, &s, 500, 1.25), &power);
+    assert!(d + 8.0 * error < -DELTA, "a wrong probability should have shown: {d} +- {error}");
+    let bits = |seed: u64| chosen_uniformly(&scene, &Settings { seed, ..s }, 4, 1.0).bits();
+    assert!(bits(51) != case.render("none", 51, 4, |_| ()).bits());
 }
 
 /// All materials but `null`, textures and shading normals, with a soft sky in place of the scene's small sun (whose

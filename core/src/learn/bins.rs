@@ -189,7 +189,8 @@ pub struct Local8 {
     pub variance: Vec3x8,
     /// Mean cost of a sample, rays.
     pub cost: F32x8,
-    /// Confidence: samples of the bin and up to eight of the other bins of its leaf, older ones discounted.
+    /// Confidence: samples of the bin itself, older ones discounted. Its surroundings, which the other numbers lean on, do
+    /// not count.
     pub count: F32x8,
 }
 

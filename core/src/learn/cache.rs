@@ -15,6 +15,7 @@ pub use super::save::CacheError;
 pub use super::training::Training;
 
 use super::bins::{BINS, BinSums, Frozen, freeze_leaf};
+use super::settings::Objective;
 use super::tree::{MAX_DEPTH, MAX_LEAVES, Node, ROOTS, Tree, direction_bin};
 use crate::memory::{Carver, Layout, Measure, MemoryError};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -85,6 +86,8 @@ pub struct Cache<'m> {
     pub(super) sums: &'m mut [BinSums],
     frozen: &'m mut [Frozen],
     pub(super) size: CacheSize,
+    /// What the units of first vertices hang on.
+    pub(super) objective: Objective,
     splits_refused: u64,
     /// Leaves of a cache without a tree.
     flat: Option<u32>,
@@ -96,11 +99,17 @@ impl<'m> Cache<'m> {
         Self::measure(Measure::new(), size).layout()
     }
 
-    /// An empty cache in a block of its own, over the bounds `lo` to `hi`, world space.
-    pub fn new(size: CacheSize, lo: [f32; 3], hi: [f32; 3], block: &'m mut [u8]) -> Result<Self, MemoryError> {
+    /// An empty cache in a block of its own, over the bounds `lo` to `hi`, world space, for the values of renders with
+    /// this objective.
+    pub fn new(
+        size: CacheSize,
+        [lo, hi]: [[f32; 3]; 2],
+        objective: Objective,
+        block: &'m mut [u8],
+    ) -> Result<Self, MemoryError> {
         let given = block.len();
         let layout = Self::layout(size).ok_or(MemoryError::TooSmall { needed: usize::MAX, given })?;
-        Self::carve(&mut Carver::new(block, layout)?, size, lo, hi)
+        Self::carve(&mut Carver::new(block, layout)?, size, [lo, hi], objective)
     }
 
     pub(crate) fn measure(m: Measure, size: CacheSize) -> Measure {
@@ -109,9 +118,15 @@ impl<'m> Cache<'m> {
             .add::<Frozen>(size.bins())
     }
 
-    pub(crate) fn carve(c: &mut Carver<'m>, size: CacheSize, lo: [f32; 3], hi: [f32; 3]) -> Result<Self, MemoryError> {
+    pub(crate) fn carve(
+        c: &mut Carver<'m>,
+        size: CacheSize,
+        [lo, hi]: [[f32; 3]; 2],
+        objective: Objective,
+    ) -> Result<Self, MemoryError> {
         let tree = Tree::carve(c, Tree::nodes_for(size.splits), size.leaves(), lo, hi)?;
-        Ok(Self { tree, sums: c.take(size.bins())?, frozen: c.take(size.bins())?, size, splits_refused: 0, flat: None })
+        let (sums, frozen) = (c.take(size.bins())?, c.take(size.bins())?);
+        Ok(Self { tree, sums, frozen, size, objective, splits_refused: 0, flat: None })
     }
 
     /// The bins of eight vertices, `u32::MAX` in inactive lanes. `kind` holds [`Kind`]s, `dir` unit vectors in world space.

@@ -59,7 +59,8 @@ impl<'m> Knowledge<'m> {
         scene: &Scene<'_>,
     ) -> Result<Self, MemoryError> {
         let info = scene.info;
-        let mut cache = cache.map(|size| Cache::carve(c, size, info.bounds_min, info.bounds_max)).transpose()?;
+        let bounds = [info.bounds_min, info.bounds_max];
+        let mut cache = cache.map(|size| Cache::carve(c, size, bounds, s.learning.objective)).transpose()?;
         let mut block = 1;
         if let Some(cache) = cache.as_mut().filter(|_| s.strategy.space() == Some(Space::Image)) {
             let blocks = |side: u32| s.size.map(|n| u64::from(n.div_ceil(side))).iter().product::<u64>();

@@ -6,13 +6,18 @@
 //! | nodes, padded to a multiple of 8 | shape: a byte per node, 1 inner, 0 leaf; parents first, children in order |
 //! | 1536 per leaf | sums of the leaves in the order of the shape |
 //!
-//! All numbers are little-endian. There are no indices, so bytes cannot describe anything but a tree: what is left to
-//! check is that the shape ends where it says, how deep it goes, and the numbers. Bytes are checked as a whole before
-//! anything is changed.
+//! All numbers are little-endian. The header says what the sums hang on: the bounds, which place the cells, and the
+//! objective, because values of [first vertices](super::cache::Kind::FirstMatte) are in units of their pixel under the
+//! relative one, and radiance under the absolute one. Nothing else has to agree: after a change of strategy, norm, depth,
+//! camera or scene the sums are what they were of a render alike, in the same units, and fade as new ones come.
+//!
+//! There are no indices, so bytes cannot describe anything but a tree: what is left to check is that the shape ends where it
+//! says, how deep it goes, and the numbers. Bytes are checked as a whole before anything is changed.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use super::bins::{BINS, BinSums};
 use super::cache::Cache;
+use super::settings::Objective;
 use super::tree::{MAX_DEPTH, Node, ROOTS};
 use crate::scene::blob::content_hash;
 use bytemuck::{Pod, Zeroable};
@@ -21,7 +26,7 @@ use core::fmt;
 /// First bytes of a saved cache.
 const MAGIC: u64 = u64::from_le_bytes(*b"CRPCACHE");
 /// Version of the format.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Largest sum: adding up such files, or squaring their means, stays finite.
 const MAX_SUM: f64 = 1e100;
 
@@ -39,7 +44,9 @@ struct Header {
     leaves: u32,
     /// Bits of the cube's smallest corner and edge.
     cube: [u32; 4],
-    reserved: [u32; 5],
+    /// An [`Objective`].
+    objective: u32,
+    reserved: [u32; 4],
 }
 
 /// Why bytes are not a cache that can be loaded, or a cache cannot be saved.
@@ -72,6 +79,13 @@ pub enum CacheError {
         expected: f32,
         /// Of the bytes.
         found: f32,
+    },
+    /// Of renders with another objective.
+    Objective {
+        /// Of this cache.
+        expected: Objective,
+        /// Of the bytes: an [`Objective`] as a number.
+        found: u32,
     },
     /// A node that is neither 0 nor 1, or an inner one at the depth limit.
     Node {
@@ -120,6 +134,10 @@ impl fmt::Display for CacheError {
             Self::Bounds { index, expected, found } => {
                 write!(f, "saved cache starts at {found} on axis {index}, need {expected}")
             }
+            Self::Objective { expected, found } => match Objective::from_u32(*found) {
+                Some(o) => write!(f, "saved cache has values for the objective {o}, need {expected}"),
+                None => write!(f, "saved cache has values for an unknown objective, {found}, need {expected}"),
+            },
             Self::Node { index, found, depth } => {
                 write!(f, "node {index} of the saved cache is {found} at depth {depth}")
             }
@@ -161,7 +179,7 @@ fn read_sums(bytes: &[u8]) -> BinSums {
 }
 
 impl<'b> Saved<'b> {
-    fn check(bytes: &'b [u8], cube: [f32; 4]) -> Result<Self, CacheError> {
+    fn check(bytes: &'b [u8], cache: &Cache<'_>) -> Result<Self, CacheError> {
         let given = bytes.len();
         let (header, body) = bytes.split_at_checked(HEADER).ok_or(CacheError::Length { needed: HEADER, given })?;
         let header = words_to_native(bytemuck::pod_read_unaligned(header));
@@ -179,10 +197,13 @@ impl<'b> Saved<'b> {
         if header.hash != found {
             return Err(CacheError::Hash { stored: header.hash, found });
         }
-        for (index, (expected, found)) in (0..).zip(cube.into_iter().zip(header.cube)) {
+        for (index, (expected, found)) in (0..).zip(cache.tree.cube.into_iter().zip(header.cube)) {
             if expected.to_bits() != found {
                 return Err(CacheError::Bounds { index, expected, found: f32::from_bits(found) });
             }
+        }
+        if header.objective != cache.objective as u32 {
+            return Err(CacheError::Objective { expected: cache.objective, found: header.objective });
         }
         let (shape, sums) = body.split_at_checked(padded(header.nodes)).unwrap_or((&[], &[]));
         let shape = shape.get(..header.nodes as usize).unwrap_or(&[]);
@@ -251,6 +272,7 @@ fn words_to_native(h: Header) -> Header {
         nodes: u32::from_le(h.nodes),
         leaves: u32::from_le(h.leaves),
         cube: h.cube.map(u32::from_le),
+        objective: u32::from_le(h.objective),
         reserved: h.reserved,
     }
 }
@@ -298,7 +320,8 @@ impl Cache<'_> {
             nodes: self.nodes(),
             leaves: self.leaves(),
             cube: self.tree.cube.map(f32::to_bits),
-            reserved: [0; 5],
+            objective: self.objective as u32,
+            reserved: [0; 4],
         };
         head.copy_from_slice(bytemuck::bytes_of(&words_to_native(header)));
         header.hash = content_hash(out.get(16..).unwrap_or(&[]));
@@ -308,10 +331,10 @@ impl Cache<'_> {
         Ok(needed)
     }
 
-    /// Takes over a saved cache of the same bounds, in place of what it has. Bytes with more leaves than there is room
+    /// Takes over a saved cache of the same bounds and objective, in place of what it has. Bytes with more leaves than there is room
     /// for are refused; [`Self::merge`] into an empty cache takes what fits. After an error the cache is as before.
     pub fn load(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
-        let saved = Saved::check(bytes, self.tree.cube)?;
+        let saved = Saved::check(bytes, self)?;
         let room = self.size.leaves();
         if saved.leaves > room {
             return Err(CacheError::Full { needed: saved.leaves, room });
@@ -321,11 +344,11 @@ impl Cache<'_> {
         Ok(())
     }
 
-    /// Adds a saved cache of the same bounds. Where its tree is finer, this one grows as long as there is room, else the
+    /// Adds a saved cache of the same bounds and objective. Where its tree is finer, this one grows as long as there is room, else the
     /// finer sums join in one leaf; where it is coarser, leaves get an eighth per level. After an error the cache is as
     /// before.
     pub fn merge(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
-        let saved = Saved::check(bytes, self.tree.cube)?;
+        let saved = Saved::check(bytes, self)?;
         self.add(&saved);
         Ok(())
     }

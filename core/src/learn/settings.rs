@@ -2,16 +2,33 @@
 
 use super::estimate::Estimate;
 use crate::rrs::{Learned8, MAX_FACTOR, MIN_FACTOR, Norm};
+use core::fmt;
 use croupier_simd::{F32x8, Vec3x8};
 
 /// Which error is to be small.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u32)]
 pub enum Objective {
     /// Squared error over the squared pixel (plus 0.01): relMSE, eq. 28 of EARS.
     #[default]
-    Relative,
+    Relative = 1,
     /// Squared error.
-    Absolute,
+    Absolute = 2,
+}
+
+impl Objective {
+    pub(super) fn from_u32(x: u32) -> Option<Self> {
+        [Self::Relative, Self::Absolute].into_iter().find(|o| *o as u32 == x)
+    }
+}
+
+impl fmt::Display for Objective {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Relative => "relative",
+            Self::Absolute => "absolute",
+        })
+    }
 }
 
 /// The known value that stands in for what roulette skips (Szecsi et al. 2003).

@@ -42,7 +42,9 @@ impl<'m> Training<'m> {
     /// Adds a sample. Negative values count as 0, values above [`super::cache::MAX_VALUE`] as that.
     ///
     /// `false` if it was not taken: the bin does not exist, a number is not finite, or the bin has
-    /// [`super::cache::BIN_LIMIT`] samples of this iteration. That limit looks at the count alone, so it biases no mean.
+    /// [`super::cache::BIN_LIMIT`] samples of this iteration. A full bin keeps the first ones, so what it says leans to the
+    /// tiles that the shard begins with; factors, and so the noise, are a little off then, but no picture is biased.
+    /// [`crate::Counters::samples_refused`] counts them.
     #[inline]
     pub fn log(&mut self, bin: u32, x: [f32; 3], cost: f32) -> bool {
         let finite = x.iter().all(|x| x.is_finite()) && cost.is_finite();

@@ -82,12 +82,47 @@ impl LightSample8 {
     }
 }
 
-/// How a light is chosen for a reference point; a light tree can replace the power-weighted table.
+/// How a light is chosen for a reference point. [`PowerSelector`] is built in; hosts may bring their own, such as a light
+/// tree.
+///
+/// Pictures are right if both functions tell the same probabilities and every light that could be seen from a point has
+/// one above 0: point and directional lights are found in no other way. How good the choice is shows in the noise only.
+///
+/// ```
+/// use croupier::light::LightSelector;
+/// use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+/// use croupier::{Plan, Scene, Session, SessionError, accel::WideBvh, profile::Full};
+///
+/// /// All lights alike.
+/// struct Uniform(u32);
+///
+/// impl LightSelector for Uniform {
+///     fn select(&self, point: Vec3x8, normal: Vec3x8, r: U32x8) -> (U32x8, F32x8) {
+///         let pick = |r: u32| ((u64::from(r) * u64::from(self.0)) >> 32) as u32;
+///         let light = U32x8::new(r.to_array().map(pick));
+///         (light, self.probability(point, normal, light, Mask8::all_lanes()))
+///     }
+///
+///     fn probability(&self, _: Vec3x8, _: Vec3x8, _: U32x8, mask: Mask8) -> F32x8 {
+///         mask.zero_unless(F32x8::splat(1.0 / self.0 as f32))
+///     }
+/// }
+///
+/// fn session<'s, 'm>(
+///     scene: Scene<'s>,
+///     plan: &Plan,
+///     block: &'m mut [u8],
+/// ) -> Result<Session<'s, 'm, Full, WideBvh<'s>, Uniform>, SessionError> {
+///     let uniform = Uniform(scene.lights.len() as u32);
+///     Session::with_selector(scene, WideBvh::new(&scene), uniform, plan, block)
+/// }
+/// ```
 pub trait LightSelector {
-    /// Light index and its probability from a 32-bit random number.
+    /// Index in [`Scene::lights`] and its probability from a 32-bit random number, for points with unit normals, world
+    /// space. No such light, or a probability of 0: no light is sampled.
     fn select(&self, point: Vec3x8, normal: Vec3x8, r: U32x8) -> (U32x8, F32x8);
 
-    /// Probability that [`Self::select`] picks `light` in the lanes of `mask`.
+    /// Probability that [`Self::select`] picks `light` in the lanes of `mask`, 0 in the others.
     fn probability(&self, point: Vec3x8, normal: Vec3x8, light: U32x8, mask: Mask8) -> F32x8;
 }
 

@@ -52,9 +52,10 @@ pub struct Counters {
     pub shadow_kills: u64,
     /// Sum of the segments of all paths, shared ones counted for each.
     pub path_segments: u64,
-    /// Samples whose estimates were learned from.
+    /// Samples that were offered to the statistics, the refused ones included.
     pub samples_logged: u64,
-    /// Samples of bins that had enough in this iteration.
+    /// Samples that were not learned from because their bin had enough of this iteration ([`crate::learn::cache::BIN_LIMIT`]),
+    /// or because a number overflowed. Many of them: the statistics lean to the first tiles of each shard.
     pub samples_refused: u64,
     /// Samples without a ledger record because the slab was full: they, and those they are part of, were not learned from.
     pub ledger_full: u64,

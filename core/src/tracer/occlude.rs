@@ -4,16 +4,16 @@ use super::scatter::LitSamples;
 use super::shard::Shard;
 use crate::accel::{self, Intersector, Ray8};
 use crate::learn::COST_SHADOW;
-use crate::light::LightSample8;
+use crate::light::{LightSample8, LightSelector};
 use crate::profile::Profile;
 use crate::session::Session;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
 impl Shard<'_> {
     /// The lanes of `mask` whose light sample nothing hides.
-    pub(super) fn occlude<P: Profile, I: Intersector>(
+    pub(super) fn occlude<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
-        session: &Session<'_, '_, P, I>,
+        session: &Session<'_, '_, P, I, L>,
         s: &LitSamples<'_>,
         l: &LightSample8,
         mask: Mask8,

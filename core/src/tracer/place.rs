@@ -4,6 +4,7 @@ use super::roulette::Arrival8;
 use super::surface::TRANSMISSIVE;
 use crate::accel::Intersector;
 use crate::learn::cache::Kind;
+use crate::light::LightSelector;
 use crate::profile::Profile;
 use crate::rrs::Space;
 use crate::scene::blob::MaterialKind;
@@ -42,8 +43,8 @@ fn inverse(x: Vec3x8, floor: f32) -> Vec3x8 {
 /// The bins of arrived vertices. What matte surfaces reflect hangs on where they face; what shiny ones reflect on the
 /// mirrored direction; what others let through on the viewing direction. Samples are logged over the albedo, so that a
 /// texture or a black and a white thing in one cell do not pass for noise.
-pub(super) fn place<P: Profile, I: Intersector>(
-    session: &Session<'_, '_, P, I>,
+pub(super) fn place<P: Profile, I: Intersector, L: LightSelector>(
+    session: &Session<'_, '_, P, I, L>,
     a: &Arrival8,
     albedo: Vec3x8,
     space: Space,

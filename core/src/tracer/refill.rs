@@ -6,6 +6,7 @@ use super::ledger::NO_RECORD;
 use super::shard::Shard;
 use crate::accel::{Intersector, Ray8};
 use crate::camera;
+use crate::light::LightSelector;
 use crate::profile::Profile;
 use crate::rng::Key8;
 use crate::scene::Effects;
@@ -64,9 +65,9 @@ impl Cursor {
 
 impl Shard<'_> {
     /// Up to eight camera rays. `None` when the cursor ran out within empty slots.
-    pub(super) fn camera_rays<P: Profile, I: Intersector>(
+    pub(super) fn camera_rays<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
-        session: &Session<'_, '_, P, I>,
+        session: &Session<'_, '_, P, I, L>,
     ) -> Option<Flight8> {
         let iteration = session.iteration();
         // numbers of one pixel must not come back in another iteration, however many samples it had

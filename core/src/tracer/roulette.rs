@@ -8,6 +8,7 @@ use super::shard::Shard;
 use super::vertex::{RESERVE, Vertex8};
 use crate::accel::Intersector;
 use crate::bsdf::{self, Bsdf, Inputs8, Visitor};
+use crate::light::LightSelector;
 use crate::profile::Profile;
 use crate::rrs::{self, Learned8, Vertices8};
 use crate::scene::Scene;
@@ -79,7 +80,11 @@ fn shininess(scene: &Scene<'_>, a: &Arrival8) -> F32x8 {
 
 impl Shard<'_> {
     /// Rounds the factors of a packet and stores what goes on.
-    pub(super) fn roulette<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>, a: Arrival8) {
+    pub(super) fn roulette<P: Profile, I: Intersector, L: LightSelector>(
+        &mut self,
+        session: &Session<'_, '_, P, I, L>,
+        a: Arrival8,
+    ) {
         let settings = *self.plan.settings();
         let strategy = settings.strategy;
         let knowledge = session.knowledge();

@@ -9,7 +9,7 @@ use super::vertex::{Batch, CLASSES, Vertex8};
 use crate::accel::{self, Intersector, Ray8};
 use crate::bsdf::{self, Bsdf, Eval8, Inputs8, Sample8, Visitor};
 use crate::learn::COST_SHADOW;
-use crate::light::{self, LightSample8, power_heuristic};
+use crate::light::{self, LightSample8, LightSelector, power_heuristic};
 use crate::profile::Profile;
 use crate::rng::Key8;
 use crate::rrs::MIN_FACTOR;
@@ -81,7 +81,10 @@ impl<'s> Visitor<'s> for IsDelta {
 
 impl Shard<'_> {
     /// Scatters a packet of the fullest class, or of the next from which a sample fits.
-    pub(super) fn scatter<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>) -> Option<Flight8> {
+    pub(super) fn scatter<P: Profile, I: Intersector, L: LightSelector>(
+        &mut self,
+        session: &Session<'_, '_, P, I, L>,
+    ) -> Option<Flight8> {
         let (fullest, _) = self.pool.fullest();
         let mut taken = self.take(fullest).map(|b| (fullest, b));
         for class in 0..CLASSES {
@@ -170,9 +173,9 @@ impl Shard<'_> {
     }
 
     /// Adds the light samples' radiance where nothing is in the way.
-    fn light_contribution<P: Profile, I: Intersector>(
+    fn light_contribution<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
-        session: &Session<'_, '_, P, I>,
+        session: &Session<'_, '_, P, I, L>,
         s: &LitSamples<'_>,
         l: &LightSample8,
         f: &Eval8,
@@ -196,9 +199,9 @@ impl Shard<'_> {
     /// Plays roulette for shadow rays: a light sample is a sample of known value and the cost of one ray, so the factor that
     /// is best for it is that of EARS (eq. 32) with the square of its contribution as second moment (Veach 1997, section
     /// 10.4.1, "efficiency-optimised Russian roulette", with the same idea of a threshold). The lanes that go on.
-    fn shadow_roulette<P: Profile, I: Intersector>(
+    fn shadow_roulette<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
-        session: &Session<'_, '_, P, I>,
+        session: &Session<'_, '_, P, I, L>,
         s: &LitSamples<'_>,
         found: &mut Found8,
         mask: Mask8,
@@ -224,7 +227,7 @@ impl Shard<'_> {
 #[inline(never)]
 fn sample_lights<P: Profile>(
     scene: &Scene<'_>,
-    session: &Session<'_, '_, P, impl Intersector>,
+    session: &Session<'_, '_, P, impl Intersector, impl LightSelector>,
     v: &Vertex8,
     key: Key8,
     active: Mask8,

@@ -9,6 +9,7 @@ use super::{ledger_capacity, pixel_slots, roots_capacity};
 use crate::accel::Intersector;
 use crate::film::{PixelAov, PixelSums};
 use crate::learn::cache::Training;
+use crate::light::LightSelector;
 use crate::memory::{Carver, MemoryError};
 use crate::profile::Profile;
 use crate::session::{Iteration, Session};
@@ -126,7 +127,11 @@ impl<'m> Shard<'m> {
     }
 
     /// Works until the budget is used or the iteration is finished. Many small steps and one big step give the same bits.
-    pub fn step<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>, budget: Budget) -> Progress {
+    pub fn step<P: Profile, I: Intersector, L: LightSelector>(
+        &mut self,
+        session: &Session<'_, '_, P, I, L>,
+        budget: Budget,
+    ) -> Progress {
         if self.joined != session.identity() {
             self.begin(session);
         }
@@ -139,7 +144,7 @@ impl<'m> Shard<'m> {
         Progress::More
     }
 
-    fn begin<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>) {
+    fn begin<P: Profile, I: Intersector, L: LightSelector>(&mut self, session: &Session<'_, '_, P, I, L>) {
         let iteration = session.iteration();
         self.joined = session.identity();
         // what an iteration that was given up has left
@@ -160,7 +165,7 @@ impl<'m> Shard<'m> {
     }
 
     /// One packet through all stages; `false` when nothing is left.
-    fn turn<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>) -> bool {
+    fn turn<P: Profile, I: Intersector, L: LightSelector>(&mut self, session: &Session<'_, '_, P, I, L>) -> bool {
         let (_, pending) = self.pool.fullest();
         let room = self.pool.free() >= 2 * RESERVE && !self.cursor.is_finished();
         let flight = if pending >= 8 || pending > 0 && !room {

@@ -6,7 +6,7 @@ use super::settle::Found8;
 use super::shard::Shard;
 use super::vertex::Vertex8;
 use crate::accel::{self, Hit8, Intersector};
-use crate::light::{self, power_heuristic};
+use crate::light::{self, LightSelector, power_heuristic};
 use crate::profile::Profile;
 use crate::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind, NONE, TRIANGLE_SMOOTH};
 use crate::scene::{Effects, Scene};
@@ -22,9 +22,9 @@ pub(super) const TRANSMISSIVE: u32 = 1 << MaterialKind::Dielectric as u32
 
 impl Shard<'_> {
     /// Lanes that left the scene.
-    pub(super) fn escape<P: Profile, I: Intersector>(
+    pub(super) fn escape<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
-        session: &Session<'_, '_, P, I>,
+        session: &Session<'_, '_, P, I, L>,
         f: &Flight8,
         escaped: Mask8,
     ) {
@@ -41,9 +41,9 @@ impl Shard<'_> {
     }
 
     /// Lanes that hit a triangle.
-    pub(super) fn arrive<P: Profile, I: Intersector>(
+    pub(super) fn arrive<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
-        session: &Session<'_, '_, P, I>,
+        session: &Session<'_, '_, P, I, L>,
         f: &Flight8,
         hit: &Hit8,
     ) {
@@ -91,9 +91,9 @@ impl Shard<'_> {
     }
 
     /// Emission of hit area lights, weighted against the light sample that could have found them.
-    fn emission<P: Profile, I: Intersector>(
+    fn emission<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
-        session: &Session<'_, '_, P, I>,
+        session: &Session<'_, '_, P, I, L>,
         f: &Flight8,
         hit: &Hit8,
         ng: Vec3x8,

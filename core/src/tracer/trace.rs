@@ -4,12 +4,17 @@ use super::flight::Flight8;
 use super::shard::Shard;
 use crate::accel::{Hit8, Intersector};
 use crate::learn::COST_BOUNCE;
+use crate::light::LightSelector;
 use crate::profile::Profile;
 use crate::session::Session;
 
 impl Shard<'_> {
     /// Traces a flight and hands it on: escaped lanes meet the environment, the others a surface and roulette.
-    pub(super) fn advance<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>, f: &Flight8) {
+    pub(super) fn advance<P: Profile, I: Intersector, L: LightSelector>(
+        &mut self,
+        session: &Session<'_, '_, P, I, L>,
+        f: &Flight8,
+    ) {
         if f.active.none() {
             return;
         }
@@ -23,7 +28,11 @@ impl Shard<'_> {
         }
     }
 
-    fn trace<P: Profile, I: Intersector>(&mut self, session: &Session<'_, '_, P, I>, f: &Flight8) -> Hit8 {
+    fn trace<P: Profile, I: Intersector, L: LightSelector>(
+        &mut self,
+        session: &Session<'_, '_, P, I, L>,
+        f: &Flight8,
+    ) -> Hit8 {
         let n = f.active.count();
         self.counters.trace.count(n);
         if f.depth.lane(f.active.lanes().next().unwrap_or(0)) > 1 {

@@ -11,7 +11,7 @@
 use exr::prelude as openexr;
 use exr::prelude::{ReadChannels, ReadLayers, WritableImage};
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufReader, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::{error, fmt};
 
@@ -169,22 +169,26 @@ impl Picture {
     /// Reads every layer of an EXR file (one part or many, scan lines or tiles, 16- or 32-bit; the largest
     /// resolution). Layers come in the order unnamed first, then by name.
     pub fn read_exr(path: &Path) -> Result<Self, ImageError> {
-        let decode = |e: String| ImageError::Decode(path.into(), e);
         let file = File::open(path).map_err(|e| ImageError::Read(path.into(), e))?;
+        Self::decode_exr(BufReader::new(file)).map_err(|e| ImageError::Decode(path.into(), e))
+    }
+
+    /// [`Self::read_exr`] from anywhere; errors are texts, for the caller knows the file.
+    pub(crate) fn decode_exr(from: impl Read + Seek + Send) -> Result<Self, String> {
         let image = openexr::read()
             .no_deep_data()
             .largest_resolution_level()
             .all_channels()
             .all_layers()
             .all_attributes()
-            .from_unbuffered(file)
-            .map_err(|e| decode(e.to_string()))?;
+            .from_buffered(from)
+            .map_err(|e| e.to_string())?;
         let parts = &image.layer_data;
-        let size = parts.first().map(|p| p.size).ok_or_else(|| decode("it has no parts".into()))?;
+        let size = parts.first().map(|p| p.size).ok_or("it has no parts")?;
         let mut picture = Self::new(size.x(), size.y());
         for part in parts {
             if part.size != size {
-                return Err(decode("its parts differ in size".into()));
+                return Err("its parts differ in size".into());
             }
             // The name of a file's only part is a title; it names a layer only where there are several.
             let part_name = match &part.attributes.layer_name {
@@ -200,7 +204,7 @@ impl Picture {
                     (part, prefix) => format!("{part}.{prefix}"),
                 };
                 if channel.sampling != openexr::Vec2(1, 1) {
-                    return Err(decode(format!("channel {full} is subsampled")));
+                    return Err(format!("channel {full} is subsampled"));
                 }
                 let values = channel.sample_data.values_as_f32().collect();
                 picture.layer_mut(layer).channels.push(Channel { name: name.into(), values });

@@ -105,7 +105,9 @@ pub struct Progress {
     pub rays: u64,
     /// Wall-clock seconds so far.
     pub seconds: f64,
-    /// Estimated relMSE of the image so far, as soon as there are two iterations to compare.
+    /// Estimated relMSE of the picture after the last finished iteration ([`croupier::ErrorEstimate::rel_mse`]): the samples
+    /// of the iteration under way are not in it. `None` while the first is under way. Where a pixel has a single sample, its
+    /// square stands in for its squared error, so that after an iteration of one sample the estimate is far too large.
     pub relmse_estimate: Option<f64>,
 }
 
@@ -131,9 +133,9 @@ pub struct RenderStats {
     pub seconds: f64,
     /// 1e-6 rays / second.
     pub mrays_per_s: f64,
-    /// Estimated relMSE of the whole image.
+    /// Estimated relMSE of the whole image; `None` below two samples per pixel.
     pub relmse_estimate: Option<f64>,
-    /// Its 95 % interval.
+    /// Its 95 % interval. See [`croupier::ErrorEstimate`] for what both mean with roulette and splitting.
     pub relmse_interval: Option<[f64; 2]>,
     /// Part of the eight lanes that did work, by stage.
     pub lane_utilisation: BTreeMap<&'static str, f64>,

@@ -123,7 +123,12 @@ fn everything_at_once() {
     }
 
     // begun with its own statistics; without the other flags
-    let plain = json(&render(dir, &["--rrs", "ears", "--spp", "2", "--cache-in", "a.cache", "-o", "b.exr", "--json"]));
+    let begun = ["--rrs", "ears", "--spp", "2", "--cache-in", "a.cache", "-o", "b.exr", "--json"];
+    let refused = render(dir, &begun);
+    let error = text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(1), "{error}");
+    assert!(error.contains("a.cache: saved cache has values for the objective absolute, need relative"), "{error}");
+    let plain = json(&render(dir, &[&begun[..], &["--objective", "absolute"]].concat()));
     assert!(["iterations", "time", "false_color", "cache_out"].iter().all(|k| plain.get(*k).is_none()), "{plain}");
     assert!(Picture::read_exr(&dir.join("b.exr")).unwrap().layer("denoised").is_none());
     assert!(!dir.join("b.factor1.png").exists());

@@ -31,7 +31,7 @@ pub struct LearningFlags {
     /// Memory for statistics of the scene, of all shards together
     #[arg(long, value_name = "N", default_value = "24MiB", value_parser = bytes)]
     cache_bytes: usize,
-    /// Begin with statistics that a render of this scene has saved
+    /// Begin with statistics that a render of this scene with the same objective has saved
     #[arg(long, value_name = "FILE")]
     cache_in: Option<PathBuf>,
     /// Save the statistics of the scene in the end

@@ -11,8 +11,8 @@ pub enum LoadError {
     Read {
         /// File.
         path: PathBuf,
-        /// File that names it.
-        referrer: Option<PathBuf>,
+        /// Place that names it: file and line, or file and value.
+        referrer: Option<String>,
         /// The system's reason.
         source: io::Error,
     },
@@ -43,8 +43,8 @@ pub enum LoadError {
     Image {
         /// File.
         path: PathBuf,
-        /// File that names it.
-        referrer: PathBuf,
+        /// Place that names it: file and line, or file and value.
+        referrer: String,
         /// Why.
         what: String,
     },
@@ -64,7 +64,7 @@ impl LoadError {
         Self::Line { path: path.into(), line, what: what.into() }
     }
 
-    pub(super) fn image(path: &Path, referrer: &Path, what: String) -> Self {
+    pub(super) fn image(path: &Path, referrer: &str, what: String) -> Self {
         Self::Image { path: path.into(), referrer: referrer.into(), what }
     }
 }
@@ -74,7 +74,7 @@ impl fmt::Display for LoadError {
         match self {
             Self::Read { path, referrer: None, source } => write!(f, "cannot read {}: {source}", path.display()),
             Self::Read { path, referrer: Some(by), source } => {
-                write!(f, "cannot read {}, which {} names: {source}", path.display(), by.display())
+                write!(f, "cannot read {}, which {by} names: {source}", path.display())
             }
             Self::Unknown { path } => {
                 write!(f, "{} is neither a folder with a scene.json nor an .obj file", path.display())
@@ -82,7 +82,7 @@ impl fmt::Display for LoadError {
             Self::Line { path, line, what } => write!(f, "{}:{line}: {what}", path.display()),
             Self::Json { path, at, what } => write!(f, "{}: {at}: {what}", path.display()),
             Self::Image { path, referrer, what } => {
-                write!(f, "cannot use the image {}, which {} names: {what}", path.display(), referrer.display())
+                write!(f, "cannot use the image {}, which {referrer} names: {what}", path.display())
             }
             Self::Medium { path, index, name } => write!(
                 f,

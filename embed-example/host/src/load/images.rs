@@ -1,17 +1,27 @@
-//! Decoders: PNG textures, EXR environment maps. Errors are texts; the caller knows the file.
+//! Decoders: PNG and JPEG textures, EXR environment maps. Errors are texts; the caller knows the file.
 
 use crate::description::{Environment, Texture};
+use crate::image::{Picture, Rgb};
 use png::{BitDepth, ColorType, Transformations};
 use std::io::Cursor;
+use zune_jpeg::JpegDecoder;
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::colorspace::ColorSpace;
+use zune_jpeg::zune_core::options::DecoderOptions;
 
 /// Bytes that a decoded texture may need: the largest that the scene blob can hold.
 const LARGEST: usize = 4 << 30;
 
+/// A PNG or JPEG as 8-bit RGBA: its first bytes tell which, names of files are often wrong.
+pub(super) fn texture(bytes: &[u8]) -> Result<Texture, String> {
+    if bytes.starts_with(&[0xff, 0xd8]) { jpeg(bytes) } else { png(bytes) }
+}
+
 /// Any PNG as 8-bit RGBA: palettes and few-bit greys are expanded, 16-bit values rounded, sRGB is assumed.
-pub(super) fn png(bytes: &[u8]) -> Result<Texture, String> {
+fn png(bytes: &[u8]) -> Result<Texture, String> {
     let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), png::Limits { bytes: LARGEST });
     decoder.set_transformations(Transformations::EXPAND);
-    let mut reader = decoder.read_info().map_err(|e| format!("not a readable PNG: {e}"))?;
+    let mut reader = decoder.read_info().map_err(|e| format!("not a readable PNG or JPEG: {e}"))?;
     let size = reader.output_buffer_size().filter(|n| *n <= LARGEST).ok_or("too large")?;
     let mut data = vec![0; size];
     let info = reader.next_frame(&mut data).map_err(|e| format!("not a readable PNG: {e}"))?;
@@ -30,29 +40,25 @@ pub(super) fn png(bytes: &[u8]) -> Result<Texture, String> {
     Ok(Texture { name: String::new(), width: info.width, height: info.height, texels })
 }
 
-/// The first RGB(A) layer of an EXR as an unscaled, unrotated environment map, and how many negative or NaN numbers
-/// (filters leave them behind) became 0.
-pub(super) fn exr(bytes: Vec<u8>) -> Result<(Environment, usize), String> {
-    use exr::prelude::{ReadChannels, ReadLayers, Vec2, read};
-    struct Pixels {
-        width: usize,
-        texels: Vec<[f32; 3]>,
+/// Any JPEG of 8 bits a channel, up to 16384 pixels a side; grey, RGB, YCbCr or CMYK, sRGB is assumed. Files that end
+/// early are refused (strict mode), which would fill up with grey; if only their last bytes are missing that may go unnoticed.
+fn jpeg(bytes: &[u8]) -> Result<Texture, String> {
+    let options = DecoderOptions::default().jpeg_set_out_colorspace(ColorSpace::RGBA).set_strict_mode(true);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    let data = decoder.decode().map_err(|e| format!("not a readable JPEG: {e}"))?;
+    let size = decoder.info().map_or([0; 2], |i| [i.width, i.height]);
+    let texels: Vec<[u8; 4]> = data.as_chunks().0.to_vec();
+    if texels.is_empty() || texels.len() != usize::from(size[0]) * usize::from(size[1]) {
+        return Err(format!("a JPEG of {} texels for {} x {} pixels", texels.len(), size[0], size[1]));
     }
-    let image = read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .rgba_channels(
-            |size: Vec2<usize>, _: &_| Pixels { width: size.width(), texels: vec![[0.0; 3]; size.area()] },
-            |p: &mut Pixels, at: Vec2<usize>, (r, g, b, _): (f32, f32, f32, f32)| {
-                p.texels[at.y() * p.width + at.x()] = [r, g, b];
-            },
-        )
-        .first_valid_layer()
-        .all_attributes()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(|e| format!("not a readable RGB EXR: {e}"))?;
-    let size = image.layer_data.size;
-    let mut texels = image.layer_data.channel_data.pixels.texels;
+    Ok(Texture { name: String::new(), width: size[0].into(), height: size[1].into(), texels })
+}
+
+/// The RGB picture of an EXR as an unscaled, unrotated environment map, and how many negative or NaN numbers (filters leave
+/// them behind) became 0.
+pub(super) fn exr(bytes: &[u8]) -> Result<(Environment, usize), String> {
+    let picture = Picture::decode_exr(Cursor::new(bytes)).map_err(|e| format!("not a readable EXR: {e}"))?;
+    let Rgb { width, height, pixels: mut texels } = picture.main().ok_or("no layer with channels R, G and B")?;
     let mut clamped = 0;
     for x in texels.iter_mut().flatten() {
         if x.is_nan() || *x < 0.0 {
@@ -60,7 +66,7 @@ pub(super) fn exr(bytes: Vec<u8>) -> Result<(Environment, usize), String> {
             clamped += 1;
         }
     }
-    let (width, height) = (size.width() as u32, size.height() as u32);
+    let (width, height) = (width as u32, height as u32);
     if height < 2 {
         return Err(format!("an environment map of {width} x {height} pixels needs 2 rows"));
     }

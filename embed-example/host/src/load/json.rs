@@ -32,6 +32,11 @@ impl<'v> Place<'v> {
         LoadError::Json { path: self.file.into(), at, what: what.into() }
     }
 
+    /// File and value, for messages about what it names.
+    pub fn referrer(&self) -> String {
+        format!("{} ({})", self.file.display(), self.at)
+    }
+
     fn child(&self, at: String, value: &'v Value) -> Self {
         Self { file: self.file, at, value }
     }

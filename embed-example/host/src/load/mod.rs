@@ -5,7 +5,7 @@
 //! | `scene_json` | a folder with `scene.json` (the format of `scenes/FORMAT.md`) |
 //! | `obj` | geometry: Wavefront OBJ |
 //! | `mtl` | materials of a bare OBJ |
-//! | `images` | PNG textures, EXR environment maps |
+//! | `images` | PNG and JPEG textures, EXR environment maps |
 //! | `json` | values of a JSON document that know their place |
 
 mod error;
@@ -62,8 +62,8 @@ struct Loader {
 }
 
 impl Loader {
-    /// Reads a whole file; `referrer` is the file that names it.
-    fn read(&mut self, path: &Path, referrer: Option<&Path>) -> Result<Vec<u8>, LoadError> {
+    /// Reads a whole file; `referrer` is the place that names it.
+    fn read(&mut self, path: &Path, referrer: Option<&str>) -> Result<Vec<u8>, LoadError> {
         let bytes = fs::read(path).map_err(|source| LoadError::Read {
             path: path.into(),
             referrer: referrer.map(Into::into),
@@ -74,18 +74,18 @@ impl Loader {
     }
 
     /// As [`Loader::read`]; bytes that are not UTF-8 (old exporters' comments) become replacement characters.
-    fn read_text(&mut self, path: &Path, referrer: Option<&Path>) -> Result<String, LoadError> {
+    fn read_text(&mut self, path: &Path, referrer: Option<&str>) -> Result<String, LoadError> {
         let bytes = self.read(path, referrer)?;
         Ok(String::from_utf8(bytes).unwrap_or_else(|e| String::from_utf8_lossy(e.as_bytes()).into_owned()))
     }
 
     /// Index of the texture in `path`, decoded at its first use.
-    fn texture(&mut self, scene: &mut SceneDescription, path: &Path, referrer: &Path) -> Result<u32, LoadError> {
+    fn texture(&mut self, scene: &mut SceneDescription, path: &Path, referrer: &str) -> Result<u32, LoadError> {
         if let Some(index) = self.textures.get(path) {
             return Ok(*index);
         }
         let bytes = self.read(path, Some(referrer))?;
-        let image = images::png(&bytes).map_err(|what| LoadError::image(path, referrer, what))?;
+        let image = images::texture(&bytes).map_err(|what| LoadError::image(path, referrer, what))?;
         let index = scene.textures.len() as u32;
         scene.textures.push(Texture { name: path.display().to_string(), ..image });
         self.textures.insert(path.into(), index);
@@ -93,9 +93,9 @@ impl Loader {
     }
 
     /// The environment map in `path`, unscaled and unrotated.
-    fn environment(&mut self, path: &Path, referrer: &Path) -> Result<Environment, LoadError> {
+    fn environment(&mut self, path: &Path, referrer: &str) -> Result<Environment, LoadError> {
         let bytes = self.read(path, Some(referrer))?;
-        let (map, clamped) = images::exr(bytes).map_err(|what| LoadError::image(path, referrer, what))?;
+        let (map, clamped) = images::exr(&bytes).map_err(|what| LoadError::image(path, referrer, what))?;
         if clamped > 0 {
             self.note(format!("{}: {clamped} negative or NaN numbers were taken as 0", path.display()));
         }

@@ -29,8 +29,8 @@ const SMOOTH: f32 = 1e-3;
 /// One `newmtl`.
 pub(super) struct Definition {
     pub material: tobj::Material,
-    /// File of `map_Kd`, without its options.
-    pub texture: Option<String>,
+    /// File of `map_Kd`, without its options, and the line that names it.
+    pub texture: Option<(String, u32)>,
 }
 
 /// What a definition becomes.
@@ -44,17 +44,24 @@ pub(super) struct Mapped {
 /// fewer than three numbers.
 pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<Definition>, LoadError> {
     let mut plain = String::with_capacity(text.len() + 16);
+    // of each definition: the line of its texture
+    let mut texture_lines = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
         check(line.trim(), &mut plain).map_err(|what| LoadError::line(path, number, what))?;
         plain.push('\n');
+        match line.split_whitespace().next() {
+            Some("newmtl") => texture_lines.push(0),
+            Some("map_Kd") => texture_lines.iter_mut().next_back().into_iter().for_each(|l| *l = number),
+            _ => {}
+        }
     }
     let (materials, _) = tobj::load_mtl_buf(&mut plain.as_bytes())
         .map_err(|e| LoadError::line(path, 0, format!("refused by the MTL parser: {e}")))?;
-    let define = |material: tobj::Material| {
-        let texture = material.diffuse_texture.as_deref().map(without_options);
+    let define = |(material, line): (tobj::Material, u32)| {
+        let texture = material.diffuse_texture.as_deref().map(|t| (without_options(t), line));
         Definition { material, texture }
     };
-    Ok(materials.into_iter().map(define).collect())
+    Ok(materials.into_iter().zip(texture_lines).map(define).collect())
 }
 
 /// Writes the line in the form that `tobj` takes; lines of no use here become empty.

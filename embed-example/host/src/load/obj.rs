@@ -6,6 +6,7 @@
 //! of the faces (with or without texture coordinates and normals) changes, materials as numbers. Each mesh that comes
 //! out then has normals for all faces or for none, and `tobj` has nothing left to refuse.
 
+use super::json::Place;
 use super::{LoadError, Loader, mtl};
 use crate::builtin;
 use crate::description::{Camera, Emitter, Object, SceneDescription, Triangle, Vertex};
@@ -223,6 +224,8 @@ fn prepare(path: &Path, text: &str) -> Result<Prepared, LoadError> {
             joined.clear();
         }
     }
+    // a last line that promises another
+    checker.check(&joined)?;
     Ok(checker.out)
 }
 
@@ -270,7 +273,7 @@ fn append(path: &Path, scene: &mut SceneDescription, prepared: Prepared, materia
 }
 
 /// Reads and checks; counts go to the report.
-fn read(loader: &mut Loader, path: &Path, referrer: Option<&Path>) -> Result<Prepared, LoadError> {
+fn read(loader: &mut Loader, path: &Path, referrer: Option<&str>) -> Result<Prepared, LoadError> {
     let text = loader.read_text(path, referrer)?;
     let prepared = prepare(path, &text)?;
     loader.report.polygons += prepared.polygons;
@@ -278,20 +281,20 @@ fn read(loader: &mut Loader, path: &Path, referrer: Option<&Path>) -> Result<Pre
     Ok(prepared)
 }
 
-/// Adds the geometry of an OBJ file whose materials are the scene's, defined in `referrer`.
+/// Adds the geometry of an OBJ file whose materials are the scene's, defined in the file of `referrer`, which names it.
 pub(super) fn load_geometry(
     loader: &mut Loader,
     scene: &mut SceneDescription,
     path: &Path,
-    referrer: &Path,
+    referrer: &Place<'_>,
 ) -> Result<(), LoadError> {
-    let prepared = read(loader, path, Some(referrer))?;
+    let prepared = read(loader, path, Some(&referrer.referrer()))?;
     let find = |(name, line): &(String, u32)| {
         let index = scene.materials.iter().position(|m| m.name == *name);
         index.map(|i| i as u32).ok_or_else(|| {
             let what = match name.as_str() {
                 "" => "a face before any `usemtl`".into(),
-                name => format!("a face of material `{name}`, which {} does not define", referrer.display()),
+                name => format!("a face of material `{name}`, which {} does not define", referrer.file.display()),
             };
             LoadError::line(path, *line, what)
         })
@@ -306,9 +309,9 @@ pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescrip
     let prepared = read(loader, path, None)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut defined: HashMap<String, (mtl::Definition, PathBuf)> = HashMap::new();
-    for (file, _) in &prepared.libraries {
+    for (file, line) in &prepared.libraries {
         let file = folder.join(file);
-        let text = loader.read_text(&file, Some(path))?;
+        let text = loader.read_text(&file, Some(&format!("{}:{line}", path.display())))?;
         for definition in mtl::parse(&file, &text)? {
             defined.insert(definition.material.name.clone(), (definition, file.clone()));
         }
@@ -318,8 +321,10 @@ pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescrip
         let index = scene.materials.len() as u32;
         match defined.get(name) {
             Some((definition, file)) => {
-                let texture =
-                    definition.texture.as_ref().map(|t| loader.texture(&mut scene, &mtl::sibling(file, t), file));
+                let texture = definition.texture.as_ref().map(|(texture, line)| {
+                    let referrer = format!("{}:{line} (material `{name}`)", file.display());
+                    loader.texture(&mut scene, &mtl::sibling(file, texture), &referrer)
+                });
                 let mapped = mtl::map(definition, texture.transpose()?);
                 loader.report.notes.extend(mapped.notes);
                 scene.materials.push(mapped.material);

@@ -39,7 +39,7 @@ pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription,
         }
     }
     let file = document.get("geometry")?.get("file")?;
-    obj::load_geometry(loader, &mut scene, &folder.join(file.text()?), path)?;
+    obj::load_geometry(loader, &mut scene, &folder.join(file.text()?), &file)?;
     Ok(scene)
 }
 
@@ -120,8 +120,8 @@ fn reflectance(
             return Err(place.error(format!("`{}` is not supported, only `{only}`", place.text()?)));
         }
     }
-    let path = folder.join(r.get("file")?.text()?);
-    Ok(Reflectance::Texture(loader.texture(scene, &path, r.file)?))
+    let file = r.get("file")?;
+    Ok(Reflectance::Texture(loader.texture(scene, &folder.join(file.text()?), &file.referrer())?))
 }
 
 fn emitter(loader: &mut Loader, scene: &mut SceneDescription, folder: &Path, e: &Place<'_>) -> Result<(), LoadError> {
@@ -156,7 +156,8 @@ fn emitter(loader: &mut Loader, scene: &mut SceneDescription, folder: &Path, e: 
 }
 
 fn envmap(loader: &mut Loader, folder: &Path, e: &Place<'_>) -> Result<Environment, LoadError> {
-    let mut map = loader.environment(&folder.join(e.get("file")?.text()?), e.file)?;
+    let file = e.get("file")?;
+    let mut map = loader.environment(&folder.join(file.text()?), &file.referrer())?;
     if let Environment::Map { scale, to_world, .. } = &mut map {
         if let Some(s) = e.find("scale")? {
             *scale = if s.is_number() { [s.float()?; 3] } else { s.rgb()? };
