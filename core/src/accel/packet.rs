@@ -44,15 +44,27 @@ impl Best {
         Hit1 { t: self.t.lane(i), triangle: self.triangle.lane(i), u: self.u.lane(i), v: self.v.lane(i) }
     }
 
+    /// Sets lane `i`. By selection: eight lanes read back right after one of them was written alone stall the processor.
     #[inline(always)]
     pub fn set(&mut self, i: usize, h: &Hit1) {
-        self.t = self.t.with_lane(i, h.t);
-        let mut triangle = self.triangle.to_array();
-        triangle[i & 7] = h.triangle;
-        self.triangle = U32x8::new(triangle);
-        self.u = self.u.with_lane(i, h.u);
-        self.v = self.v.with_lane(i, h.v);
+        let lane = one(i);
+        self.t = lane.select(F32x8::splat(h.t), self.t);
+        self.triangle = U32x8::select(lane, U32x8::splat(h.triangle), self.triangle);
+        self.u = lane.select(F32x8::splat(h.u), self.u);
+        self.v = lane.select(F32x8::splat(h.v), self.v);
     }
+
+    /// Lane `i` looks for nothing more.
+    #[inline(always)]
+    fn finish(&mut self, i: usize) {
+        self.t = one(i).select(F32x8::splat(f32::NEG_INFINITY), self.t);
+    }
+}
+
+/// Lane `i`.
+#[inline(always)]
+fn one(i: usize) -> Mask8 {
+    U32x8::splat(i as u32).eq(U32x8::new([0, 1, 2, 3, 4, 5, 6, 7]))
 }
 
 /// Walks the rays `group` of `s` (one octant, one major axis) from the root. Closest: improves `best`. Any: returns the
@@ -106,7 +118,7 @@ pub(super) fn walk_packet<const ANY: bool>(
                     let found = walk::<ANY>(tree, (child, entry.lane(i)), &Ray1::new(s, i), &mut h, keys, sp);
                     if ANY && found {
                         occluded |= 1 << i;
-                        b.t = b.t.with_lane(i, f32::NEG_INFINITY);
+                        b.finish(i);
                         changed = true;
                     } else if !ANY && h.triangle != before.triangle {
                         b.set(i, &h);
@@ -145,7 +157,7 @@ pub(super) fn walk_packet<const ANY: bool>(
                         changed = true;
                         if ANY {
                             occluded |= 1 << i;
-                            b.t = b.t.with_lane(i, f32::NEG_INFINITY);
+                            b.finish(i);
                         } else {
                             b.set(i, &h);
                         }
