@@ -102,7 +102,7 @@ impl fmt::Display for SettingsError {
             Self::Ring(n) => write!(f, "ring of {n} vertices: need {MIN_RING} to 2^24"),
             Self::Cache { needed, given } => write!(f, "cache of {given} bytes: with so many shards it needs {needed}"),
             Self::Constant => f.write_str("the constant of roulette must be finite and cannot serve threshold; the cached mean needs ear, ears, adrr or adrrs"),
-            Self::Learning => f.write_str("learning: need a ledger of 1 to 2^24 records, a split count above 0, a carry of 0 to 1, factors around 1 in 0.05 to 20"),
+            Self::Learning => f.write_str("learning: need a ledger of 1 to 2^24 records, at least 1 sample to learn from, a split count above 0, a carry of 0 to 1, factors around 1 in 0.05 to 20"),
             Self::Memory => f.write_str("these settings need more memory than can be addressed"),
         }
     }
@@ -187,6 +187,7 @@ fn cache_size(s: &Settings) -> Result<Option<CacheSize>, SettingsError> {
     let fits = (MIN_FACTOR..=1.0).contains(&least)
         && (1.0..=MAX_FACTOR).contains(&most)
         && (1..=1 << 24).contains(&l.ledger)
+        && l.samples > 0
         && l.split_count > 0.0
         && (0.0..=1.0).contains(&l.carry);
     if !fits {

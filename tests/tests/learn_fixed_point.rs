@@ -132,7 +132,7 @@ fn the_fixed_point_is_the_numerical_minimum() {
 fn factors_settle_in_the_machine() {
     let scene = blob(&cornell([24, 24]));
     let s = settings(&scene, "ears:plain");
-    let learning_ = Learning { carry: 0.0, cache_bytes: 1 << 20, split_count: 4000.0, ..s.learning };
+    let learning_ = Learning { carry: 0.0, cache_bytes: 1 << 20, split_count: 4000.0, samples: 48, ..s.learning };
     let s = Settings { max_depth: 12, seed: 17, learning: learning_, ..s };
     let mut seen = Vec::new();
     learning(&scene, &s, &[48; 46], Schedule::InOrder(1 << 20), &mut |i, l: &mut dyn Learned| {
