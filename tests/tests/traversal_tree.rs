@@ -1,6 +1,8 @@
 //! The host's trees: every triangle once, every vertex in every box above it, bounded depth, the promised numbering.
 
+use croupier::accel::{Intersector, Ray8, WideBvh};
 use croupier::scene::blob::{CHILD_INDEX, LEAF_BIT, Leaf, MAX_TREE_DEPTH, NONE, Node};
+use croupier::simd::{F32x8, Mask8, Vec3x8};
 use croupier_host::bvh::{Effort, Tree, build};
 use croupier_tests::geometry::{Rng, Tri, soup, star};
 
@@ -111,4 +113,58 @@ fn triangles_that_are_not_finite_are_left_out() {
     assert!(seen.iter().enumerate().all(|(i, n)| *n == u32::from(![3, 50, 99].contains(&i))));
     let bad = vec![[[f32::NAN; 3]; 3]; 5];
     assert!(build(&bad, Effort::Medium).nodes.is_empty());
+}
+
+/// The deepest tree that validates, made to fill stacks: every node has seven leaves and, at the same distance and with a
+/// lower reference, the next node. Leaf k holds two triangles at z = +-height(k).
+fn chain(height: impl Fn(u32) -> f32) -> (Vec<Node>, Vec<Leaf>) {
+    let (mut nodes, mut leaves) = (Vec::new(), Vec::new());
+    for level in 0..MAX_TREE_DEPTH {
+        let mut node = Node { bounds: [[-10.0; 8]; 6], child: [NONE; 8], reserved: [0; 8] };
+        node.bounds[3..].fill([10.0; 8]);
+        let inner = usize::from(level + 1 < MAX_TREE_DEPTH);
+        for child in &mut node.child[inner..] {
+            let k = leaves.len() as u32;
+            let mut leaf = Leaf { p: [[0.0; 8]; 9], triangle: [NONE; 8] };
+            for (slot, z) in [height(k), -height(k)].into_iter().enumerate() {
+                leaf.triangle[slot] = 2 * k + slot as u32;
+                let corners = [-9.0, -9.0, z, 9.0, -9.0, z, 0.0, 9.0, z];
+                (0..9).for_each(|row| leaf.p[row][slot] = corners[row]);
+            }
+            leaves.push(leaf);
+            *child = LEAF_BIT | 2 << 27 | k;
+        }
+        if inner == 1 {
+            node.child[0] = level + 1;
+        }
+        nodes.push(node);
+    }
+    (nodes, leaves)
+}
+
+// Killed by: rays that take turns keep to their eighth of the stack and lose what does not fit, or forget to begin anew.
+#[test]
+fn full_stacks_lose_nothing() {
+    let last = 7 * MAX_TREE_DEPTH;
+    for closest in [0, 3, 100, last - 1, last] {
+        let (nodes, leaves) = chain(|k| if k == closest { 1.0 } else { 2.0 + k as f32 / 256.0 });
+        let bvh = WideBvh::from_parts(&nodes, &leaves);
+        // all directions, so that rays go alone; or one octant, so that up to eight go together
+        for (octants, active) in [(7, 8), (0, 1), (0, 2), (0, 5), (0, 8)] {
+            let d = Vec3x8::from_fn(|i| {
+                let sign = |k: usize| if (i & octants) >> k & 1 == 1 { -1.0 } else { 1.0 };
+                [0.1 * sign(0), 0.1 * sign(1), sign(2)]
+            });
+            let ray = |tmax: f32| Ray8 { o: Vec3x8::ZERO, d, tmin: F32x8::ZERO, tmax: F32x8::splat(tmax) };
+            let active = Mask8::first(active);
+            let hit = bvh.closest(&ray(f32::INFINITY), active);
+            assert_eq!(hit.hit, active);
+            for i in active.lanes() {
+                assert_eq!(hit.t.lane(i), 1.0);
+                assert_eq!(hit.triangle.lane(i), 2 * closest + u32::from(d.z.lane(i) < 0.0));
+            }
+            assert_eq!(bvh.occluded(&ray(1.1), active), active);
+            assert_eq!(bvh.occluded(&ray(0.9), active), Mask8::NONE);
+        }
+    }
 }

@@ -11,6 +11,7 @@
 use clap::Parser;
 use croupier::accel::{Hit8, Intersector, Ray8, WideBvh};
 use croupier::simd::{F32x8, Mask8, Vec3x8};
+use croupier_benches::clock::Clock;
 use croupier_host::bvh::{self, Effort};
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
@@ -280,20 +281,11 @@ fn aligned<'a, T: bytemuck::Pod>(records: &[T], memory: &'a mut Vec<u8>) -> &'a 
     bytemuck::cast_slice(&memory[start..start + bytes.len()])
 }
 
-/// CPU time of this thread, if the system tells.
-fn cpu_time() -> Option<Duration> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    Some(Duration::from_nanos(text.split(' ').next()?.parse().ok()?))
-}
-
+/// Seconds of this thread.
 fn timed<T>(f: impl FnOnce() -> T) -> (T, f64) {
-    let (wall, cpu) = (Instant::now(), cpu_time());
+    let clock = Clock::start();
     let out = black_box(f());
-    let elapsed = match (cpu, cpu_time()) {
-        (Some(a), Some(b)) if b > a => b - a,
-        _ => wall.elapsed(),
-    };
-    (out, elapsed.as_secs_f64())
+    (out, clock.seconds())
 }
 
 /// Median and quartile spread over the median.
@@ -355,7 +347,7 @@ fn main() {
     ];
 
     let sets: Vec<Set> = sets.into_iter().filter(|s| s.name.contains(&args.only)).collect();
-    // enough passes per measurement to hide the scheduler's tick, which CPU times are counted in
+    // enough passes per measurement to average over what else the machine does
     let mut passes = vec![[1u32; 3]; sets.len()];
     for (set, passes) in sets.iter().zip(&mut passes) {
         let answers: Vec<(usize, f64)> = (0..3)

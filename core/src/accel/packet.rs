@@ -15,28 +15,32 @@
 //!    when it is popped: fewer tests, as some are behind a hit by then, and a fifth of the memory of keeping their entries.
 
 use super::setup::{Setup, each};
-use super::single::{Hit1, Keys, Ray1, STACK, test_leaf, walk};
+use super::single::{Hit1, Hits, Keys, STACK, test_leaf, walk};
 use super::triangle::{Line, intersect};
-use crate::scene::blob::{CHILD_INDEX, LEAF_BIT, Leaf, NONE, Node};
+use crate::scene::blob::{CHILD_INDEX, LEAF_BIT, Leaf, Node};
 use croupier_simd::{F32x8, Mask8, U32x8};
 
-/// Groups of at most this many rays go one by one (3 is faster than 4 on primary rays, all else alike).
-pub(super) const FEW: u32 = 3;
+/// Groups of at most this many rays go as single rays; 3 to 7 differ by few %.
+pub(super) const FEW: u32 = 5;
 
-/// Closest hits of eight rays; any hit: `triangle` other than [`NONE`] where there is one.
-pub(super) struct Best {
+/// Closest hits of the packet.
+struct Best {
     /// Limits: t of the closest hits; below every t in lanes that are done.
-    pub t: F32x8,
-    pub triangle: U32x8,
-    pub u: F32x8,
-    pub v: F32x8,
+    t: F32x8,
+    triangle: U32x8,
+    u: F32x8,
+    v: F32x8,
 }
 
 impl Best {
-    /// No hits up to and including `limit`.
     #[inline(always)]
-    pub fn none(limit: F32x8) -> Self {
-        Self { t: limit, triangle: U32x8::splat(NONE), u: F32x8::ZERO, v: F32x8::ZERO }
+    fn load(h: &Hits) -> Self {
+        Self { t: F32x8::new(h.t), triangle: U32x8::new(h.triangle), u: F32x8::new(h.u), v: F32x8::new(h.v) }
+    }
+
+    #[inline(always)]
+    fn store(&self) -> Hits {
+        Hits { t: self.t.to_array(), triangle: self.triangle.to_array(), u: self.u.to_array(), v: self.v.to_array() }
     }
 
     #[inline(always)]
@@ -46,7 +50,7 @@ impl Best {
 
     /// Sets lane `i`. By selection: eight lanes read back right after one of them was written alone stall the processor.
     #[inline(always)]
-    pub fn set(&mut self, i: usize, h: &Hit1) {
+    fn set(&mut self, i: usize, h: &Hit1) {
         let lane = one(i);
         self.t = lane.select(F32x8::splat(h.t), self.t);
         self.triangle = U32x8::select(lane, U32x8::splat(h.triangle), self.triangle);
@@ -67,16 +71,17 @@ fn one(i: usize) -> Mask8 {
     U32x8::splat(i as u32).eq(U32x8::new([0, 1, 2, 3, 4, 5, 6, 7]))
 }
 
-/// Walks the rays `group` of `s` (one octant, one major axis) from the root. Closest: improves `best`. Any: returns the
-/// lanes with a hit.
+/// Walks the rays `group` of `s` (one octant, one major axis) from the root. Closest: improves `hits`. Any: returns the
+/// lanes with a hit. `stack` is for single rays.
 #[inline(never)]
 pub(super) fn walk_packet<const ANY: bool>(
     tree: (&[Node], &[Leaf]),
     s: &Setup,
     group: u32,
-    best: &mut Best,
-    keys: &mut Keys,
+    hits: &mut Hits,
+    stack: &mut Keys,
 ) -> u32 {
+    let mut keys: Keys = [0; STACK];
     let lead = group.trailing_zeros() as usize & 7;
     let members = Mask8::from_bits(group);
     let axes = s.axes(lead);
@@ -102,7 +107,8 @@ pub(super) fn walk_packet<const ANY: bool>(
     let earliest = F32x8::splat(members.select(line.tmin, F32x8::INFINITY).min_lane());
 
     let never = F32x8::splat(f32::NEG_INFINITY);
-    let mut b = Best { t: members.select(best.t, never), ..*best };
+    let before = Best::load(hits);
+    let mut b = Best { t: members.select(before.t, never), ..before };
     let mut latest = b.t.max_lane();
     let (mut sp, mut child, mut entry, mut inside) = (0usize, 0u32, line.tmin, members);
     let mut occluded = 0u32;
@@ -112,19 +118,15 @@ pub(super) fn walk_packet<const ANY: bool>(
         let mut changed = false;
         if child & LEAF_BIT == 0 {
             if n <= FEW {
-                for i in Mask8::from_bits(rays).lanes() {
-                    let mut h = b.lane(i);
-                    let before = h;
-                    let found = walk::<ANY>(tree, (child, entry.lane(i)), &Ray1::new(s, i), &mut h, keys, sp);
-                    if ANY && found {
-                        occluded |= 1 << i;
-                        b.finish(i);
-                        changed = true;
-                    } else if !ANY && h.triangle != before.triangle {
-                        b.set(i, &h);
-                        changed = true;
-                    }
+                let mut h = b.store();
+                let found = walk::<ANY>(tree, (child, &entry.to_array()), s, rays, &mut h, stack);
+                if ANY {
+                    occluded |= found;
+                    b.t = Mask8::from_bits(found).select(never, b.t);
+                } else {
+                    b = Best::load(&h);
                 }
+                changed = true;
             } else if let Some(node) = tree.0.get(child as usize) {
                 let rows = &node.bounds;
                 let (mut enter, mut leave) = (earliest, F32x8::splat(latest));
@@ -153,7 +155,7 @@ pub(super) fn walk_packet<const ANY: bool>(
             if n < triangles {
                 for i in Mask8::from_bits(rays).lanes() {
                     let mut h = b.lane(i);
-                    if test_leaf::<ANY>(leaf, &Ray1::new(s, i), entry.lane(i), &mut h) {
+                    if test_leaf::<ANY>(leaf, s, i, entry.lane(i), &mut h) {
                         changed = true;
                         if ANY {
                             occluded |= 1 << i;
@@ -214,9 +216,9 @@ pub(super) fn walk_packet<const ANY: bool>(
             }
         }
     }
-    best.t = members.select(b.t, best.t);
-    best.triangle = U32x8::select(members, b.triangle, best.triangle);
-    best.u = members.select(b.u, best.u);
-    best.v = members.select(b.v, best.v);
+    if !ANY {
+        b.t = members.select(b.t, before.t);
+        *hits = b.store();
+    }
     occluded
 }

@@ -91,17 +91,13 @@ impl Setup {
         }
     }
 
-    /// The axes of lane `i`, cyclic so that the shear keeps orientation; the last is the major one. All are below 3,
-    /// which the compiler sees.
+    /// The axes of lane `i`, cyclic so that the shear keeps orientation; the last is the major one. From a table: the
+    /// next ray's axes cannot be predicted from this one's.
     #[inline(always)]
     pub fn axes(&self, i: usize) -> [usize; 3] {
-        if self.major[0] >> i & 1 == 1 {
-            [1, 2, 0]
-        } else if self.major[1] >> i & 1 == 1 {
-            [2, 0, 1]
-        } else {
-            [0, 1, 2]
-        }
+        const TABLE: [[usize; 3]; 4] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 1, 2]];
+        // `min` shows the compiler that they index three rows
+        TABLE[(self.major[0] >> i & 1 | (self.major[1] >> i & 1) << 1) as usize].map(|k| k.min(2))
     }
 
     /// Rows of a node that hold the near planes of lane `i`; the far ones are at `3 - x`, `5 - y`, `7 - z`.

@@ -1,10 +1,11 @@
-//! One ray against the tree, eight boxes or eight triangles at a time.
+//! Single rays against the tree, eight boxes or eight triangles at a time, several rays taking turns.
 //!
 //! ```text
-//! closest(node):
-//!     for each child that the ray enters before the closest hit so far, nearest first:
-//!         leaf: keep the closest hit of its triangles
-//!         node: closest(child)
+//! for each ray in turn, until all are done:
+//!     at a leaf: keep the closest hit of its triangles
+//!     at a node: of the children that the ray enters before the closest hit so far
+//!         the nearest is next, the others go to the ray's stack
+//!     none: next is the top of the stack, unless it is behind the closest hit
 //! ```
 //!
 //! 1. The nearest child is walked at once, the others go to the stack sorted by entry (insertion sort: seldom more than
@@ -13,11 +14,14 @@
 //! 3. Any hit: no order, the first hit ends it.
 //! 4. A hit counts from `max(t, entry of its leaf)`: so a subtree entered after the closest hit holds nothing closer, not
 //!    even by rounding, and the result does not depend on the order of visits. Equal t: the lower triangle index.
+//! 5. While one ray waits for a node or a leaf from memory, the processor already works on the next ray. Rays share one
+//!    stack of the full size: a ray that fills its eighth begins anew with all of it, and (4) gives the same result.
+//!    Dropped: boxes of all rays first and then their decisions, reading ahead what is next (as slow as one by one).
 
 use super::setup::{Setup, each};
 use super::triangle::{Line, intersect};
 use crate::scene::blob::{CHILD_INDEX, LEAF_BIT, Leaf, NONE, Node};
-use croupier_simd::F32x8;
+use croupier_simd::{F32x8, Mask8};
 
 /// Entries of the traversal stack: 7 siblings per level of a tree of
 /// [`MAX_TREE_DEPTH`](crate::scene::blob::MAX_TREE_DEPTH) levels fit.
@@ -25,39 +29,6 @@ pub(super) const STACK: usize = 256;
 
 /// Entry distance (upper half, float bits) and child reference of the subtrees to visit.
 pub(super) type Keys = [u64; STACK];
-
-/// Constants of one ray, one value in all lanes.
-pub(super) struct Ray1<'a> {
-    line: Line<'a>,
-    near: [F32x8; 3],
-    far: [F32x8; 3],
-    ninv: [F32x8; 3],
-    /// Rows of a node's near planes.
-    rows: [usize; 3],
-}
-
-impl<'a> Ray1<'a> {
-    /// Lane `i` of `s`.
-    #[inline(always)]
-    pub fn new(s: &'a Setup, i: usize) -> Self {
-        let i = i & 7;
-        let axes = s.axes(i);
-        Self {
-            line: Line {
-                o: each(|k| F32x8::splat(s.o[axes[k]][i])),
-                shear: each(|k| F32x8::splat(s.shear[k][i])),
-                tmin: F32x8::splat(s.tmin[i]),
-                setup: s,
-                axes,
-                lane: Some(i),
-            },
-            near: each(|k| F32x8::splat(s.near[k][i])),
-            far: each(|k| F32x8::splat(s.far[k][i])),
-            ninv: each(|k| F32x8::splat(s.ninv[k][i])),
-            rows: s.rows(i),
-        }
-    }
-}
 
 /// A closest hit.
 #[derive(Clone, Copy)]
@@ -68,24 +39,42 @@ pub(super) struct Hit1 {
     pub v: f32,
 }
 
-impl Hit1 {
-    /// No hit up to and including `limit`.
-    pub fn none(limit: f32) -> Self {
-        Self { t: limit, triangle: NONE, u: 0.0, v: 0.0 }
+/// Closest hits by lane.
+pub(super) struct Hits {
+    pub t: [f32; 8],
+    pub triangle: [u32; 8],
+    pub u: [f32; 8],
+    pub v: [f32; 8],
+}
+
+impl Hits {
+    /// No hits up to and including `limit`.
+    #[inline(always)]
+    pub fn none(limit: [f32; 8]) -> Self {
+        Self { t: limit, triangle: [NONE; 8], u: [0.0; 8], v: [0.0; 8] }
+    }
+
+    #[inline(always)]
+    fn set(&mut self, i: usize, h: &Hit1) {
+        (self.t[i], self.triangle[i], self.u[i], self.v[i]) = (h.t, h.triangle, h.u, h.v);
     }
 }
 
-/// The triangles of a leaf as the rows of `axes`.
+/// Tests lane `i` of `s` against the triangles of `leaf`, which it enters at `entry`. Closest: improves `best`, returns
+/// whether it did. Any: returns whether there is a hit at or before `best.t`.
 #[inline(always)]
-fn rows(leaf: &Leaf, axes: [usize; 3]) -> [[F32x8; 3]; 3] {
-    each(|v| each(|k| F32x8::new(leaf.p[3 * v + axes[k]])))
-}
-
-/// Tests `r` against the triangles of `leaf`, which it enters at `entry`. Closest: improves `best`, returns whether it did.
-/// Any: returns whether there is a hit at or before `best.t`.
-#[inline(always)]
-pub(super) fn test_leaf<const ANY: bool>(leaf: &Leaf, r: &Ray1<'_>, entry: f32, best: &mut Hit1) -> bool {
-    let Some(c) = intersect::<ANY>(&rows(leaf, r.line.axes), &r.line, F32x8::splat(best.t)) else { return false };
+pub(super) fn test_leaf<const ANY: bool>(leaf: &Leaf, s: &Setup, i: usize, entry: f32, best: &mut Hit1) -> bool {
+    let axes = s.axes(i);
+    let line = Line {
+        o: each(|k| F32x8::splat(s.o[axes[k]][i])),
+        shear: each(|k| F32x8::splat(s.shear[k][i])),
+        tmin: F32x8::splat(s.tmin[i]),
+        setup: s,
+        axes,
+        lane: Some(i),
+    };
+    let p = each(|v| each(|k| F32x8::new(leaf.p[3 * v + axes[k]])));
+    let Some(c) = intersect::<ANY>(&p, &line, F32x8::splat(best.t)) else { return false };
     if ANY {
         return true;
     }
@@ -99,85 +88,118 @@ pub(super) fn test_leaf<const ANY: bool>(leaf: &Leaf, r: &Ray1<'_>, entry: f32, 
     found
 }
 
-/// Walks the subtree `root`, which the ray enters at `entry`. Closest: improves `best`. Any: stops at the first hit and
-/// returns whether there is one. Uses `stack` from `base` on.
-#[inline(always)]
+/// Walks the subtree `root` with the rays `lanes` of `s`, which enter it at `entry`. Closest: improves `hits`. Any: returns
+/// the lanes with a hit at or before `hits.t`; each stops at its first.
 pub(super) fn walk<const ANY: bool>(
-    (nodes, leaves): (&[Node], &[Leaf]),
-    (root, entry): (u32, f32),
-    r: &Ray1<'_>,
-    best: &mut Hit1,
+    tree: (&[Node], &[Leaf]),
+    root: (u32, &[f32; 8]),
+    s: &Setup,
+    lanes: u32,
+    hits: &mut Hits,
     stack: &mut Keys,
-    base: usize,
-) -> bool {
-    let [n0, n1, n2] = r.rows;
-    let [f0, f1, f2] = each(|k| 2 * k + 3 - r.rows[k]);
-    let mut limit = F32x8::splat(best.t);
-    let mut sp = base;
-    let mut current = u64::from(entry.to_bits()) << 32 | u64::from(root);
-    loop {
-        let child = current as u32;
-        if child & LEAF_BIT == 0 {
-            if let Some(node) = nodes.get(child as usize) {
-                let b = &node.bounds;
-                let near = |row: usize, k: usize| (r.near[k] - F32x8::new(b[row])) * r.ninv[k];
-                let far = |row: usize, k: usize| (r.far[k] - F32x8::new(b[row])) * r.ninv[k];
-                let enter = r.line.tmin.max(near(n0, 0)).max(near(n1, 1).max(near(n2, 2)));
-                let leave = limit.min(far(f0, 0)).min(far(f1, 1).min(far(f2, 2)));
-                let mut m = enter.le(leave).bits();
-                if m != 0 {
-                    let enter = enter.to_array();
-                    // any hit reads no entries
-                    let bits = |i: usize| if ANY { 0 } else { u64::from(enter[i].to_bits()) << 32 };
-                    let key = |i: usize| bits(i) | u64::from(node.child[i]);
-                    let mut next = || {
-                        let i = m.trailing_zeros() as usize & 7;
-                        m &= m - 1;
-                        (key(i), m != 0)
-                    };
-                    let (mut nearest, mut more) = next();
-                    let start = sp;
-                    while more {
-                        let other;
-                        (other, more) = next();
-                        if ANY {
-                            stack[sp & (STACK - 1)] = other;
-                            sp += 1;
+) -> u32 {
+    let (mut found, deep) = take_turns::<ANY, { STACK / 8 }>(tree, root, (s, lanes), hits, stack);
+    for i in Mask8::from_bits(deep).lanes() {
+        found |= take_turns::<ANY, STACK>(tree, root, (s, 1 << i), hits, stack).0;
+    }
+    found
+}
+
+/// [`walk`] with `ROOM` entries of the stack for each ray. Returns the lanes with any hit, and those that need more room:
+/// their `hits` are real, though perhaps not the closest.
+#[inline(never)]
+fn take_turns<const ANY: bool, const ROOM: usize>(
+    (nodes, leaves): (&[Node], &[Leaf]),
+    (root, entry): (u32, &[f32; 8]),
+    (s, lanes): (&Setup, u32),
+    hits: &mut Hits,
+    stack: &mut Keys,
+) -> (u32, u32) {
+    let mut current: [u64; 8] = core::array::from_fn(|i| u64::from(entry[i].to_bits()) << 32 | u64::from(root));
+    let mut tops = [0usize; 8];
+    let (mut live, mut found, mut deep) = (lanes, 0u32, 0u32);
+    while live != 0 {
+        for i in Mask8::from_bits(live).lanes() {
+            let base = i * ROOM;
+            let mut sp = tops[i];
+            let child = current[i] as u32;
+            if child & LEAF_BIT == 0 {
+                if let Some(node) = nodes.get(child as usize) {
+                    let low = s.rows(i);
+                    let b = &node.bounds;
+                    let ninv = each(|k| F32x8::splat(s.ninv[k][i]));
+                    let near = |k: usize| (F32x8::splat(s.near[k][i]) - F32x8::new(b[low[k]])) * ninv[k];
+                    let far = |k: usize| (F32x8::splat(s.far[k][i]) - F32x8::new(b[2 * k + 3 - low[k]])) * ninv[k];
+                    let enter = F32x8::splat(s.tmin[i]).max(near(0)).max(near(1).max(near(2)));
+                    let leave = F32x8::splat(hits.t[i]).min(far(0)).min(far(1).min(far(2)));
+                    let mut m = enter.le(leave).bits();
+                    if m != 0 {
+                        if sp + 7 > ROOM {
+                            deep |= 1 << i;
+                            live &= !(1 << i);
                             continue;
                         }
-                        let mut later = other;
-                        if other < nearest {
-                            (nearest, later) = (other, nearest);
+                        let enter = enter.to_array();
+                        // any hit reads no entries
+                        let bits = |c: usize| if ANY { 0 } else { u64::from(enter[c].to_bits()) << 32 };
+                        let key = |c: usize| bits(c) | u64::from(node.child[c]);
+                        let mut next = || {
+                            let c = m.trailing_zeros() as usize & 7;
+                            m &= m - 1;
+                            (key(c), m != 0)
+                        };
+                        let (mut nearest, mut more) = next();
+                        let start = sp;
+                        while more {
+                            let other;
+                            (other, more) = next();
+                            if ANY {
+                                stack[(base + sp) & (STACK - 1)] = other;
+                                sp += 1;
+                                continue;
+                            }
+                            let mut later = other;
+                            if other < nearest {
+                                (nearest, later) = (other, nearest);
+                            }
+                            let mut p = sp;
+                            while p > start && stack[(base + p - 1) & (STACK - 1)] < later {
+                                stack[(base + p) & (STACK - 1)] = stack[(base + p - 1) & (STACK - 1)];
+                                p -= 1;
+                            }
+                            stack[(base + p) & (STACK - 1)] = later;
+                            sp += 1;
                         }
-                        let mut p = sp;
-                        while p > start && stack[(p - 1) & (STACK - 1)] < later {
-                            stack[p & (STACK - 1)] = stack[(p - 1) & (STACK - 1)];
-                            p -= 1;
-                        }
-                        stack[p & (STACK - 1)] = later;
-                        sp += 1;
+                        (current[i], tops[i]) = (nearest, sp);
+                        continue;
                     }
-                    current = nearest;
-                    continue;
+                }
+            } else if let Some(leaf) = leaves.get((child & CHILD_INDEX) as usize) {
+                let mut best = Hit1 { t: hits.t[i], triangle: hits.triangle[i], u: 0.0, v: 0.0 };
+                if test_leaf::<ANY>(leaf, s, i, f32::from_bits((current[i] >> 32) as u32), &mut best) {
+                    if ANY {
+                        found |= 1 << i;
+                        live &= !(1 << i);
+                        continue;
+                    }
+                    hits.set(i, &best);
                 }
             }
-        } else if let Some(leaf) = leaves.get((child & CHILD_INDEX) as usize) {
-            let found = test_leaf::<ANY>(leaf, r, f32::from_bits((current >> 32) as u32), best);
-            if ANY && found {
-                return true;
-            }
-            limit = F32x8::splat(best.t);
-        }
-        loop {
-            if sp == base {
-                return false;
-            }
-            sp -= 1;
-            current = stack[sp & (STACK - 1)];
-            // an entry equal to the closest t may hold an equal hit with a lower index
-            if ANY || f32::from_bits((current >> 32) as u32) <= best.t {
-                break;
+            let limit = hits.t[i];
+            loop {
+                if sp == 0 {
+                    live &= !(1 << i);
+                    break;
+                }
+                sp -= 1;
+                let key = stack[(base + sp) & (STACK - 1)];
+                // an entry equal to the closest t may hold an equal hit with a lower index
+                if ANY || f32::from_bits((key >> 32) as u32) <= limit {
+                    (current[i], tops[i]) = (key, sp);
+                    break;
+                }
             }
         }
     }
+    (found, deep)
 }

@@ -3,9 +3,9 @@
 //! Rays are grouped by direction octant and major axis; groups of more than [`FEW`] walk the tree as a packet, which
 //! doubles the throughput of coherent rays; the others go one by one, which is best for incoherent ones.
 
-use super::packet::{Best, FEW, walk_packet};
+use super::packet::{FEW, walk_packet};
 use super::setup::Setup;
-use super::single::{Hit1, Keys, Ray1, STACK, walk};
+use super::single::{Hits, Keys, STACK, walk};
 use super::{Hit8, Intersector, Ray8};
 use crate::scene::Scene;
 use crate::scene::blob::{Leaf, NONE, Node};
@@ -46,9 +46,9 @@ impl<'s> WideBvh<'s> {
         Self { nodes, leaves, extent }
     }
 
-    /// Traces the valid rays of `s`; returns the lanes with a hit if `ANY`.
+    /// Traces the valid rays of `s`. Closest: improves `hits`. Any: returns the lanes with a hit.
     #[inline(always)]
-    fn trace<const ANY: bool>(&self, s: &Setup, best: &mut Best) -> u32 {
+    fn trace<const ANY: bool>(&self, s: &Setup, hits: &mut Hits) -> u32 {
         let tree = (self.nodes, self.leaves);
         let mut stack: Keys = [0; STACK];
         let (mut left, mut alone, mut occluded) = (s.valid, 0, 0);
@@ -58,17 +58,11 @@ impl<'s> WideBvh<'s> {
             if group.count_ones() <= FEW {
                 alone |= group;
             } else {
-                occluded |= walk_packet::<ANY>(tree, s, group, best, &mut stack);
+                occluded |= walk_packet::<ANY>(tree, s, group, hits, &mut stack);
             }
         }
-        for i in Mask8::from_bits(alone).lanes() {
-            let mut h = Hit1::none(s.limit[i]);
-            let found = walk::<ANY>(tree, (0, s.tmin[i]), &Ray1::new(s, i), &mut h, &mut stack, 0);
-            if ANY {
-                occluded |= u32::from(found) << i;
-            } else if h.triangle != NONE {
-                best.set(i, &h);
-            }
+        if alone != 0 {
+            occluded |= walk::<ANY>(tree, (0, &s.tmin), s, alone, hits, &mut stack);
         }
         occluded
     }
@@ -77,17 +71,18 @@ impl<'s> WideBvh<'s> {
 impl Intersector for WideBvh<'_> {
     fn closest(&self, rays: &Ray8, active: Mask8) -> Hit8 {
         let s = Setup::new(rays, active, self.extent);
-        let mut best = Best::none(F32x8::new(s.limit));
+        let mut hits = Hits::none(s.limit);
         if !self.nodes.is_empty() && s.valid != 0 {
-            self.trace::<false>(&s, &mut best);
+            self.trace::<false>(&s, &mut hits);
         }
-        let hit = !best.triangle.eq(U32x8::splat(NONE));
+        let triangle = U32x8::new(hits.triangle);
+        let hit = !triangle.eq(U32x8::splat(NONE));
         Hit8 {
             hit,
-            t: hit.select(best.t, rays.tmax),
-            triangle: best.triangle,
-            u: hit.zero_unless(best.u),
-            v: hit.zero_unless(best.v),
+            t: hit.select(F32x8::new(hits.t), rays.tmax),
+            triangle,
+            u: hit.zero_unless(F32x8::new(hits.u)),
+            v: hit.zero_unless(F32x8::new(hits.v)),
         }
     }
 
@@ -96,7 +91,6 @@ impl Intersector for WideBvh<'_> {
         if self.nodes.is_empty() || s.valid == 0 {
             return Mask8::NONE;
         }
-        let mut best = Best::none(F32x8::new(s.limit));
-        Mask8::from_bits(self.trace::<true>(&s, &mut best))
+        Mask8::from_bits(self.trace::<true>(&s, &mut Hits::none(s.limit)))
     }
 }
