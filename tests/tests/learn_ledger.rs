@@ -23,6 +23,7 @@ fn whole_leaves(scene: &[u8], max_depth: u32) -> Settings {
         ledger: 1 << 14,
         estimate: Estimate::Blocks,
         objective: Objective::Absolute,
+        samples: u32::MAX,
         ..s.learning
     };
     Settings { max_depth, learning, ring: 1 << 14, split_budget: 1 << 20, ..s }

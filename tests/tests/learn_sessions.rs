@@ -107,6 +107,7 @@ fn full_bins_refuse_and_count() {
     s.learning.cache_bytes = 16_000;
     // so that the vertices that the camera sees are logged in the first iteration
     s.learning.objective = Objective::Absolute;
+    s.learning.samples = u32::MAX;
     let limit = f64::from(BIN_LIMIT);
     let mut seen = Vec::new();
     learning(&scene, &s, &[600, 0], IN_ORDER, &mut |_, l: &mut dyn Learned| {
