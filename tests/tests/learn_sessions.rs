@@ -120,6 +120,30 @@ fn full_bins_refuse_and_count() {
     assert_eq!(counts.iter().sum::<f64>(), (c.samples_logged - c.samples_refused) as f64);
 }
 
+/// Of 16 samples of a pixel the first 3 teach what 3 samples do, and all of them make the picture. Killed by: a limit that is
+/// not looked at, one too many or too few, the last samples instead of the first, pictures without the others.
+#[test]
+fn the_first_samples_of_a_pixel_are_learned_from() {
+    let scene = blob(&cornell([16, 16]));
+    let mut s = learns(&scene, "ears", 4);
+    s.learning.objective = Objective::Absolute;
+    let mut run = |samples: u32, spp: u32| {
+        s.learning.samples = samples;
+        let mut saved = Vec::new();
+        let image = learning(&scene, &s, &[spp, 0], IN_ORDER, &mut |i, l: &mut dyn Learned| {
+            if i == 0 {
+                saved = l.saved().unwrap();
+            }
+        });
+        (saved, image.counters.samples_logged, image.counters.camera_samples)
+    };
+    let (some, logged, paths) = run(3, 16);
+    let (few, of_few, _) = run(u32::MAX, 3);
+    let (_, of_all, all) = run(u32::MAX, 16);
+    assert!(some == few && logged == of_few && of_all > 4 * logged, "{logged} of {of_all}, {of_few} of 3 samples");
+    assert_eq!(paths, all);
+}
+
 /// Statistics of other bounds are refused with what differs, and nothing has changed. Of other things within the same bounds
 /// they are taken: they change the noise, no mean (`learn_unbiased.rs` loads random ones). Killed by: bounds that are not
 /// looked at, a cache that is emptied before the bytes are checked.
@@ -274,6 +298,7 @@ fn choices_that_make_no_sense_are_refused() {
     };
     for learning in [
         Learning { ledger: 0, ..Learning::default() },
+        Learning { samples: 0, ..Learning::default() },
         Learning { ledger: (1 << 24) + 1, ..Learning::default() },
         Learning { split_count: 0.0, ..Learning::default() },
         Learning { split_count: f32::NAN, ..Learning::default() },
