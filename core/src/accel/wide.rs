@@ -15,8 +15,7 @@ use croupier_simd::{F32x8, Mask8, U32x8};
 ///
 /// Watertight: no ray passes between triangles that share an edge or a vertex. A hit is the closest by computed t, among
 /// equal ones the triangle with the lowest index; which rays share a packet never changes a bit of the result. `tmin`
-/// below 0 counts as 0. Calls need about 8 KiB of
-/// stack.
+/// below 0 counts as 0. Calls need about 9 KiB of stack.
 #[derive(Clone, Copy, Debug)]
 pub struct WideBvh<'s> {
     nodes: &'s [Node],
