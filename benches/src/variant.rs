@@ -59,8 +59,8 @@ impl Variant {
             s.learning.factors = [1.0, 1.0];
         }
         if self.has("small") {
-            s.shards = 1;
-            s.learning = Learning { cache_bytes: 192 << 10, ledger: 256, estimate: Estimate::Blocks, ..s.learning };
+            (s.shards, s.ring) = (1, 128);
+            s.learning = Learning { cache_bytes: 152 << 10, ledger: 256, estimate: Estimate::Blocks, ..s.learning };
         }
         s
     }

@@ -54,7 +54,7 @@ pub struct PixelStats {
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct PixelAov {
-    /// Albedo of the first hit.
+    /// Albedo of the first hit from the camera's side, as roulette takes it: reflected and transmitted, 1 for clear glass.
     pub albedo: [f64; 3],
     /// Shading normal of the first hit, world space.
     pub normal: [f64; 3],

@@ -33,7 +33,8 @@ pub struct Settings {
     pub ring: u32,
     /// Samples that splitting may add to one camera sample; beyond it factors are at most 1 (unbiased, counted).
     pub split_budget: u32,
-    /// Also gather albedo, normal, depth and factors.
+    /// Also gather albedo, normal, depth and factors. The denoised estimate of the pixels that strategies learn with is
+    /// better with them.
     pub aovs: bool,
     /// Give pixels with much error more samples, others fewer, from the second iteration on. Every pixel gets one at
     /// least, and iterations are weighted as a whole, so that no pixel's mean hangs on its own noise.
@@ -89,6 +90,8 @@ pub enum SettingsError {
     Constant,
     /// A choice of [`Learning`] is out of range.
     Learning,
+    /// A parameter of the strategy or a choice of [`Learning`] is NaN.
+    NotANumber,
     /// The memory would exceed what can be addressed.
     Memory,
 }
@@ -103,6 +106,7 @@ impl fmt::Display for SettingsError {
             Self::Cache { needed, given } => write!(f, "cache of {given} bytes: with so many shards it needs {needed}"),
             Self::Constant => f.write_str("the constant of roulette must be finite and cannot serve threshold; the cached mean needs ear, ears, adrr or adrrs"),
             Self::Learning => f.write_str("learning: need a ledger of 1 to 2^24 records, at least 1 sample to learn from, a split count above 0, a carry of 0 to 1, factors around 1 in 0.05 to 20"),
+            Self::NotANumber => f.write_str("a parameter of the strategy, or of learning, is not a number"),
             Self::Memory => f.write_str("these settings need more memory than can be addressed"),
         }
     }
@@ -125,6 +129,10 @@ impl Plan {
     /// Checks the settings and measures the blocks.
     pub fn new(settings: &Settings) -> Result<Self, SettingsError> {
         let s = *settings;
+        #[expect(clippy::eq_op, reason = "equal to itself unless a number in it is NaN")]
+        if s != s {
+            return Err(SettingsError::NotANumber);
+        }
         let pixels = u64::from(s.size[0]) * u64::from(s.size[1]);
         if pixels == 0 || pixels > 1 << 31 {
             return Err(SettingsError::Size(s.size));
@@ -179,9 +187,6 @@ fn cache_size(s: &Settings) -> Result<Option<CacheSize>, SettingsError> {
     if !fits {
         return Err(SettingsError::Constant);
     }
-    if s.strategy.space().is_none() {
-        return Ok(None);
-    }
     let l = &s.learning;
     let [least, most] = l.factors;
     let fits = (MIN_FACTOR..=1.0).contains(&least)
@@ -192,6 +197,9 @@ fn cache_size(s: &Settings) -> Result<Option<CacheSize>, SettingsError> {
         && (0.0..=1.0).contains(&l.carry);
     if !fits {
         return Err(SettingsError::Learning);
+    }
+    if s.strategy.space().is_none() {
+        return Ok(None);
     }
     let needed = CacheSize::SMALLEST.bytes(s.shards).ok_or(SettingsError::Memory)?;
     CacheSize::within(l.cache_bytes, s.shards).map(Some).ok_or(SettingsError::Cache { needed, given: l.cache_bytes })

@@ -3,7 +3,7 @@
 use croupier::Settings;
 use croupier_host::description::*;
 use croupier_tests::bsdf::fresnel_dielectric;
-use croupier_tests::runner::{Image, render, settings};
+use croupier_tests::runner::{Image, Schedule, render, scheduled, settings};
 use croupier_tests::scenes::*;
 
 /// |z| that a comparison may reach: with the 60 of this file a false alarm in 1e5 runs.
@@ -122,6 +122,22 @@ fn strategies_keep_direct_light() {
     let expected = 0.5 / std::f64::consts::PI;
     for strategy in ["none", "classic", "classic:1", "contribution", "throughput", "albedo", "fixed:0.3", "fixed:4.5"] {
         assert_mean(strategy, &render_as(&s, strategy, 2, 4096), expected, 0.01);
+    }
+}
+
+/// The same with strategies that learn. Light samples of two lights differ, so that there is something to learn.
+#[test]
+fn learned_strategies_keep_direct_light() {
+    let mut s = spot(0.5, [4, 4]);
+    s.emitters.push(Emitter::Directional { direction: [0.0, -1.0, 0.0], irradiance: [1.0; 3] });
+    s.emitters.push(Emitter::Point { position: [0.0, 2.0, 0.0], intensity: [12.0; 3] });
+    let expected = 0.5 / std::f64::consts::PI * (1.0 + 12.0 / 4.0);
+    let scene = blob(&s);
+    for strategy in ["bolin-meyer", "adrr", "adrrs", "ear", "ears", "ear:plain", "ears:plain"] {
+        let s = Settings { max_depth: 2, ..settings(&scene, strategy) };
+        let image = scheduled(&scene, &s, &[64, 512, 1024, 4096, 4096], Schedule::InOrder(1 << 20));
+        assert_mean(strategy, &image, expected, 0.01);
+        assert!(image.counters.samples_logged > 10_000, "{strategy}");
     }
 }
 

@@ -187,6 +187,9 @@ fn moment_and_variance_decide_together() {
         let v = learned(0.5, moment, variance, 1.0);
         assert_eq!(with("ears:plain", &v), ears, "ears, moment {moment}, variance {variance}");
         assert_eq!(with("ear:plain", &v), ear, "ear, moment {moment}, variance {variance}");
+        if !moment.is_finite() && !variance.is_finite() {
+            assert_eq!([with("ears", &v), with("ear", &v)], [1.0; 2], "moment {moment}, variance {variance}");
+        }
         if moment.is_finite() && variance.is_finite() {
             let s = with("bolin-meyer", &v);
             assert_eq!(s, ears, "bolin-meyer, moment {moment}, variance {variance}");

@@ -10,7 +10,7 @@ use crate::film::{Film, SqrtNewton};
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::tiles::TILE;
 
-/// Fewest and most samples of a pixel over the mean.
+/// Least and greatest share of a pixel in the samples beyond its first, relative to what the mean pixel wishes.
 const SHARES: [f64; 2] = [0.25, 8.0];
 
 /// Camera samples per pixel, by tile.
@@ -47,47 +47,70 @@ impl<'m> Allotment<'m> {
         if n > 0 { f64::from(n) / f64::from(self.samples.max(1)) } else { 1.0 }
     }
 
-    /// Deals out `samples` camera samples per pixel in the mean.
+    /// Deals out `samples` camera samples per pixel in the mean: one to each, the others by what tiles wish, with what
+    /// rounding leaves over handed from tile to tile.
     pub(super) fn deal(&mut self, samples: u32, film: &Film<'_>, pixels: &Pixels<'_>) {
         self.samples = samples;
         self.counts.fill(samples);
-        if self.counts.is_empty() || !pixels.known() || samples == 0 {
+        if self.counts.is_empty() || !pixels.known() || samples < 2 {
             return;
         }
-        let (mut sum, mut area) = (0.0, 0.0);
+        // wishes wait where the counts will be
+        let (mut wished, mut area) = (0.0, 0.0);
         for tile in 0..self.counts.len() {
-            let (wish, n) = self.wish(tile as u32, film, pixels);
-            sum += wish * n;
+            let wish = self.wish(tile as u32, film, pixels) as f32;
+            let n = self.area(tile as u32);
+            wished += f64::from(wish) * n;
             area += n;
-        }
-        if sum <= 0.0 || !f64::is_finite(sum) {
-            return;
-        }
-        for tile in 0..self.counts.len() {
-            let share = self.wish(tile as u32, film, pixels).0 * area / sum;
-            let [least, most] = SHARES;
-            if let Some(n) = self.counts.get_mut(tile) {
-                *n = ((share.clamp(least, most) * f64::from(samples) + 0.5) as u32).max(1);
+            if let Some(count) = self.counts.get_mut(tile) {
+                *count = wish.to_bits();
             }
+        }
+        let mean = wished / area;
+        if !(mean > 0.0 && mean.is_finite()) {
+            return self.counts.fill(samples);
+        }
+        let [least, most] = SHARES;
+        let share = |bits: u32| (f64::from(f32::from_bits(bits)) / mean).clamp(least, most);
+        let dealt: f64 = (0..).zip(&*self.counts).map(|(tile, &bits)| share(bits) * self.area(tile)).sum();
+        let scale = f64::from(samples - 1) * area / dealt;
+        let mut left = 0.0;
+        for tile in 0..self.counts.len() {
+            let n = self.area(tile as u32);
+            let Some(count) = self.counts.get_mut(tile) else { continue };
+            left += share(*count) * scale * n;
+            let more = (left / n + 0.5) as u32;
+            left -= f64::from(more) * n;
+            *count = 1 + more;
         }
     }
 
-    /// sqrt(variance / cost) of a tile's samples, and its pixels.
-    fn wish(&self, tile: u32, film: &Film<'_>, pixels: &Pixels<'_>) -> (f64, f64) {
-        let [w, h] = self.size;
-        let columns = w.div_ceil(TILE);
-        let (x0, y0) = (tile % columns * TILE, tile / columns * TILE);
-        let (mut error, mut rays, mut n) = (0.0, 0.0, 0.0);
-        for y in y0..(y0 + TILE).min(h) {
-            for x in x0..(x0 + TILE).min(w) {
-                let i = y * w + x;
+    /// First pixel of a tile, and the one behind its last.
+    fn corners(&self, tile: u32) -> [[u32; 2]; 2] {
+        let columns = self.size[0].div_ceil(TILE);
+        let first = [tile % columns * TILE, tile / columns * TILE];
+        [first, [0, 1].map(|a| (first[a] + TILE).min(self.size[a]))]
+    }
+
+    /// Pixels of a tile.
+    fn area(&self, tile: u32) -> f64 {
+        let [from, to] = self.corners(tile);
+        f64::from((to[0] - from[0]) * (to[1] - from[1]))
+    }
+
+    /// sqrt(variance / cost) of a tile's samples.
+    fn wish(&self, tile: u32, film: &Film<'_>, pixels: &Pixels<'_>) -> f64 {
+        let [from, to] = self.corners(tile);
+        let (mut error, mut rays) = (0.0, 0.0);
+        for y in from[1]..to[1] {
+            for x in from[0]..to[0] {
+                let i = y * self.size[0] + x;
                 let Some(p) = film.pixels().get(i as usize) else { continue };
                 let e = p.variance_of_mean().into_iter().zip(pixels.importance(i)).map(|(v, w)| v * f64::from(w));
                 error += e.sum::<f64>() * p.samples as f64;
                 rays += p.rays as f64 / p.samples.max(1) as f64;
-                n += 1.0;
             }
         }
-        ((error / f64::max(rays, 1.0)).sqrt_newton(), n)
+        (error / f64::max(rays, 1.0)).sqrt_newton()
     }
 }

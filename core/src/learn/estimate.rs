@@ -9,7 +9,8 @@ use crate::tiles::TILE;
 /// How the estimate of the pixels is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Estimate {
-    /// By the built-in denoiser; takes about 140 bytes a pixel, scratch included.
+    /// By the built-in denoiser, which looks at albedo and normals if [`crate::Settings::aovs`] has them gathered; takes about
+    /// 140 bytes a pixel, scratch included.
     #[default]
     Denoised,
     /// Means over squares of 8x8 pixels: 12 bytes for 64 pixels.

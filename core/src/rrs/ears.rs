@@ -76,11 +76,14 @@ pub(super) fn grown(v: &Vertices8, s: F32x8, plain: bool) -> F32x8 {
     }
     let blend = |a: F32x8, b: F32x8, t: F32x8| a + (b - a) * t;
     let window = adrrs::window(l.contribution(v.beta));
+    let broken = known.and_not(s.is_finite() & window.is_finite());
     let learned = blend(level(window), level(s), l.trust(TRUST_MOMENT));
     let s = known.select(from_level(blend(level(classic), learned, l.trust(TRUST_MEAN))), classic);
     // what is killed out of ignorance comes back as a few samples of enormous weight: no factor below 1 brings the
     // throughput over the limit
-    s.max(((v.beta * v.albedo).max_component() / MOST_THROUGHPUT).min(F32x8::ONE))
+    let s = s.max(((v.beta * v.albedo).max_component() / MOST_THROUGHPUT).min(F32x8::ONE));
+    // levels hide what is not finite, `Strategy::factor` looks for it
+    broken.select(F32x8::splat(f32::NAN), s)
 }
 
 impl RrsStrategy for Ears {

@@ -39,7 +39,7 @@ pub use throughput::Throughput;
 pub use winners::Winners;
 
 use core::fmt;
-use croupier_simd::{F32x8, U32x8, Vec3x8};
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Smallest factor of an unbiased strategy.
 pub const MIN_FACTOR: f32 = 0.05;
@@ -143,9 +143,16 @@ macro_rules! strategies {
             /// that is not finite is 1 (NUMERICS RRS-3).
             #[inline(always)]
             pub fn factor(&self, v: &Vertices8) -> F32x8 {
+                self.checked_factor(v).0
+            }
+
+            /// [`Self::factor`], and the lanes whose factor was finite.
+            #[inline(always)]
+            pub(crate) fn checked_factor(&self, v: &Vertices8) -> (F32x8, Mask8) {
                 let s = match self { $(Self::$name(x) => x.factor(v)),* };
-                let s = s.is_finite().select(s, F32x8::ONE);
-                if self.is_biased() { s } else { s.clamp(MIN_FACTOR, MAX_FACTOR) }
+                let finite = s.is_finite();
+                let s = finite.select(s, F32x8::ONE);
+                (if self.is_biased() { s } else { s.clamp(MIN_FACTOR, MAX_FACTOR) }, finite)
             }
         }
     };

@@ -59,6 +59,10 @@ pub struct Counters {
     pub samples_refused: u64,
     /// Samples without a ledger record because the slab was full: they, and those they are part of, were not learned from.
     pub ledger_full: u64,
+    /// Vertices whose factor was not a finite number and became 1.
+    pub factors_not_finite: u64,
+    /// Hits at which a path ended because of the hard stop ([`crate::HARD_STOP`]) before its `max_depth`.
+    pub hard_stopped: u64,
     /// Contributions or weights that were not finite and were not added.
     pub non_finite: u64,
     /// Film index of the pixel of the first of them, plus 1; 0 if there is none.
@@ -104,6 +108,8 @@ impl Counters {
         self.samples_logged += o.samples_logged;
         self.samples_refused += o.samples_refused;
         self.ledger_full += o.ledger_full;
+        self.factors_not_finite += o.factors_not_finite;
+        self.hard_stopped += o.hard_stopped;
         self.non_finite += o.non_finite;
         if self.first_non_finite == 0 {
             self.first_non_finite = o.first_non_finite;

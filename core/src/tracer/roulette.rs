@@ -47,17 +47,17 @@ impl<'s> Visitor<'s> for AlbedoOf<'_, 's> {
     }
 }
 
-/// Albedos of eight vertices of any classes.
-fn albedo<P: Profile>(scene: &Scene<'_>, a: &Arrival8) -> Vec3x8 {
+/// Albedos of vertices of any classes, 0 in other lanes.
+pub(super) fn albedo<P: Profile>(scene: &Scene<'_>, vertex: &Vertex8, kinds: &[u32; 8], active: Mask8) -> Vec3x8 {
     let mut out = Vec3x8::ZERO;
-    let mut left = a.active.bits();
+    let mut left = active.bits();
     while left != 0 {
-        let kind = a.kind[left.trailing_zeros() as usize & 7];
-        let bits = a.active.lanes().filter(|&i| a.kind[i] == kind).fold(0, |m, i| m | 1 << i);
+        let kind = kinds[left.trailing_zeros() as usize & 7];
+        let bits = active.lanes().filter(|&i| kinds[i] == kind).fold(0, |m, i| m | 1 << i);
         left &= !bits;
         let mask = Mask8::from_bits(bits);
         let of = MaterialKind::from_u32(kind)
-            .and_then(|k| bsdf::dispatch_in(P::EFFECTS, k, AlbedoOf { scene, vertex: &a.vertex, mask }));
+            .and_then(|k| bsdf::dispatch_in(P::EFFECTS, k, AlbedoOf { scene, vertex, mask }));
         out = Vec3x8::select(mask, of.unwrap_or(Vec3x8::ONE), out);
     }
     out
@@ -89,7 +89,8 @@ impl Shard<'_> {
         let strategy = settings.strategy;
         let knowledge = session.knowledge();
         let mut v = a.vertex;
-        let albedo = if strategy.needs_albedo() { albedo::<P>(session.scene(), &a) } else { Vec3x8::ZERO };
+        let albedo =
+            if strategy.needs_albedo() { albedo::<P>(session.scene(), &v, &a.kind, a.active) } else { Vec3x8::ZERO };
         let mut logged = None;
         let mut learned = Learned8::NONE;
         if strategy.needs_image() {
@@ -102,7 +103,7 @@ impl Shard<'_> {
             self.counters.look_ups.count(a.active.count());
             logged = Some(found);
         }
-        let s = strategy.factor(&Vertices8 {
+        let (s, finite) = strategy.checked_factor(&Vertices8 {
             beta: v.beta,
             last_weight: a.weight,
             albedo,
@@ -111,6 +112,7 @@ impl Shard<'_> {
             shininess: if strategy.needs_shininess() { shininess(session.scene(), &a) } else { F32x8::ZERO },
             learned,
         });
+        self.counters.factors_not_finite += u64::from(a.active.and_not(finite).count());
         let [least, most] = settings.learning.factors;
         let s = if logged.is_some() { s.clamp(least, most) } else { s };
         let s = self.bound(s, v.root, a.active);

@@ -122,6 +122,7 @@ impl Shard<'_> {
         let root = v.root.to_array();
         for i in broken.lanes() {
             self.count_non_finite(root[i]);
+            self.ledger.spoil(ledger.lane(i));
         }
         let flying = flying.and_not(broken);
         self.close_lanes(active.and_not(flying), v.root, ledger, v.depth);

@@ -1,7 +1,7 @@
 //! Stage `surface`: what was hit, what it emits, and the vertex that it becomes.
 
 use super::flight::Flight8;
-use super::roulette::Arrival8;
+use super::roulette::{Arrival8, albedo};
 use super::settle::Found8;
 use super::shard::Shard;
 use super::vertex::Vertex8;
@@ -11,6 +11,7 @@ use crate::profile::Profile;
 use crate::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind, NONE, TRIANGLE_SMOOTH};
 use crate::scene::{Effects, Scene};
 use crate::session::Session;
+use crate::settings::HARD_STOP;
 use crate::texture;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
@@ -55,21 +56,17 @@ impl Shard<'_> {
         if P::EFFECTS.contains(Effects::AREA_LIGHTS) {
             self.emission(session, f, hit, point.ng);
         }
+        let ends = U32x8::splat(session.max_depth());
+        if self.plan.settings().max_depth > HARD_STOP {
+            self.counters.hard_stopped += u64::from(mask.and_not(f.depth.lt(ends)).count());
+        }
         let first = mask & f.depth.eq(U32x8::splat(1));
-        let mut going = mask & f.depth.lt(U32x8::splat(session.max_depth()));
+        let mut going = mask & f.depth.lt(ends);
         let wants_aov = !self.aovs.is_empty() && first.any();
         if going.none() && !wants_aov {
             return self.close_lanes(mask, f.root, f.ledger, f.depth);
         }
         let s = shade::<P>(scene, hit, wo, point.ng);
-        if wants_aov {
-            self.record_first_hit(first, f, hit, &s);
-        }
-        going &= s.scatters;
-        self.close_lanes(mask.and_not(going), f.root, f.ledger, f.depth);
-        if going.none() {
-            return;
-        }
         let vertex = Vertex8 {
             p: point.p,
             error: point.error,
@@ -87,6 +84,15 @@ impl Shard<'_> {
             count: U32x8::splat(0),
             next: U32x8::splat(0),
         };
+        if wants_aov {
+            let albedo = albedo::<P>(scene, &vertex, &s.kind, first & s.scatters);
+            self.record_first_hit(first, f, hit, s.ns, albedo);
+        }
+        going &= s.scatters;
+        self.close_lanes(mask.and_not(going), f.root, f.ledger, f.depth);
+        if going.none() {
+            return;
+        }
         self.roulette(session, Arrival8 { vertex, weight: f.weight, kind: s.kind, active: going });
     }
 
@@ -122,17 +128,17 @@ impl Shard<'_> {
         self.gather(mask, f.root, f.ledger, &found);
     }
 
-    fn record_first_hit(&mut self, first: Mask8, f: &Flight8, hit: &Hit8, s: &Shading8) {
+    fn record_first_hit(&mut self, first: Mask8, f: &Flight8, hit: &Hit8, normal: Vec3x8, albedo: Vec3x8) {
         let root = f.root.to_array();
         // a host's intersector may answer anything
-        let good = first & hit.t.is_finite() & s.ns.is_finite() & s.reflectance.is_finite();
+        let good = first & hit.t.is_finite() & normal.is_finite() & albedo.is_finite();
         for i in first.and_not(good).lanes() {
             self.count_non_finite(root[i]);
         }
         for i in good.lanes() {
             let pixel = self.roots.get(root[i]).pixel as usize;
             let Some(aov) = self.aovs.get_mut(pixel) else { continue };
-            let (albedo, normal) = (s.reflectance.lane(i), s.ns.lane(i));
+            let (albedo, normal) = (albedo.lane(i), normal.lane(i));
             for c in 0..3 {
                 aov.albedo[c] += f64::from(albedo[c]);
                 aov.normal[c] += f64::from(normal[c]);

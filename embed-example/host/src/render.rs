@@ -77,7 +77,7 @@ pub struct RenderOptions {
 impl Default for RenderOptions {
     fn default() -> Self {
         Self {
-            strategy: "classic".into(),
+            strategy: "ears".into(),
             target: Target::Spp(64),
             max_depth: None,
             size: None,
