@@ -153,6 +153,63 @@ fn info_and_bake_of_a_baked_scene() {
     assert_eq!(std::fs::read(dir.path().join("good.crp")).unwrap(), good);
 }
 
+/// A quad, a line, a triangle without area on a lamp and a smooth one with a normal of length 0, without a camera.
+const DOUBTFUL: &str = "mtllib doubtful.mtl
+v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+vn 0 0 0
+usemtl foggy
+f 1 2 3 4
+f 1//1 2//1 4//1
+l 1 2
+usemtl lamp
+f 1 2 2
+";
+
+/// What loading and baking assumed or left out is said by every command that opens a scene. Killed by: a report that is
+/// dropped, a count that is left out, notes on stdout.
+#[test]
+fn notes_about_a_scene_are_printed() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let materials = "newmtl foggy\nKd 2 0 0\nd 0.75\nnewmtl lamp\nKe 1 1 1\n";
+    std::fs::write(dir.join("doubtful.obj"), DOUBTFUL).unwrap();
+    std::fs::write(dir.join("doubtful.mtl"), materials).unwrap();
+    let said = [
+        "has no camera",
+        "`foggy`: opacity 0.75 was taken as 1",
+        "`foggy`: reflectance [2.0, 0.0, 0.0] was limited",
+        "more than three corners, split into triangles: 1",
+        "points and lines, left out: 1",
+        "triangles without area, left out: 1",
+        "would have been lights: 1",
+        "normal of length 0, shaded flat: 1",
+    ];
+    let counts = ["dropped_lights", "dropped_triangles", "flattened", "skipped_elements", "split_polygons"];
+    let counts = serde_json::Value::Object(counts.iter().map(|n| (n.to_string(), 1.into())).collect());
+    let render = ["render", "doubtful.obj", "--size", "8x8", "--spp", "1", "-o", "d.exr", "--json"];
+    let bake = ["bake", "doubtful.obj", "-o", "d.crp", "--json"];
+    for arguments in [&render[..], &bake, &["info", "doubtful.obj", "--json"]] {
+        let out = croupier(dir, arguments);
+        let notes = text(&out.stderr);
+        assert_eq!(out.status.code(), Some(0), "{notes}");
+        assert_eq!(notes.lines().count(), said.len(), "{notes}");
+        assert!(notes.lines().all(|l| l.starts_with("croupier: note: doubtful.obj: ")), "{notes}");
+        let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        for part in said {
+            assert!(notes.contains(part), "{notes}: {part}");
+            assert!(json["notes"].as_array().unwrap().iter().any(|n| n.as_str().unwrap().contains(part)), "{json}");
+        }
+        assert_eq!(json["scene_counts"], counts);
+    }
+    // said when it was baked
+    let out = croupier(dir, &["info", "d.crp", "--json"]);
+    assert!(out.status.success() && out.stderr.is_empty(), "{}", text(&out.stderr));
+    assert_eq!(serde_json::from_slice::<serde_json::Value>(&out.stdout).unwrap()["notes"], serde_json::json!([]));
+}
+
 fn picture(level: f32, stderr: Option<f32>) -> Picture {
     let mut picture = Picture::new(32, 24);
     // A pattern of mean 0 within each block: noise without noise.

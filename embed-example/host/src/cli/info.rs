@@ -1,5 +1,6 @@
 //! `croupier info`
 
+use super::notes::Notes;
 use super::{Outcome, say, say_json, scene};
 use croupier::scene::Effects;
 use croupier::{Scene, SceneError};
@@ -35,10 +36,12 @@ struct Facts {
     effects: Vec<&'static str>,
     /// Absent in builds that cannot render.
     plan: Option<PlanSummary>,
+    #[serde(flatten)]
+    notes: Notes,
 }
 
 impl Facts {
-    fn of(bytes: &[u8]) -> Result<Self, SceneError> {
+    fn of(bytes: &[u8], notes: Notes) -> Result<Self, SceneError> {
         let scene = Scene::from_bytes(bytes)?;
         let called_for = Effects::NAMES.iter().filter(|(effect, _)| scene.effects.contains(*effect));
         Ok(Self {
@@ -58,6 +61,7 @@ impl Facts {
             max_depth: scene.info.max_depth,
             effects: called_for.map(|(_, name)| *name).collect(),
             plan: plan(bytes, &RenderOptions::default()).ok(),
+            notes,
         })
     }
 }
@@ -65,8 +69,8 @@ impl Facts {
 /// Runs the command.
 pub fn run(args: &Args) -> Outcome {
     let path = args.scene.as_deref();
-    let bytes = scene::open(path)?;
-    let f = Facts::of(&bytes).map_err(|e| scene::about(path)(&e))?;
+    let (bytes, notes) = scene::open(path)?;
+    let f = Facts::of(&bytes, notes).map_err(|e| scene::about(path)(&e))?;
     if args.json {
         return say_json(&f);
     }

@@ -1,12 +1,13 @@
 //! Command line: arguments, exit status, and one file per command.
 //!
-//! Exit status 0: done (also when stopped by Ctrl-C with the picture so far written); 1: one line on stderr says what went
-//! wrong; 2: the arguments make no sense. Results go to stdout, progress and errors to stderr.
+//! Exit status 0: done (also when stopped by Ctrl-C with the picture so far written); 1: the last line on stderr says what went
+//! wrong; 2: the arguments make no sense. Results go to stdout, progress, notes and errors to stderr.
 
 mod bake;
 mod compare;
 mod info;
 mod learning;
+mod notes;
 mod progress;
 mod render;
 mod scene;
@@ -53,12 +54,21 @@ pub fn run() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
-            // One line, whatever the error's text holds.
-            let text = e.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
-            let _ = writeln!(io::stderr(), "croupier: {text}");
+            complain(&e.to_string());
             ExitCode::FAILURE
         }
     }
+}
+
+/// Prints one line on stderr, whatever the text holds.
+fn complain(text: &str) {
+    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let _ = writeln!(io::stderr(), "croupier: {text}");
+}
+
+/// Prints what is no error, but may not be what the user expects.
+fn note(text: &str) {
+    complain(&format!("note: {text}"));
 }
 
 /// Prints a line of results. A reader that has gone away (`croupier info | head`) is no error.

@@ -1,6 +1,7 @@
 //! `croupier render`
 
 use super::learning::LearningFlags;
+use super::notes::Notes;
 use super::progress::Rendering;
 use super::{Outcome, say, say_json, scene};
 use croupier::Strategy;
@@ -124,6 +125,8 @@ struct Report<'a> {
     #[serde(flatten)]
     stats: &'a RenderStats,
     #[serde(flatten)]
+    notes: &'a Notes,
+    #[serde(flatten)]
     statistics: Option<&'a Statistics>,
     width: usize,
     height: usize,
@@ -146,7 +149,7 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     let cache_out = flags.learning.cache_out.as_deref();
     cache_out.map_or(Ok(()), writable)?;
     let options = flags.options()?;
-    let bytes = scene::open(path)?;
+    let (bytes, notes) = scene::open(path)?;
     let watch = Rendering::start(options.target);
     let result = render(&bytes, &options, &watch)
         .map_err(|e| flags.learning.about(&e).unwrap_or_else(|| scene::about(path)(&e)))?;
@@ -167,6 +170,7 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     if flags.json {
         return say_json(&Report {
             stats,
+            notes: &notes,
             statistics: flags.stats.then_some(statistics),
             width,
             height,
