@@ -113,6 +113,7 @@ fn runtime_errors_are_one_line_and_status_1() {
     write("empty.crp", b"");
     write("garbage.crp", &[7; 500]);
     write("cut.crp", &good[..good.len() - 1]);
+    write("far.obj", b"v 0 0 0\nv 1e30 0 0\nv 0 1 0\nf 1 2 3\n");
     std::fs::create_dir(dir.join("folder.crp")).unwrap();
 
     fails(dir, &["info", "missing.crp"], &["cannot read missing.crp", "No such file"]);
@@ -123,6 +124,7 @@ fn runtime_errors_are_one_line_and_status_1() {
     fails(dir, &["render", "cut.crp"], &["cut.crp", &good.len().to_string()]);
     fails(dir, &["bake", "cut.crp", "-o", "new.crp"], &["cut.crp"]);
     fails(dir, &["bake", "good.crp", "-o", "no/where.crp"], &["no/where.crp"]);
+    fails(dir, &["info", "far.obj"], &["croupier: far.obj: camera: origin"]);
     fails(dir, &["render", "good.crp", "-o", "no/where.exr"], &["no/where.exr", "not a folder"]);
     fails(dir, &["compare", "missing.exr", "good.crp"], &["missing.exr"]);
     fails(dir, &["compare", "good.crp", "good.crp"], &["good.crp", "not a readable EXR"]);

@@ -42,7 +42,7 @@ pub fn open(path: Option<&Path>) -> Result<(SceneBytes, Notes), Box<dyn Error>> 
         Some(path) => load::load(path)?,
         None => (builtin::cornell_box(), LoadReport::default()),
     };
-    let baked = bake(&description)?;
+    let baked = bake(&description).map_err(|e| about(path)(&e))?;
     let notes = Notes::of(&loaded, &baked.report);
     notes.print(path);
     Ok((SceneBytes::Baked(baked), notes))
