@@ -79,6 +79,15 @@ fn wrong_files_are_named_before_rendering() {
     ears(&["--cache-out", "no/where.cache"], &["cannot write no/where.cache", "not a folder"]);
     ears(&["--cache-out", "folder"], &["cannot write folder", "it is a folder"]);
     ears(&["--cache-bytes", "1KiB"], &["cache of 1024 bytes"]);
+    // beside the file that is named
+    let beside = ["b.png", "c.cost.png"].map(|name| dir.join(name));
+    beside.iter().for_each(|name| std::fs::create_dir(name).unwrap());
+    fails(&["-o", "b.exr"], &["cannot write b.png", "it is a folder"]);
+    fails(&["-o", "c.exr", "--false-color"], &["cannot write c.cost.png", "it is a folder"]);
+    let long = format!("{}.exr", "x".repeat(250));
+    fails(&["-o", &long], &["cannot write xxx", "too long"]);
+    ears(&["-o", "d.exr", "--cache-out", "d.png"], &["cannot write d.png", "share"]);
+    beside.iter().for_each(|name| std::fs::remove_dir(name).unwrap());
     fails(&["--rrs", "classic", "--cache-out", "x.cache"], &["`classic`", "no cache"]);
     fails(&["--rrs", "bolin-meyer", "--cache-in", "words.cache"], &["`bolin-meyer`", "no cache"]);
     fails(&["--rrs", "classic", "--constant", "cached"], &["constant", "ears"]);
@@ -110,6 +119,7 @@ fn everything_at_once() {
     assert_eq!(found["cache_out"], "a.cache");
     let images = ["factor1", "factor2", "factor3", "factor4", "cost", "paths"].map(|n| format!("a.{n}.png"));
     assert_eq!(found["false_color"], serde_json::json!(images));
+    assert_eq!(found["written"].as_array().unwrap().len(), 9);
     for name in images.iter().map(String::as_str).chain(["a.png", "a.exr", "a.cache"]) {
         assert!(std::fs::metadata(dir.join(name)).unwrap().len() > 100, "{name}");
     }

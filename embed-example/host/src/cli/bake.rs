@@ -33,6 +33,7 @@ struct Report<'a> {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Outcome {
+    super::output::writable(&args.output)?;
     let (bytes, notes) = scene::open(Some(&args.scene))?;
     let scene = Scene::from_bytes(&bytes).map_err(|e| scene::about(Some(&args.scene))(&e))?;
     write_whole(&args.output, |out| out.write_all(&bytes).map_err(|e| ImageError::Write(args.output.clone(), e)))?;

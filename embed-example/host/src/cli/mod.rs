@@ -8,6 +8,7 @@ mod compare;
 mod info;
 mod learning;
 mod notes;
+mod output;
 mod progress;
 mod render;
 mod scene;

@@ -2,18 +2,15 @@
 
 use super::learning::LearningFlags;
 use super::notes::Notes;
+use super::output::Outputs;
 use super::progress::Rendering;
 use super::{Outcome, say, say_json, scene};
 use croupier::Strategy;
 use croupier::rrs::ParseError;
-use croupier_host::false_color::{Scale, draw};
-use croupier_host::image::{ImageError, Picture, write_png, write_whole};
 use croupier_host::render::{RenderOptions, RenderResult, RenderStats, Target, render};
 use croupier_host::statistics::Statistics;
-use croupier_host::tonemap::{Curve, tonemap};
 use serde::Serialize;
 use std::error::Error;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Path segments at which every path ends, whatever the settings.
@@ -135,19 +132,19 @@ struct Report<'a> {
     stopped_early: bool,
     output: &'a Path,
     png: &'a Path,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    false_color: Vec<PathBuf>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    false_color: &'a [PathBuf],
     #[serde(skip_serializing_if = "Option::is_none")]
     cache_out: Option<&'a Path>,
+    /// Those of the files above that are complete.
+    written: &'a [PathBuf],
 }
 
 /// Runs the command.
 pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
-    let png = flags.output.with_extension("png");
+    let outputs = Outputs::new(&flags.output, flags.learning.cache_out.as_deref(), flags.false_color);
     // Said now, not after an hour of rendering.
-    writable(&flags.output)?;
-    let cache_out = flags.learning.cache_out.as_deref();
-    cache_out.map_or(Ok(()), writable)?;
+    outputs.check()?;
     let options = flags.options()?;
     let (bytes, notes) = scene::open(path)?;
     let watch = Rendering::start(options.target);
@@ -155,86 +152,55 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
         .map_err(|e| flags.learning.about(&e).unwrap_or_else(|| scene::about(path)(&e)))?;
     drop(watch);
     let RenderResult { picture, stats, statistics, cache, stopped_early } = &result;
-    picture.write_exr(&flags.output)?;
-    if let Some((path, bytes)) = cache_out.zip(cache.as_ref()) {
-        write_whole(path, |out| out.write_all(bytes).map_err(|e| ImageError::Write(path.into(), e)))?;
-    }
-    let (width, height) = (picture.width, picture.height);
-    let image = picture
-        .rgb(if flags.denoise { "denoised" } else { "" })
-        .ok_or_else(|| format!("{}: the picture has no colours", flags.output.display()))?;
     // Its lamp lights the walls to about a fifth of white.
     let exposure = flags.exposure.unwrap_or(if path.is_none() { 1.0 } else { 0.0 });
-    write_png(&png, width, height, &tonemap(&image, exposure, Curve::Shoulder))?;
-    let false_color = if flags.false_color { write_false_color(&flags.output, picture)? } else { Vec::new() };
+    let image = if flags.denoise { "denoised" } else { "" };
+    let written = outputs.write(picture, cache.as_deref(), image, exposure);
+    let report = Report {
+        stats,
+        notes: &notes,
+        statistics: flags.stats.then_some(statistics),
+        width: picture.width,
+        height: picture.height,
+        strategy: &options.strategy,
+        seed: options.seed,
+        stopped_early: *stopped_early,
+        output: outputs.exr,
+        png: &outputs.png,
+        false_color: &outputs.false_color,
+        cache_out: outputs.cache,
+        written: &written.files,
+    };
+    // The figures are worth having even if a file is missing.
     if flags.json {
-        return say_json(&Report {
-            stats,
-            notes: &notes,
-            statistics: flags.stats.then_some(statistics),
-            width,
-            height,
-            strategy: &options.strategy,
-            seed: options.seed,
-            stopped_early: *stopped_early,
-            output: &flags.output,
-            png: &png,
-            false_color,
-            cache_out,
-        });
+        say_json(&report)?
+    } else {
+        print(&report)?
     }
-    let early = if *stopped_early { "stopped early: " } else { "" };
-    let RenderStats { spp, rays, seconds, mrays_per_s, .. } = *stats;
+    written.error.map_or(Ok(()), |e| Err(e.into()))
+}
+
+fn print(r: &Report<'_>) -> Outcome {
+    let early = if r.stopped_early { "stopped early: " } else { "" };
+    let RenderStats { spp, rays, seconds, mrays_per_s, .. } = *r.stats;
     say(&format!(
-        "{early}{width}x{height} pixels, {spp:.1} samples per pixel, {:.1} million rays in {seconds:.1} s, {mrays_per_s:.2} Mrays/s",
+        "{early}{}x{} pixels, {spp:.1} samples per pixel, {:.1} million rays in {seconds:.1} s, {mrays_per_s:.2} Mrays/s",
+        r.width,
+        r.height,
         rays as f64 * 1e-6
     ))?;
-    if let Some(e) = stats.relmse_estimate {
-        let interval = stats.relmse_interval.map_or(String::new(), |[a, b]| format!(" ({a:.3e} to {b:.3e})"));
+    if let Some(e) = r.stats.relmse_estimate {
+        let interval = r.stats.relmse_interval.map_or(String::new(), |[a, b]| format!(" ({a:.3e} to {b:.3e})"));
         say(&format!("estimated relMSE {e:.3e}{interval}"))?;
     }
-    for (name, count) in stats.counters.iter().filter(|(_, count)| **count > 0) {
+    for (name, count) in r.stats.counters.iter().filter(|(_, count)| **count > 0) {
         say(&format!("{name}: {count}"))?;
     }
-    if flags.stats {
+    if let Some(statistics) = r.statistics {
         say(&format!("\n{statistics}"))?;
     }
-    let more = false_color.iter().map(PathBuf::as_path).chain(cache_out);
-    let more: String = more.map(|p| format!(", {}", p.display())).collect();
-    say(&format!("wrote {} and {}{more}", flags.output.display(), png.display()))
-}
-
-/// Can a file of this name be made?
-fn writable(path: &Path) -> Result<(), String> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-    match folder.filter(|f| !f.is_dir()) {
-        Some(folder) => Err(format!("cannot write {}: {} is not a folder", path.display(), folder.display())),
-        None if path.is_dir() => Err(format!("cannot write {}: it is a folder", path.display())),
-        None => Ok(()),
-    }
-}
-
-/// Pictures of factors, costs and paths beside `output`; their names.
-fn write_false_color(output: &Path, picture: &Picture) -> Result<Vec<PathBuf>, ImageError> {
-    const LAYERS: [(&str, &str); 6] = [
-        ("factor1", "factor 1"),
-        ("factor2", "factor 2"),
-        ("factor3", "factor 3"),
-        ("factor4", "factor 4+"),
-        ("cost", "rays"),
-        ("paths", "paths"),
-    ];
-    let mut names = Vec::new();
-    for (layer, title) in LAYERS {
-        let Some(channel) = picture.layer(layer).and_then(|l| l.channels.first()) else { continue };
-        let factors = layer.starts_with("factor");
-        let scale = if factors { Scale::FACTORS } else { Scale::sequential(&channel.values) };
-        let drawing = draw(&channel.values, picture.width, &scale, title);
-        let name = output.with_extension(format!("{layer}.png"));
-        write_png(&name, drawing.width, drawing.height, &drawing.pixels)?;
-        names.push(name);
-    }
-    Ok(names)
+    let names: Vec<_> = r.written.iter().map(|p| p.display().to_string()).collect();
+    if names.is_empty() { Ok(()) } else { say(&format!("wrote {}", names.join(", "))) }
 }
 
 /// Help of `--rrs`.
