@@ -85,6 +85,7 @@ fn usage_errors_are_status_2() {
         (vec!["bake", "a.obj", "-o", "a.obj"], "must end in .crp"),
         (vec!["bake", "a.obj"], "--output"),
         (vec!["compare", "a.exr"], "REFERENCE"),
+        (vec!["compare", "a.exr", "b.exr", "--exposure", "nan"], "-100 and 100"),
         (vec!["compare", "a.exr", "b.exr", "--stderr-image", "c.exr", "--seed-image", "d.exr"], "cannot be used with"),
         (vec!["dance"], "dance"),
         (vec!["--spp", "0"], "--spp"),

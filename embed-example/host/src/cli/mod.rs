@@ -84,3 +84,12 @@ fn say(line: &str) -> Outcome {
 fn say_json(value: &impl serde::Serialize) -> Outcome {
     say(&serde_json::to_string(value)?)
 }
+
+/// An exposure.
+fn stops(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(x) if x.abs() <= 100.0 => Ok(x),
+        Ok(_) => Err("must be between -100 and 100".into()),
+        Err(e) => Err(e.to_string()),
+    }
+}

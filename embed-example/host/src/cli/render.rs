@@ -51,7 +51,7 @@ pub struct Flags {
     #[arg(long, value_name = "N", default_value_t = RenderOptions::default().shards, value_parser = clap::value_parser!(u32).range(1..=65536))]
     shards: u32,
     /// Stops of exposure for the PNG; 0 if absent, 1 for the built-in scene
-    #[arg(long, value_name = "STOPS", value_parser = stops, allow_negative_numbers = true)]
+    #[arg(long, value_name = "STOPS", value_parser = super::stops, allow_negative_numbers = true)]
     exposure: Option<f32>,
     /// Add the denoised picture as layer `denoised`, and make the PNG from it
     #[arg(long)]
@@ -236,14 +236,6 @@ fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
         Ok(_) => Err("must be above 0 and finite".into()),
-        Err(e) => Err(e.to_string()),
-    }
-}
-
-fn stops(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(x) if x.abs() <= 100.0 => Ok(x),
-        Ok(_) => Err("must be between -100 and 100".into()),
         Err(e) => Err(e.to_string()),
     }
 }
