@@ -27,8 +27,8 @@ fn fails(folder: &Path, arguments: &[&str], parts: &[&str]) {
 }
 
 /// The smallest scene: a camera that looks into the void.
-fn empty_scene() -> Vec<u8> {
-    let info = SceneInfo { max_depth: 7, ..SceneInfo::zeroed() };
+fn empty_scene(max_depth: u32) -> Vec<u8> {
+    let info = SceneInfo { max_depth, ..SceneInfo::zeroed() };
     let camera = Camera {
         origin: [0.0; 3],
         forward: [0.0, 0.0, -1.0],
@@ -109,7 +109,7 @@ fn runtime_errors_are_one_line_and_status_1() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let write = |name: &str, bytes: &[u8]| std::fs::write(dir.join(name), bytes).unwrap();
-    let good = empty_scene();
+    let good = empty_scene(7);
     write("good.crp", &good);
     write("empty.crp", b"");
     write("garbage.crp", &[7; 500]);
@@ -136,7 +136,7 @@ fn runtime_errors_are_one_line_and_status_1() {
 #[test]
 fn info_and_bake_of_a_baked_scene() {
     let dir = tempfile::tempdir().unwrap();
-    let good = empty_scene();
+    let good = empty_scene(7);
     std::fs::write(dir.path().join("good.crp"), &good).unwrap();
     let out = croupier(dir.path(), &["info", "good.crp", "--json"]);
     assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
@@ -145,6 +145,7 @@ fn info_and_bake_of_a_baked_scene() {
     assert_eq!(json["triangles"], 0);
     assert_eq!(json["size"], serde_json::json!([20, 10]));
     assert_eq!(json["max_depth"], 7);
+    assert_eq!(json["longest_path"], 7);
     assert_eq!(json["effects"], serde_json::json!([]));
     let words = text(&croupier(dir.path(), &["info", "good.crp"]).stdout);
     assert!(words.contains("20x10 pixels, paths of up to 7 segments"), "{words}");
@@ -154,6 +155,25 @@ fn info_and_bake_of_a_baked_scene() {
     let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
     assert_eq!(json["bytes"], good.len());
     assert_eq!(std::fs::read(dir.path().join("good.crp")).unwrap(), good);
+}
+
+/// Killed by: a limit of path segments that is kept a secret, or told to somebody who asked for fewer.
+#[test]
+fn paths_shorter_than_asked_for_are_said() {
+    let dir = tempfile::tempdir().unwrap();
+    for (max_depth, limited) in [(200, false), (1000, true)] {
+        std::fs::write(dir.path().join("deep.crp"), empty_scene(max_depth)).unwrap();
+        let words = text(&croupier(dir.path(), &["info", "deep.crp"]).stdout);
+        assert!(words.contains("paths of up to 200 segments"), "{words}");
+        assert_eq!(words.contains("(the scene asks for 1000)"), limited, "{words}");
+        let render = ["render", "deep.crp", "--spp", "1", "-o", "d.exr", "--json"];
+        let out = croupier(dir.path(), &render);
+        let (said, json) = (text(&out.stderr), text(&out.stdout));
+        let note = "paths end after 200 segments, the scene asks for 1000";
+        assert_eq!((said.contains(note), json.contains(note)), (limited, limited), "{said} {json}");
+        let out = croupier(dir.path(), &[&render[..], &["--max-depth", "200"]].concat());
+        assert!(out.status.success() && out.stderr.is_empty());
+    }
 }
 
 /// A quad, a line, a triangle without area on a lamp and a smooth one with a normal of length 0, without a camera.

@@ -36,6 +36,12 @@ impl Notes {
         all
     }
 
+    /// Adds one, and prints it.
+    pub fn add(&mut self, path: Option<&Path>, text: String) {
+        super::note(&about(path)(&text));
+        self.notes.push(text);
+    }
+
     /// Prints them, with the scene's name in front.
     pub fn print(&self, path: Option<&Path>) {
         self.notes.iter().take(PRINTED).for_each(|text| super::note(&about(path)(text)));

@@ -5,16 +5,13 @@ use super::notes::Notes;
 use super::output::Outputs;
 use super::progress::Rendering;
 use super::{Outcome, say, say_json, scene};
-use croupier::Strategy;
 use croupier::rrs::ParseError;
+use croupier::{HARD_STOP, Scene, SceneError, Strategy};
 use croupier_host::render::{RenderOptions, RenderResult, RenderStats, Target, render};
 use croupier_host::statistics::Statistics;
 use serde::Serialize;
 use std::error::Error;
 use std::path::{Path, PathBuf};
-
-/// Path segments at which every path ends, whatever the settings.
-const HARD_STOP: i64 = 200;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -36,7 +33,7 @@ pub struct Flags {
     #[command(flatten)]
     until: Until,
     /// Path segments from the camera: 1 shows emitters only; the scene's own number if absent
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=HARD_STOP))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(HARD_STOP)))]
     max_depth: Option<u32>,
     /// Size in pixels; the scene's own if absent
     #[arg(long, value_name = "WxH", value_parser = size)]
@@ -146,7 +143,10 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     // Said now, not after an hour of rendering.
     outputs.check()?;
     let options = flags.options()?;
-    let (bytes, notes) = scene::open(path)?;
+    let (bytes, mut notes) = scene::open(path)?;
+    if let Some(text) = shortened(&bytes, flags.max_depth).map_err(|e| scene::about(path)(&e))? {
+        notes.add(path, text);
+    }
     let watch = Rendering::start(options.target);
     let result = render(&bytes, &options, &watch)
         .map_err(|e| flags.learning.about(&e).unwrap_or_else(|| scene::about(path)(&e)))?;
@@ -178,6 +178,13 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
         print(&report)?
     }
     written.error.map_or(Ok(()), |e| Err(e.into()))
+}
+
+/// What to say if paths end before the scene wants them to, and nobody asked for it.
+fn shortened(bytes: &[u8], given: Option<u32>) -> Result<Option<String>, SceneError> {
+    let wanted = Scene::from_bytes(bytes)?.info.max_depth;
+    let text = || format!("paths end after {HARD_STOP} segments, the scene asks for {wanted}");
+    Ok((given.is_none() && wanted > HARD_STOP).then(text))
 }
 
 fn print(r: &Report<'_>) -> Outcome {
