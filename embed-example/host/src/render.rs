@@ -141,6 +141,9 @@ pub struct RenderStats {
     pub lane_utilisation: BTreeMap<&'static str, f64>,
     /// Events that cost quality or were mended (full rings, bad samples, ...), by name.
     pub counters: BTreeMap<&'static str, u64>,
+    /// Column and row of the pixel in which the first contribution was not finite, if one was. They were left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_non_finite: Option<[u32; 2]>,
 }
 
 /// A rendered picture.
@@ -298,5 +301,37 @@ fn stats(r: &Rendered) -> RenderStats {
         relmse_interval: (r.spp > 1).then_some([r.error.low, r.error.high]),
         lane_utilisation: lanes.iter().map(|(n, u)| (*n, u.share())).collect(),
         counters: counters.into_iter().collect(),
+        first_non_finite: first_non_finite(c.first_non_finite, r.size),
+    }
+}
+
+/// Column and row of the core's number of a pixel, which is its index plus 1, or 0 for none.
+fn first_non_finite(number: u64, [width, _]: [u32; 2]) -> Option<[u32; 2]> {
+    let (index, width) = (number.checked_sub(1)?, u64::from(width));
+    Some([(index % width) as u32, (index / width) as u32])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Killed by: a number that is taken for an index, rows taken for columns, a pixel where there is none.
+    #[test]
+    fn pixels_of_numbers() {
+        let found = [0, 1, 5, 6, 15].map(|n| first_non_finite(n, [5, 3]));
+        assert_eq!(found, [None, Some([0, 0]), Some([4, 0]), Some([0, 1]), Some([4, 2])]);
+    }
+
+    /// Killed by: a pixel that the core found and nobody is told of.
+    #[test]
+    fn the_first_pixel_that_is_not_finite_is_told() {
+        let scene = crate::bake::bake(&crate::builtin::cornell_box(), &Default::default(), |_, _| ()).unwrap();
+        let options = RenderOptions { size: Some([5, 3]), target: Target::Spp(1), ..RenderOptions::default() };
+        let scene = Scene::from_bytes(&scene.bytes).unwrap();
+        let o = Options::new(settings(&scene, &options).unwrap(), options.target);
+        let mut r = drive_scene(scene, &o, &crate::drive::Unobserved).unwrap();
+        assert_eq!(stats(&r).first_non_finite, None);
+        r.counters.first_non_finite = 8;
+        assert_eq!(stats(&r).first_non_finite, Some([2, 1]));
     }
 }

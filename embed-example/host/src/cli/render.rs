@@ -152,6 +152,10 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
         .map_err(|e| flags.learning.about(&e).unwrap_or_else(|| scene::about(path)(&e)))?;
     drop(watch);
     let RenderResult { picture, stats, statistics, cache, stopped_early } = &result;
+    if let Some([x, y]) = stats.first_non_finite {
+        let count = stats.counters.get("non_finite").unwrap_or(&1);
+        notes.add(path, format!("{count} contributions were not finite and left out, the first in pixel ({x}, {y})"));
+    }
     // Its lamp lights the walls to about a fifth of white.
     let exposure = flags.exposure.unwrap_or(if path.is_none() { 1.0 } else { 0.0 });
     let image = if flags.denoise { "denoised" } else { "" };
