@@ -50,7 +50,7 @@ pub fn open(path: Option<&Path>) -> Result<(SceneBytes, Notes), Box<dyn Error>> 
 
 fn bake(description: &SceneDescription) -> Result<bake::Baked, BakeError> {
     let bar = progress::Baking::start();
-    bake::bake(description, &bake::BakeOptions::default(), |stage, part| bar.show(&format!("{stage:?}"), part))
+    bake::bake(description, &bake::BakeOptions::default(), |stage, _| bar.show(stage))
 }
 
 fn map(path: &Path) -> Result<SceneBytes, Box<dyn Error>> {
