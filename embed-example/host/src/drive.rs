@@ -24,7 +24,7 @@ use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-/// Rays between two looks at the clock and at [`Observer::stop`].
+/// Rays of a shard between two calls of [`Observer::progress`] and [`Observer::stop`].
 const STEP_RAYS: u64 = 1 << 16;
 
 /// How to render.

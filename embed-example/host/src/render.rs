@@ -16,11 +16,13 @@ use std::collections::BTreeMap;
 pub enum Target {
     /// Samples per pixel, >= 1.
     Spp(u32),
-    /// Wall-clock seconds, > 0. The image then depends on the machine.
+    /// Wall-clock seconds of rendering, > 0. No iteration begins that would pass them at the speed so far; one that has
+    /// begun is finished, and the first one, a sample per pixel, is rendered in any case. The image then depends on the
+    /// machine.
     Seconds(f64),
-    /// Rays of all kinds, >= 1; passed by at most one iteration.
+    /// Rays of all kinds, >= 1. The same: passed by at most one iteration.
     Rays(u64),
-    /// Estimated relMSE of the whole image, > 0.
+    /// Estimated relMSE of the whole image, > 0, looked at after iterations; not believed below 4 samples per pixel.
     Error(f64),
 }
 
@@ -111,14 +113,18 @@ pub struct Progress {
     pub relmse_estimate: Option<f64>,
 }
 
-/// Watches a render, and may end it. Called from the thread that renders and, [`Observer::stop`], from its workers.
+/// Watches a render, and may end it. Called from the thread that called [`render`] and from its workers.
 pub trait Observer: Sync {
-    /// Called a few times a second.
+    /// Called by each worker after each step: when a shard has traced some 65 000 rays or has finished its part of the
+    /// iteration. Workers do not wait for each other, so that several may call at a time; each waits for its own call.
     fn progress(&self, progress: &Progress);
-    /// True ends the render soon; what was rendered is still returned.
+    /// True ends the render soon, and must stay true; what was rendered is still returned. Asked before each iteration but
+    /// the first, and by each worker after each step that leaves its shard something to do: such a shard begins no further
+    /// camera samples and finishes those under way. So a first iteration whose shards take a single step each is finished.
+    /// Nothing else ends an iteration early, no [`Target`] either.
     fn stop(&self) -> bool;
     /// An iteration is finished: the picture so far and the wall-clock seconds it took. Called from the thread that
-    /// renders; the time spent in here does not count as rendering.
+    /// called [`render`]; the time spent in here does not count as rendering.
     fn iteration(&self, _film: &Film<'_>, _seconds: f64) {}
 }
 

@@ -75,13 +75,14 @@ struct Until {
     /// Stop after this many samples per pixel
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
-    /// Stop after this time
+    /// Stop after this time, loading and writing not counted: no iteration begins that would pass it at the speed so far,
+    /// one that has begun is finished, and the first, a sample per pixel, is rendered in any case
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     seconds: Option<f64>,
-    /// Stop after this many rays
+    /// Stop after this many rays: no iteration begins that would pass them at the cost so far, but for the first
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     rays: Option<u64>,
-    /// Stop when the estimated relMSE is below this
+    /// Stop after the iteration that brings the estimated relMSE to this, with 4 samples per pixel at least
     #[arg(long, value_name = "E", value_parser = positive, allow_negative_numbers = true)]
     until_error: Option<f64>,
 }
