@@ -24,6 +24,27 @@ fn json(out: &Output) -> serde_json::Value {
     serde_json::from_slice(&out.stdout).unwrap()
 }
 
+/// Width and height of a PNG file, all of which must decode.
+fn png_size(path: &Path) -> (u32, u32) {
+    let file = std::io::BufReader::new(std::fs::File::open(path).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut pixels).unwrap();
+    (info.width, info.height)
+}
+
+/// Killed by: no command taken for a mistake, another scene, names or a folder other than those that README promises.
+#[test]
+fn without_a_command_the_built_in_scene_is_rendered_here() {
+    let dir = tempfile::tempdir().unwrap();
+    let found = json(&croupier(dir.path(), &["--spp", "1", "--json"]));
+    assert_eq!(found["written"], serde_json::json!(["croupier.exr", "croupier.png"]));
+    let exr = Picture::read_exr(&dir.path().join("croupier.exr")).unwrap();
+    assert_eq!((exr.width, exr.height), (400, 400));
+    assert_eq!(png_size(&dir.path().join("croupier.png")), (400, 400));
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
+}
+
 /// Killed by: a list of strategies in words, of which one is forgotten.
 #[test]
 fn help_lists_every_strategy() {
@@ -184,10 +205,10 @@ fn every_flag_changes_the_picture() {
     }
 }
 
-/// Killed by: a Ctrl-C after which the statistics are lost.
+/// Killed by: a Ctrl-C after which the statistics or the pictures are lost.
 #[cfg(target_os = "linux")]
 #[test]
-fn statistics_are_saved_after_ctrl_c() {
+fn everything_is_saved_after_ctrl_c() {
     let dir = tempfile::tempdir().unwrap();
     let arguments = ["render", "--size", "16x16", "--threads", "1", "--rrs", "ears", "--seconds", "1000000", "--json"];
     let mut child = Command::new(env!("CARGO_BIN_EXE_croupier"))
@@ -215,4 +236,7 @@ fn statistics_are_saved_after_ctrl_c() {
     let said: serde_json::Value = serde_json::from_str(&said).unwrap();
     assert_eq!(said["stopped_early"], true);
     assert!(std::fs::read(dir.path().join("a.cache")).unwrap().starts_with(b"CRPCACHE"));
+    let exr = Picture::read_exr(&dir.path().join("croupier.exr")).unwrap();
+    assert!((exr.width, exr.height) == (16, 16) && exr.rgb("").unwrap().pixels.iter().any(|c| c[0] > 0.0));
+    assert_eq!(png_size(&dir.path().join("croupier.png")), (16, 16));
 }
