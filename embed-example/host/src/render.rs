@@ -72,7 +72,7 @@ pub struct RenderOptions {
     pub save_cache: bool,
     /// Add the layer `denoised`.
     pub denoise: bool,
-    /// Measure what look-ups take, for [`Statistics::time`].
+    /// Measure what looking up and entering samples take, for [`Statistics::time`].
     pub calibrate: bool,
 }
 

@@ -173,9 +173,13 @@ fn everything_at_once() {
     assert_eq!(rgb("noisy.exr"), rgb("clean.exr"));
 
     let words = text(&render(dir, &["--rrs", "ears", "--spp", "4", "--stats", "-o", "w.exr"]).stdout);
-    for part in ["paths per sample", "factor at first hit", "efficiency", "looking up", "building the tree"] {
+    let learned = ["looking up (about)", "entering samples (about)", "building the tree"];
+    for part in ["paths per sample", "factor at first hit", "efficiency"].iter().chain(&learned) {
         assert!(words.contains(part), "{words}");
     }
+    let crowded = ["--rrs", "ears", "--spp", "200", "--stats", "--cache-bytes", "16KiB", "-o", "w.exr"];
+    let words = text(&render(dir, &crowded).stdout);
+    assert!(words.contains(" splits refused so far for lack of room"), "{words}");
 }
 
 /// Killed by: a flag that is read and forgotten.
