@@ -30,13 +30,6 @@ impl AlignedBytes {
         lines.resize(length.div_ceil(ALIGN), Line::zeroed());
         Some(Self { lines, length })
     }
-
-    /// A copy of `bytes`.
-    pub fn copy_of(bytes: &[u8]) -> Self {
-        let mut copy = Self::zeroed(bytes.len());
-        copy.as_mut().copy_from_slice(bytes);
-        copy
-    }
 }
 
 impl Deref for AlignedBytes {

@@ -24,7 +24,7 @@ use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-/// Rays between two looks at the clock and at [`Observer::stop`].
+/// Rays of a shard between two calls of [`Observer::progress`] and [`Observer::stop`].
 const STEP_RAYS: u64 = 1 << 16;
 
 /// How to render.
@@ -43,7 +43,7 @@ pub struct Options<'a> {
     pub cache: Option<&'a [u8]>,
     /// Return the cache of the scene's statistics as bytes. Needs such a strategy too.
     pub save_cache: bool,
-    /// Measure in the end what a look-up of statistics takes.
+    /// Measure in the end what looking up statistics and entering samples take.
     pub calibrate: bool,
 }
 
@@ -94,7 +94,7 @@ pub struct IterationRecord {
 pub struct CacheRecord {
     /// Leaves in use.
     pub leaves: u32,
-    /// Splits for which there was no room, in all iterations so far.
+    /// Splits for which there was no room, in all iterations so far. A leaf that remains too large counts again in each.
     pub splits_refused: u64,
 }
 

@@ -277,6 +277,13 @@ pub fn write_png(path: &Path, width: usize, height: usize, pixels: &[[u8; 3]]) -
     })
 }
 
+/// Name of the temporary file, beside `path`, that [`write_whole`] writes before it has that name.
+pub fn part_name(path: &Path) -> PathBuf {
+    let mut part = path.as_os_str().to_owned();
+    part.push(format!(".{}.part", std::process::id()));
+    part.into()
+}
+
 /// Writes a file under a temporary name beside it and renames it, so that nobody ever reads half a file and an older
 /// file of that name, mapped into memory perhaps, stays as it was.
 pub fn write_whole(
@@ -284,9 +291,7 @@ pub fn write_whole(
     write: impl FnOnce(&mut BufWriter<File>) -> Result<(), ImageError>,
 ) -> Result<(), ImageError> {
     let failed = |e: io::Error| ImageError::Write(path.into(), e);
-    let mut part = path.as_os_str().to_owned();
-    part.push(format!(".{}.part", std::process::id()));
-    let part = PathBuf::from(part);
+    let part = part_name(path);
     let mut out = BufWriter::new(File::create(&part).map_err(failed)?);
     let done = write(&mut out).and_then(|()| out.flush().map_err(failed));
     drop(out);

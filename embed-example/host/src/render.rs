@@ -16,11 +16,13 @@ use std::collections::BTreeMap;
 pub enum Target {
     /// Samples per pixel, >= 1.
     Spp(u32),
-    /// Wall-clock seconds, > 0. The image then depends on the machine.
+    /// Wall-clock seconds of rendering, > 0. No iteration begins that would pass them at the speed so far; one that has
+    /// begun is finished, and the first one, a sample per pixel, is rendered in any case. The image then depends on the
+    /// machine.
     Seconds(f64),
-    /// Rays of all kinds, >= 1; passed by at most one iteration.
+    /// Rays of all kinds, >= 1. The same: passed by at most one iteration.
     Rays(u64),
-    /// Estimated relMSE of the whole image, > 0.
+    /// Estimated relMSE of the whole image, > 0, looked at after iterations; not believed below 4 samples per pixel.
     Error(f64),
 }
 
@@ -70,7 +72,7 @@ pub struct RenderOptions {
     pub save_cache: bool,
     /// Add the layer `denoised`.
     pub denoise: bool,
-    /// Measure what look-ups take, for [`Statistics::time`].
+    /// Measure what looking up and entering samples take, for [`Statistics::time`].
     pub calibrate: bool,
 }
 
@@ -111,14 +113,18 @@ pub struct Progress {
     pub relmse_estimate: Option<f64>,
 }
 
-/// Watches a render, and may end it. Called from the thread that renders and, [`Observer::stop`], from its workers.
+/// Watches a render, and may end it. Called from the thread that called [`render`] and from its workers.
 pub trait Observer: Sync {
-    /// Called a few times a second.
+    /// Called by each worker after each step: when a shard has traced some 65 000 rays or has finished its part of the
+    /// iteration. Workers do not wait for each other, so that several may call at a time; each waits for its own call.
     fn progress(&self, progress: &Progress);
-    /// True ends the render soon; what was rendered is still returned.
+    /// True ends the render soon, and must stay true; what was rendered is still returned. Asked before each iteration but
+    /// the first, and by each worker after each step that leaves its shard something to do: such a shard begins no further
+    /// camera samples and finishes those under way. So a first iteration whose shards take a single step each is finished.
+    /// Nothing else ends an iteration early, no [`Target`] either.
     fn stop(&self) -> bool;
     /// An iteration is finished: the picture so far and the wall-clock seconds it took. Called from the thread that
-    /// renders; the time spent in here does not count as rendering.
+    /// called [`render`]; the time spent in here does not count as rendering.
     fn iteration(&self, _film: &Film<'_>, _seconds: f64) {}
 }
 
@@ -141,6 +147,9 @@ pub struct RenderStats {
     pub lane_utilisation: BTreeMap<&'static str, f64>,
     /// Events that cost quality or were mended (full rings, bad samples, ...), by name.
     pub counters: BTreeMap<&'static str, u64>,
+    /// Column and row of the pixel in which the first contribution was not finite, if one was. They were left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_non_finite: Option<[u32; 2]>,
 }
 
 /// A rendered picture.
@@ -298,5 +307,37 @@ fn stats(r: &Rendered) -> RenderStats {
         relmse_interval: (r.spp > 1).then_some([r.error.low, r.error.high]),
         lane_utilisation: lanes.iter().map(|(n, u)| (*n, u.share())).collect(),
         counters: counters.into_iter().collect(),
+        first_non_finite: first_non_finite(c.first_non_finite, r.size),
+    }
+}
+
+/// Column and row of the core's number of a pixel, which is its index plus 1, or 0 for none.
+fn first_non_finite(number: u64, [width, _]: [u32; 2]) -> Option<[u32; 2]> {
+    let (index, width) = (number.checked_sub(1)?, u64::from(width));
+    Some([(index % width) as u32, (index / width) as u32])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Killed by: a number that is taken for an index, rows taken for columns, a pixel where there is none.
+    #[test]
+    fn pixels_of_numbers() {
+        let found = [0, 1, 5, 6, 15].map(|n| first_non_finite(n, [5, 3]));
+        assert_eq!(found, [None, Some([0, 0]), Some([4, 0]), Some([0, 1]), Some([4, 2])]);
+    }
+
+    /// Killed by: a pixel that the core found and nobody is told of.
+    #[test]
+    fn the_first_pixel_that_is_not_finite_is_told() {
+        let scene = crate::bake::bake(&crate::builtin::cornell_box(), &Default::default(), |_, _| ()).unwrap();
+        let options = RenderOptions { size: Some([5, 3]), target: Target::Spp(1), ..RenderOptions::default() };
+        let scene = Scene::from_bytes(&scene.bytes).unwrap();
+        let o = Options::new(settings(&scene, &options).unwrap(), options.target);
+        let mut r = drive_scene(scene, &o, &crate::drive::Unobserved).unwrap();
+        assert_eq!(stats(&r).first_non_finite, None);
+        r.counters.first_non_finite = 8;
+        assert_eq!(stats(&r).first_non_finite, Some([2, 1]));
     }
 }

@@ -44,7 +44,7 @@ pub struct Iteration {
     pub efficiency: Option<f64>,
     /// Leaves of the cache afterwards.
     pub leaves: Option<u32>,
-    /// Splits of leaves for which there was no room so far.
+    /// Splits for which there was no room so far. A leaf that remains too large counts again in each iteration.
     pub splits_refused: Option<u64>,
     /// Estimated relMSE of the picture afterwards; absent after a single sample.
     pub relmse_estimate: Option<f64>,
@@ -61,7 +61,8 @@ pub struct Part {
     pub seconds: f64,
     /// Of the whole render, 0 to 1.
     pub share: f64,
-    /// Contained in `tracing`: counted, times what one takes in a loop of nothing else.
+    /// Contained in `tracing`: counted, times what one takes in a loop of nothing else. `entering samples` is adding
+    /// finished samples to the statistics alone, without the ledger in which they are gathered.
     pub within_tracing: bool,
 }
 
@@ -123,7 +124,7 @@ fn time(r: &Rendered) -> Vec<Part> {
         let threads = r.threads.max(1) as f64;
         let (packets, samples) = (r.counters.look_ups.packets as f64, r.counters.samples_logged as f64);
         parts.push(part("looking up", packets * one.look_up / threads, true));
-        parts.push(part("logging", samples * one.log / threads, true));
+        parts.push(part("entering samples", samples * one.log / threads, true));
     }
     parts.push(part("merging pixels", sum(|i| i.merging), false));
     parts.push(part("estimating pixels", sum(|i| i.estimating), false));
@@ -158,7 +159,7 @@ impl fmt::Display for Statistics {
         }
         write_table(f, &table)?;
         if let Some(n) = self.iterations.last().and_then(|i| i.splits_refused).filter(|n| *n > 0) {
-            writeln!(f, "{n} leaves of the cache found no room to split")?;
+            writeln!(f, "{n} splits refused so far for lack of room")?;
         }
         writeln!(f)?;
         let mut table = vec![["part", "s", "share"].map(String::from).to_vec()];

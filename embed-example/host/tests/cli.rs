@@ -27,8 +27,8 @@ fn fails(folder: &Path, arguments: &[&str], parts: &[&str]) {
 }
 
 /// The smallest scene: a camera that looks into the void.
-fn empty_scene() -> Vec<u8> {
-    let info = SceneInfo { max_depth: 7, ..SceneInfo::zeroed() };
+fn empty_scene(max_depth: u32) -> Vec<u8> {
+    let info = SceneInfo { max_depth, ..SceneInfo::zeroed() };
     let camera = Camera {
         origin: [0.0; 3],
         forward: [0.0, 0.0, -1.0],
@@ -85,6 +85,7 @@ fn usage_errors_are_status_2() {
         (vec!["bake", "a.obj", "-o", "a.obj"], "must end in .crp"),
         (vec!["bake", "a.obj"], "--output"),
         (vec!["compare", "a.exr"], "REFERENCE"),
+        (vec!["compare", "a.exr", "b.exr", "--exposure", "nan"], "-100 and 100"),
         (vec!["compare", "a.exr", "b.exr", "--stderr-image", "c.exr", "--seed-image", "d.exr"], "cannot be used with"),
         (vec!["dance"], "dance"),
         (vec!["--spp", "0"], "--spp"),
@@ -108,11 +109,12 @@ fn runtime_errors_are_one_line_and_status_1() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let write = |name: &str, bytes: &[u8]| std::fs::write(dir.join(name), bytes).unwrap();
-    let good = empty_scene();
+    let good = empty_scene(7);
     write("good.crp", &good);
     write("empty.crp", b"");
     write("garbage.crp", &[7; 500]);
     write("cut.crp", &good[..good.len() - 1]);
+    write("far.obj", b"v 0 0 0\nv 1e30 0 0\nv 0 1 0\nf 1 2 3\n");
     std::fs::create_dir(dir.join("folder.crp")).unwrap();
 
     fails(dir, &["info", "missing.crp"], &["cannot read missing.crp", "No such file"]);
@@ -123,6 +125,7 @@ fn runtime_errors_are_one_line_and_status_1() {
     fails(dir, &["render", "cut.crp"], &["cut.crp", &good.len().to_string()]);
     fails(dir, &["bake", "cut.crp", "-o", "new.crp"], &["cut.crp"]);
     fails(dir, &["bake", "good.crp", "-o", "no/where.crp"], &["no/where.crp"]);
+    fails(dir, &["info", "far.obj"], &["croupier: far.obj: camera: origin"]);
     fails(dir, &["render", "good.crp", "-o", "no/where.exr"], &["no/where.exr", "not a folder"]);
     fails(dir, &["compare", "missing.exr", "good.crp"], &["missing.exr"]);
     fails(dir, &["compare", "good.crp", "good.crp"], &["good.crp", "not a readable EXR"]);
@@ -133,7 +136,7 @@ fn runtime_errors_are_one_line_and_status_1() {
 #[test]
 fn info_and_bake_of_a_baked_scene() {
     let dir = tempfile::tempdir().unwrap();
-    let good = empty_scene();
+    let good = empty_scene(7);
     std::fs::write(dir.path().join("good.crp"), &good).unwrap();
     let out = croupier(dir.path(), &["info", "good.crp", "--json"]);
     assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
@@ -142,6 +145,7 @@ fn info_and_bake_of_a_baked_scene() {
     assert_eq!(json["triangles"], 0);
     assert_eq!(json["size"], serde_json::json!([20, 10]));
     assert_eq!(json["max_depth"], 7);
+    assert_eq!(json["longest_path"], 7);
     assert_eq!(json["effects"], serde_json::json!([]));
     let words = text(&croupier(dir.path(), &["info", "good.crp"]).stdout);
     assert!(words.contains("20x10 pixels, paths of up to 7 segments"), "{words}");
@@ -151,6 +155,82 @@ fn info_and_bake_of_a_baked_scene() {
     let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
     assert_eq!(json["bytes"], good.len());
     assert_eq!(std::fs::read(dir.path().join("good.crp")).unwrap(), good);
+}
+
+/// Killed by: a limit of path segments that is kept a secret, or told to somebody who asked for fewer.
+#[test]
+fn paths_shorter_than_asked_for_are_said() {
+    let dir = tempfile::tempdir().unwrap();
+    for (max_depth, limited) in [(200, false), (1000, true)] {
+        std::fs::write(dir.path().join("deep.crp"), empty_scene(max_depth)).unwrap();
+        let words = text(&croupier(dir.path(), &["info", "deep.crp"]).stdout);
+        assert!(words.contains("paths of up to 200 segments"), "{words}");
+        assert_eq!(words.contains("(the scene asks for 1000)"), limited, "{words}");
+        let render = ["render", "deep.crp", "--spp", "1", "-o", "d.exr", "--json"];
+        let out = croupier(dir.path(), &render);
+        let (said, json) = (text(&out.stderr), text(&out.stdout));
+        let note = "paths end after 200 segments, the scene asks for 1000";
+        assert_eq!((said.contains(note), json.contains(note)), (limited, limited), "{said} {json}");
+        let out = croupier(dir.path(), &[&render[..], &["--max-depth", "200"]].concat());
+        assert!(out.status.success() && out.stderr.is_empty());
+    }
+}
+
+/// A quad, a line, a triangle without area on a lamp and a smooth one with a normal of length 0, without a camera.
+const DOUBTFUL: &str = "mtllib doubtful.mtl
+v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+vn 0 0 0
+usemtl foggy
+f 1 2 3 4
+f 1//1 2//1 4//1
+l 1 2
+usemtl lamp
+f 1 2 2
+";
+
+/// What loading and baking assumed or left out is said by every command that opens a scene. Killed by: a report that is
+/// dropped, a count that is left out, notes on stdout.
+#[test]
+fn notes_about_a_scene_are_printed() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let materials = "newmtl foggy\nKd 2 0 0\nd 0.75\nnewmtl lamp\nKe 1 1 1\n";
+    std::fs::write(dir.join("doubtful.obj"), DOUBTFUL).unwrap();
+    std::fs::write(dir.join("doubtful.mtl"), materials).unwrap();
+    let said = [
+        "has no camera",
+        "`foggy`: opacity 0.75 was taken as 1",
+        "`foggy`: reflectance [2.0, 0.0, 0.0] was limited",
+        "more than three corners, split into triangles: 1",
+        "points and lines, left out: 1",
+        "triangles without area, left out: 1",
+        "would have been lights: 1",
+        "normal of length 0, shaded flat: 1",
+    ];
+    let counts = ["dropped_lights", "dropped_triangles", "flattened", "skipped_elements", "split_polygons"];
+    let counts = serde_json::Value::Object(counts.iter().map(|n| (n.to_string(), 1.into())).collect());
+    let render = ["render", "doubtful.obj", "--size", "8x8", "--spp", "1", "-o", "d.exr", "--json"];
+    let bake = ["bake", "doubtful.obj", "-o", "d.crp", "--json"];
+    for arguments in [&render[..], &bake, &["info", "doubtful.obj", "--json"]] {
+        let out = croupier(dir, arguments);
+        let notes = text(&out.stderr);
+        assert_eq!(out.status.code(), Some(0), "{notes}");
+        assert_eq!(notes.lines().count(), said.len(), "{notes}");
+        assert!(notes.lines().all(|l| l.starts_with("croupier: note: doubtful.obj: ")), "{notes}");
+        let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        for part in said {
+            assert!(notes.contains(part), "{notes}: {part}");
+            assert!(json["notes"].as_array().unwrap().iter().any(|n| n.as_str().unwrap().contains(part)), "{json}");
+        }
+        assert_eq!(json["scene_counts"], counts);
+    }
+    // said when it was baked
+    let out = croupier(dir, &["info", "d.crp", "--json"]);
+    assert!(out.status.success() && out.stderr.is_empty(), "{}", text(&out.stderr));
+    assert_eq!(serde_json::from_slice::<serde_json::Value>(&out.stdout).unwrap()["notes"], serde_json::json!([]));
 }
 
 fn picture(level: f32, stderr: Option<f32>) -> Picture {

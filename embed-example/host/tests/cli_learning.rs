@@ -24,6 +24,27 @@ fn json(out: &Output) -> serde_json::Value {
     serde_json::from_slice(&out.stdout).unwrap()
 }
 
+/// Width and height of a PNG file, all of which must decode.
+fn png_size(path: &Path) -> (u32, u32) {
+    let file = std::io::BufReader::new(std::fs::File::open(path).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut pixels).unwrap();
+    (info.width, info.height)
+}
+
+/// Killed by: no command taken for a mistake, another scene, names or a folder other than those that README promises.
+#[test]
+fn without_a_command_the_built_in_scene_is_rendered_here() {
+    let dir = tempfile::tempdir().unwrap();
+    let found = json(&croupier(dir.path(), &["--spp", "1", "--json"]));
+    assert_eq!(found["written"], serde_json::json!(["croupier.exr", "croupier.png"]));
+    let exr = Picture::read_exr(&dir.path().join("croupier.exr")).unwrap();
+    assert_eq!((exr.width, exr.height), (400, 400));
+    assert_eq!(png_size(&dir.path().join("croupier.png")), (400, 400));
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
+}
+
 /// Killed by: a list of strategies in words, of which one is forgotten.
 #[test]
 fn help_lists_every_strategy() {
@@ -79,6 +100,15 @@ fn wrong_files_are_named_before_rendering() {
     ears(&["--cache-out", "no/where.cache"], &["cannot write no/where.cache", "not a folder"]);
     ears(&["--cache-out", "folder"], &["cannot write folder", "it is a folder"]);
     ears(&["--cache-bytes", "1KiB"], &["cache of 1024 bytes"]);
+    // beside the file that is named
+    let beside = ["b.png", "c.cost.png"].map(|name| dir.join(name));
+    beside.iter().for_each(|name| std::fs::create_dir(name).unwrap());
+    fails(&["-o", "b.exr"], &["cannot write b.png", "it is a folder"]);
+    fails(&["-o", "c.exr", "--false-color"], &["cannot write c.cost.png", "it is a folder"]);
+    let long = format!("{}.exr", "x".repeat(250));
+    fails(&["-o", &long], &["cannot write xxx", "too long"]);
+    ears(&["-o", "d.exr", "--cache-out", "d.png"], &["cannot write d.png", "share"]);
+    beside.iter().for_each(|name| std::fs::remove_dir(name).unwrap());
     fails(&["--rrs", "classic", "--cache-out", "x.cache"], &["`classic`", "no cache"]);
     fails(&["--rrs", "bolin-meyer", "--cache-in", "words.cache"], &["`bolin-meyer`", "no cache"]);
     fails(&["--rrs", "classic", "--constant", "cached"], &["constant", "ears"]);
@@ -110,6 +140,7 @@ fn everything_at_once() {
     assert_eq!(found["cache_out"], "a.cache");
     let images = ["factor1", "factor2", "factor3", "factor4", "cost", "paths"].map(|n| format!("a.{n}.png"));
     assert_eq!(found["false_color"], serde_json::json!(images));
+    assert_eq!(found["written"].as_array().unwrap().len(), 9);
     for name in images.iter().map(String::as_str).chain(["a.png", "a.exr", "a.cache"]) {
         assert!(std::fs::metadata(dir.join(name)).unwrap().len() > 100, "{name}");
     }
@@ -142,9 +173,13 @@ fn everything_at_once() {
     assert_eq!(rgb("noisy.exr"), rgb("clean.exr"));
 
     let words = text(&render(dir, &["--rrs", "ears", "--spp", "4", "--stats", "-o", "w.exr"]).stdout);
-    for part in ["paths per sample", "factor at first hit", "efficiency", "looking up", "building the tree"] {
+    let learned = ["looking up (about)", "entering samples (about)", "building the tree"];
+    for part in ["paths per sample", "factor at first hit", "efficiency"].iter().chain(&learned) {
         assert!(words.contains(part), "{words}");
     }
+    let crowded = ["--rrs", "ears", "--spp", "200", "--stats", "--cache-bytes", "16KiB", "-o", "w.exr"];
+    let words = text(&render(dir, &crowded).stdout);
+    assert!(words.contains(" splits refused so far for lack of room"), "{words}");
 }
 
 /// Killed by: a flag that is read and forgotten.
@@ -174,10 +209,10 @@ fn every_flag_changes_the_picture() {
     }
 }
 
-/// Killed by: a Ctrl-C after which the statistics are lost.
+/// Killed by: a Ctrl-C after which the statistics or the pictures are lost.
 #[cfg(target_os = "linux")]
 #[test]
-fn statistics_are_saved_after_ctrl_c() {
+fn everything_is_saved_after_ctrl_c() {
     let dir = tempfile::tempdir().unwrap();
     let arguments = ["render", "--size", "16x16", "--threads", "1", "--rrs", "ears", "--seconds", "1000000", "--json"];
     let mut child = Command::new(env!("CARGO_BIN_EXE_croupier"))
@@ -205,4 +240,7 @@ fn statistics_are_saved_after_ctrl_c() {
     let said: serde_json::Value = serde_json::from_str(&said).unwrap();
     assert_eq!(said["stopped_early"], true);
     assert!(std::fs::read(dir.path().join("a.cache")).unwrap().starts_with(b"CRPCACHE"));
+    let exr = Picture::read_exr(&dir.path().join("croupier.exr")).unwrap();
+    assert!((exr.width, exr.height) == (16, 16) && exr.rgb("").unwrap().pixels.iter().any(|c| c[0] > 0.0));
+    assert_eq!(png_size(&dir.path().join("croupier.png")), (16, 16));
 }

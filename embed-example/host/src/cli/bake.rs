@@ -1,5 +1,6 @@
 //! `croupier bake`
 
+use super::notes::Notes;
 use super::{Outcome, say, say_json, scene};
 use croupier::Scene;
 use croupier_host::image::{ImageError, write_whole};
@@ -26,17 +27,27 @@ struct Report<'a> {
     triangles: usize,
     dropped_triangles: u32,
     hash: String,
+    #[serde(flatten)]
+    notes: Notes,
 }
 
 /// Runs the command.
 pub fn run(args: &Args) -> Outcome {
-    let bytes = scene::open(Some(&args.scene))?;
+    super::output::writable(&args.output)?;
+    let (bytes, notes) = scene::open(Some(&args.scene))?;
     let scene = Scene::from_bytes(&bytes).map_err(|e| scene::about(Some(&args.scene))(&e))?;
     write_whole(&args.output, |out| out.write_all(&bytes).map_err(|e| ImageError::Write(args.output.clone(), e)))?;
     let (triangles, dropped_triangles) = (scene.triangles.len(), scene.info.dropped_triangles);
     let hash = format!("{:016x}", scene.hash);
     if args.json {
-        return say_json(&Report { output: &args.output, bytes: bytes.len(), triangles, dropped_triangles, hash });
+        return say_json(&Report {
+            output: &args.output,
+            bytes: bytes.len(),
+            triangles,
+            dropped_triangles,
+            hash,
+            notes,
+        });
     }
     let dropped = match dropped_triangles {
         0 => String::new(),

@@ -24,7 +24,7 @@ pub struct Args {
     #[arg(long)]
     keep_outliers: bool,
     /// Stops of exposure for FLIP
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = super::stops, allow_negative_numbers = true)]
     exposure: f32,
     /// Print the figures as one line of JSON
     #[arg(long)]

@@ -1,8 +1,9 @@
 //! `croupier info`
 
+use super::notes::Notes;
 use super::{Outcome, say, say_json, scene};
 use croupier::scene::Effects;
-use croupier::{Scene, SceneError};
+use croupier::{HARD_STOP, Scene, SceneError};
 use croupier_host::render::{PlanSummary, RenderOptions, plan};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -31,14 +32,18 @@ struct Facts {
     lights: usize,
     bounds: [[f32; 3]; 2],
     size: [u32; 2],
+    /// The scene's own number, and the most segments that a path gets.
     max_depth: u32,
+    longest_path: u32,
     effects: Vec<&'static str>,
     /// Absent in builds that cannot render.
     plan: Option<PlanSummary>,
+    #[serde(flatten)]
+    notes: Notes,
 }
 
 impl Facts {
-    fn of(bytes: &[u8]) -> Result<Self, SceneError> {
+    fn of(bytes: &[u8], notes: Notes) -> Result<Self, SceneError> {
         let scene = Scene::from_bytes(bytes)?;
         let called_for = Effects::NAMES.iter().filter(|(effect, _)| scene.effects.contains(*effect));
         Ok(Self {
@@ -56,8 +61,10 @@ impl Facts {
             bounds: [scene.info.bounds_min, scene.info.bounds_max],
             size: scene.camera.size,
             max_depth: scene.info.max_depth,
+            longest_path: scene.info.max_depth.min(HARD_STOP),
             effects: called_for.map(|(_, name)| *name).collect(),
             plan: plan(bytes, &RenderOptions::default()).ok(),
+            notes,
         })
     }
 }
@@ -65,8 +72,8 @@ impl Facts {
 /// Runs the command.
 pub fn run(args: &Args) -> Outcome {
     let path = args.scene.as_deref();
-    let bytes = scene::open(path)?;
-    let f = Facts::of(&bytes).map_err(|e| scene::about(path)(&e))?;
+    let (bytes, notes) = scene::open(path)?;
+    let f = Facts::of(&bytes, notes).map_err(|e| scene::about(path)(&e))?;
     if args.json {
         return say_json(&f);
     }
@@ -78,7 +85,10 @@ pub fn run(args: &Args) -> Outcome {
     line("materials", format!("{materials}, {textures} textures of {texels} texels in all"))?;
     line("lights", lights.to_string())?;
     line("bounds", format!("{:?} to {:?}", f.bounds[0], f.bounds[1]))?;
-    line("picture", format!("{}x{} pixels, paths of up to {} segments", f.size[0], f.size[1], f.max_depth))?;
+    let limited =
+        if f.max_depth > HARD_STOP { format!(" (the scene asks for {})", f.max_depth) } else { String::new() };
+    let [width, height] = f.size;
+    line("picture", format!("{width}x{height} pixels, paths of up to {} segments{limited}", f.longest_path))?;
     line("effects", f.effects.join(", "))?;
     let Some(p) = f.plan else { return Ok(()) };
     line("profile", p.profile)?;

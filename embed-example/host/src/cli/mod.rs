@@ -1,12 +1,14 @@
 //! Command line: arguments, exit status, and one file per command.
 //!
-//! Exit status 0: done (also when stopped by Ctrl-C with the picture so far written); 1: one line on stderr says what went
-//! wrong; 2: the arguments make no sense. Results go to stdout, progress and errors to stderr.
+//! Exit status 0: done (also when stopped by Ctrl-C with the picture so far written); 1: the last line on stderr says what went
+//! wrong; 2: the arguments make no sense. Results go to stdout, progress, notes and errors to stderr.
 
 mod bake;
 mod compare;
 mod info;
 mod learning;
+mod notes;
+mod output;
 mod progress;
 mod render;
 mod scene;
@@ -53,12 +55,21 @@ pub fn run() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
-            // One line, whatever the error's text holds.
-            let text = e.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
-            let _ = writeln!(io::stderr(), "croupier: {text}");
+            complain(&e.to_string());
             ExitCode::FAILURE
         }
     }
+}
+
+/// Prints one line on stderr, whatever the text holds.
+fn complain(text: &str) {
+    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let _ = writeln!(io::stderr(), "croupier: {text}");
+}
+
+/// Prints what is no error, but may not be what the user expects.
+fn note(text: &str) {
+    complain(&format!("note: {text}"));
 }
 
 /// Prints a line of results. A reader that has gone away (`croupier info | head`) is no error.
@@ -72,4 +83,13 @@ fn say(line: &str) -> Outcome {
 /// Prints results as one line of JSON; numbers that are not finite become `null`.
 fn say_json(value: &impl serde::Serialize) -> Outcome {
     say(&serde_json::to_string(value)?)
+}
+
+/// An exposure.
+fn stops(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(x) if x.abs() <= 100.0 => Ok(x),
+        Ok(_) => Err("must be between -100 and 100".into()),
+        Err(e) => Err(e.to_string()),
+    }
 }

@@ -1,32 +1,33 @@
-//! Progress bars on stderr; nothing is shown where stderr is no terminal.
+//! Progress on stderr; nothing is shown where stderr is no terminal.
 
+use croupier_host::bake::Stage;
 use croupier_host::render::{Observer, Progress, Target};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Steps of a bar.
+/// Steps of the bar of a render.
 const STEPS: u64 = 1000;
 
-fn bar(template: &str) -> ProgressBar {
+fn styled(bar: ProgressBar, template: &str) -> ProgressBar {
     let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(STEPS).with_style(style.progress_chars("=> "));
+    let bar = bar.with_style(style.progress_chars("=> "));
     bar.enable_steady_tick(Duration::from_millis(250));
     bar
 }
 
-/// Shows how far baking is. Disappears when dropped.
+/// Shows what baking is at and for how long it has been baking: nobody knows for how long it will. Disappears when
+/// dropped.
 pub struct Baking(ProgressBar);
 
 impl Baking {
     pub fn start() -> Self {
-        Self(bar("baking [{bar:30}] {percent:>3} %  {msg}"))
+        Self(styled(ProgressBar::new_spinner(), "baking {spinner} {elapsed}  {msg}"))
     }
 
-    /// `part` of `stage` is done, 0 to 1.
-    pub fn show(&self, stage: &str, part: f32) {
-        self.0.set_message(stage.to_lowercase());
-        self.0.set_position((f64::from(part).clamp(0.0, 1.0) * STEPS as f64) as u64);
+    /// `stage` begins or ends.
+    pub fn show(&self, stage: Stage) {
+        self.0.set_message(stage.name());
     }
 }
 
@@ -53,7 +54,7 @@ impl Rendering {
                 std::process::exit(130);
             }
         });
-        Self { bar: bar("rendering [{bar:30}] {percent:>3} %  {msg}"), target }
+        Self { bar: styled(ProgressBar::new(STEPS), "rendering [{bar:30}] {percent:>3} %  {msg}"), target }
     }
 }
 

@@ -1,22 +1,17 @@
 //! `croupier render`
 
 use super::learning::LearningFlags;
+use super::notes::Notes;
+use super::output::Outputs;
 use super::progress::Rendering;
 use super::{Outcome, say, say_json, scene};
-use croupier::Strategy;
 use croupier::rrs::ParseError;
-use croupier_host::false_color::{Scale, draw};
-use croupier_host::image::{ImageError, Picture, write_png, write_whole};
+use croupier::{HARD_STOP, Scene, SceneError, Strategy};
 use croupier_host::render::{RenderOptions, RenderResult, RenderStats, Target, render};
 use croupier_host::statistics::Statistics;
-use croupier_host::tonemap::{Curve, tonemap};
 use serde::Serialize;
 use std::error::Error;
-use std::io::Write;
 use std::path::{Path, PathBuf};
-
-/// Path segments at which every path ends, whatever the settings.
-const HARD_STOP: i64 = 200;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -38,7 +33,7 @@ pub struct Flags {
     #[command(flatten)]
     until: Until,
     /// Path segments from the camera: 1 shows emitters only; the scene's own number if absent
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=HARD_STOP))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(HARD_STOP)))]
     max_depth: Option<u32>,
     /// Size in pixels; the scene's own if absent
     #[arg(long, value_name = "WxH", value_parser = size)]
@@ -53,7 +48,7 @@ pub struct Flags {
     #[arg(long, value_name = "N", default_value_t = RenderOptions::default().shards, value_parser = clap::value_parser!(u32).range(1..=65536))]
     shards: u32,
     /// Stops of exposure for the PNG; 0 if absent, 1 for the built-in scene
-    #[arg(long, value_name = "STOPS", value_parser = stops, allow_negative_numbers = true)]
+    #[arg(long, value_name = "STOPS", value_parser = super::stops, allow_negative_numbers = true)]
     exposure: Option<f32>,
     /// Add the denoised picture as layer `denoised`, and make the PNG from it
     #[arg(long)]
@@ -80,13 +75,14 @@ struct Until {
     /// Stop after this many samples per pixel
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
-    /// Stop after this time
+    /// Stop after this time, loading and writing not counted: no iteration begins that would pass it at the speed so far,
+    /// one that has begun is finished, and the first, a sample per pixel, is rendered in any case
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     seconds: Option<f64>,
-    /// Stop after this many rays
+    /// Stop after this many rays: no iteration begins that would pass them at the cost so far, but for the first
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     rays: Option<u64>,
-    /// Stop when the estimated relMSE is below this
+    /// Stop after the iteration that brings the estimated relMSE to this, with 4 samples per pixel at least
     #[arg(long, value_name = "E", value_parser = positive, allow_negative_numbers = true)]
     until_error: Option<f64>,
 }
@@ -124,6 +120,8 @@ struct Report<'a> {
     #[serde(flatten)]
     stats: &'a RenderStats,
     #[serde(flatten)]
+    notes: &'a Notes,
+    #[serde(flatten)]
     statistics: Option<&'a Statistics>,
     width: usize,
     height: usize,
@@ -132,105 +130,89 @@ struct Report<'a> {
     stopped_early: bool,
     output: &'a Path,
     png: &'a Path,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    false_color: Vec<PathBuf>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    false_color: &'a [PathBuf],
     #[serde(skip_serializing_if = "Option::is_none")]
     cache_out: Option<&'a Path>,
+    /// Those of the files above that are complete.
+    written: &'a [PathBuf],
 }
 
 /// Runs the command.
 pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
-    let png = flags.output.with_extension("png");
+    let outputs = Outputs::new(&flags.output, flags.learning.cache_out.as_deref(), flags.false_color);
     // Said now, not after an hour of rendering.
-    writable(&flags.output)?;
-    let cache_out = flags.learning.cache_out.as_deref();
-    cache_out.map_or(Ok(()), writable)?;
+    outputs.check()?;
     let options = flags.options()?;
-    let bytes = scene::open(path)?;
+    let (bytes, mut notes) = scene::open(path)?;
+    if let Some(text) = shortened(&bytes, flags.max_depth).map_err(|e| scene::about(path)(&e))? {
+        notes.add(path, text);
+    }
     let watch = Rendering::start(options.target);
     let result = render(&bytes, &options, &watch)
         .map_err(|e| flags.learning.about(&e).unwrap_or_else(|| scene::about(path)(&e)))?;
     drop(watch);
     let RenderResult { picture, stats, statistics, cache, stopped_early } = &result;
-    picture.write_exr(&flags.output)?;
-    if let Some((path, bytes)) = cache_out.zip(cache.as_ref()) {
-        write_whole(path, |out| out.write_all(bytes).map_err(|e| ImageError::Write(path.into(), e)))?;
+    if let Some([x, y]) = stats.first_non_finite {
+        let count = stats.counters.get("non_finite").unwrap_or(&1);
+        notes.add(path, format!("{count} contributions were not finite and left out, the first in pixel ({x}, {y})"));
     }
-    let (width, height) = (picture.width, picture.height);
-    let image = picture
-        .rgb(if flags.denoise { "denoised" } else { "" })
-        .ok_or_else(|| format!("{}: the picture has no colours", flags.output.display()))?;
     // Its lamp lights the walls to about a fifth of white.
     let exposure = flags.exposure.unwrap_or(if path.is_none() { 1.0 } else { 0.0 });
-    write_png(&png, width, height, &tonemap(&image, exposure, Curve::Shoulder))?;
-    let false_color = if flags.false_color { write_false_color(&flags.output, picture)? } else { Vec::new() };
+    let image = if flags.denoise { "denoised" } else { "" };
+    let written = outputs.write(picture, cache.as_deref(), image, exposure);
+    let report = Report {
+        stats,
+        notes: &notes,
+        statistics: flags.stats.then_some(statistics),
+        width: picture.width,
+        height: picture.height,
+        strategy: &options.strategy,
+        seed: options.seed,
+        stopped_early: *stopped_early,
+        output: outputs.exr,
+        png: &outputs.png,
+        false_color: &outputs.false_color,
+        cache_out: outputs.cache,
+        written: &written.files,
+    };
+    // The figures are worth having even if a file is missing.
     if flags.json {
-        return say_json(&Report {
-            stats,
-            statistics: flags.stats.then_some(statistics),
-            width,
-            height,
-            strategy: &options.strategy,
-            seed: options.seed,
-            stopped_early: *stopped_early,
-            output: &flags.output,
-            png: &png,
-            false_color,
-            cache_out,
-        });
+        say_json(&report)?
+    } else {
+        print(&report)?
     }
-    let early = if *stopped_early { "stopped early: " } else { "" };
-    let RenderStats { spp, rays, seconds, mrays_per_s, .. } = *stats;
+    written.error.map_or(Ok(()), |e| Err(e.into()))
+}
+
+/// What to say if paths end before the scene wants them to, and nobody asked for it.
+fn shortened(bytes: &[u8], given: Option<u32>) -> Result<Option<String>, SceneError> {
+    let wanted = Scene::from_bytes(bytes)?.info.max_depth;
+    let text = || format!("paths end after {HARD_STOP} segments, the scene asks for {wanted}");
+    Ok((given.is_none() && wanted > HARD_STOP).then(text))
+}
+
+fn print(r: &Report<'_>) -> Outcome {
+    let early = if r.stopped_early { "stopped early: " } else { "" };
+    let RenderStats { spp, rays, seconds, mrays_per_s, .. } = *r.stats;
     say(&format!(
-        "{early}{width}x{height} pixels, {spp:.1} samples per pixel, {:.1} million rays in {seconds:.1} s, {mrays_per_s:.2} Mrays/s",
+        "{early}{}x{} pixels, {spp:.1} samples per pixel, {:.1} million rays in {seconds:.1} s, {mrays_per_s:.2} Mrays/s",
+        r.width,
+        r.height,
         rays as f64 * 1e-6
     ))?;
-    if let Some(e) = stats.relmse_estimate {
-        let interval = stats.relmse_interval.map_or(String::new(), |[a, b]| format!(" ({a:.3e} to {b:.3e})"));
+    if let Some(e) = r.stats.relmse_estimate {
+        let interval = r.stats.relmse_interval.map_or(String::new(), |[a, b]| format!(" ({a:.3e} to {b:.3e})"));
         say(&format!("estimated relMSE {e:.3e}{interval}"))?;
     }
-    for (name, count) in stats.counters.iter().filter(|(_, count)| **count > 0) {
+    for (name, count) in r.stats.counters.iter().filter(|(_, count)| **count > 0) {
         say(&format!("{name}: {count}"))?;
     }
-    if flags.stats {
+    if let Some(statistics) = r.statistics {
         say(&format!("\n{statistics}"))?;
     }
-    let more = false_color.iter().map(PathBuf::as_path).chain(cache_out);
-    let more: String = more.map(|p| format!(", {}", p.display())).collect();
-    say(&format!("wrote {} and {}{more}", flags.output.display(), png.display()))
-}
-
-/// Can a file of this name be made?
-fn writable(path: &Path) -> Result<(), String> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-    match folder.filter(|f| !f.is_dir()) {
-        Some(folder) => Err(format!("cannot write {}: {} is not a folder", path.display(), folder.display())),
-        None if path.is_dir() => Err(format!("cannot write {}: it is a folder", path.display())),
-        None => Ok(()),
-    }
-}
-
-/// Pictures of factors, costs and paths beside `output`; their names.
-fn write_false_color(output: &Path, picture: &Picture) -> Result<Vec<PathBuf>, ImageError> {
-    const LAYERS: [(&str, &str); 6] = [
-        ("factor1", "factor 1"),
-        ("factor2", "factor 2"),
-        ("factor3", "factor 3"),
-        ("factor4", "factor 4+"),
-        ("cost", "rays"),
-        ("paths", "paths"),
-    ];
-    let mut names = Vec::new();
-    for (layer, title) in LAYERS {
-        let Some(channel) = picture.layer(layer).and_then(|l| l.channels.first()) else { continue };
-        let factors = layer.starts_with("factor");
-        let scale = if factors { Scale::FACTORS } else { Scale::sequential(&channel.values) };
-        let drawing = draw(&channel.values, picture.width, &scale, title);
-        let name = output.with_extension(format!("{layer}.png"));
-        write_png(&name, drawing.width, drawing.height, &drawing.pixels)?;
-        names.push(name);
-    }
-    Ok(names)
+    let names: Vec<_> = r.written.iter().map(|p| p.display().to_string()).collect();
+    if names.is_empty() { Ok(()) } else { say(&format!("wrote {}", names.join(", "))) }
 }
 
 /// Help of `--rrs`.
@@ -266,14 +248,6 @@ fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
         Ok(_) => Err("must be above 0 and finite".into()),
-        Err(e) => Err(e.to_string()),
-    }
-}
-
-fn stops(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(x) if x.abs() <= 100.0 => Ok(x),
-        Ok(_) => Err("must be between -100 and 100".into()),
         Err(e) => Err(e.to_string()),
     }
 }

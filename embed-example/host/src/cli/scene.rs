@@ -1,9 +1,14 @@
 //! From a path to scene bytes.
 
+use super::notes::Notes;
 use super::progress;
-use croupier_host::{bake, builtin, load};
+use croupier_host::bake::{self, BakeError};
+use croupier_host::builtin;
+use croupier_host::description::SceneDescription;
+use croupier_host::load::{self, LoadReport};
 use memmap2::Mmap;
 use std::error::Error;
+use std::fmt::Display;
 use std::fs::File;
 use std::ops::Deref;
 use std::path::Path;
@@ -28,21 +33,24 @@ impl Deref for SceneBytes {
 }
 
 /// Opens a scene: a baked `.crp` file, anything that loads and bakes (a folder with `scene.json`, an `.obj`), or, without
-/// a path, the built-in one.
-pub fn open(path: Option<&Path>) -> Result<SceneBytes, Box<dyn Error>> {
-    match path {
-        Some(path) if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")) => map(path),
-        Some(path) => {
-            let (description, _) = load::load(path)?;
-            Ok(SceneBytes::Baked(bake(&description)?))
+/// a path, the built-in one. What had to be assumed, ignored or left out is printed and returned.
+pub fn open(path: Option<&Path>) -> Result<(SceneBytes, Notes), Box<dyn Error>> {
+    let (description, loaded) = match path {
+        Some(path) if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")) => {
+            return Ok((map(path)?, Notes::default()));
         }
-        None => Ok(SceneBytes::Baked(bake(&builtin::cornell_box())?)),
-    }
+        Some(path) => load::load(path)?,
+        None => (builtin::cornell_box(), LoadReport::default()),
+    };
+    let baked = bake(&description).map_err(|e| about(path)(&e))?;
+    let notes = Notes::of(&loaded, &baked.report);
+    notes.print(path);
+    Ok((SceneBytes::Baked(baked), notes))
 }
 
-fn bake(description: &croupier_host::description::SceneDescription) -> Result<bake::Baked, Box<dyn Error>> {
+fn bake(description: &SceneDescription) -> Result<bake::Baked, BakeError> {
     let bar = progress::Baking::start();
-    Ok(bake::bake(description, &bake::BakeOptions::default(), |stage, part| bar.show(&format!("{stage:?}"), part))?)
+    bake::bake(description, &bake::BakeOptions::default(), |stage, _| bar.show(stage))
 }
 
 fn map(path: &Path) -> Result<SceneBytes, Box<dyn Error>> {
@@ -62,8 +70,8 @@ fn map(path: &Path) -> Result<SceneBytes, Box<dyn Error>> {
     Ok(SceneBytes::Mapped(map))
 }
 
-/// Puts the scene's name in front of an error about its content.
-pub fn about<'a>(path: Option<&'a Path>) -> impl Fn(&dyn Error) -> String + 'a {
+/// Puts the scene's name in front of an error or a note about its content.
+pub fn about<'a>(path: Option<&'a Path>) -> impl Fn(&dyn Display) -> String + 'a {
     move |e| match path {
         Some(path) => format!("{}: {e}", path.display()),
         None => format!("built-in scene: {e}"),

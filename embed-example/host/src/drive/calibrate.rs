@@ -1,4 +1,4 @@
-//! What a look-up in the learned statistics and an entry into them take, measured on the statistics of a finished render.
+//! What a look-up in the learned statistics and entering a sample into them take, measured on the statistics of a finished render.
 
 use crate::blob::AlignedBytes;
 use croupier::Scene;
@@ -18,7 +18,7 @@ const ROUNDS: usize = 5;
 pub struct Calibration {
     /// Finding and reading the statistics of a packet of eight vertices.
     pub look_up: f64,
-    /// Entering one sample.
+    /// Entering one finished sample: adding it to its bin, not what gathers it in the ledger before.
     pub log: f64,
 }
 

@@ -1,0 +1,52 @@
+//! What loading and baking assumed, ignored or left out: printed on stderr, and part of every JSON report about a scene.
+
+use super::scene::about;
+use croupier_host::bake::BakeReport;
+use croupier_host::load::LoadReport;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Notes that are printed; JSON has them all.
+const PRINTED: usize = 20;
+
+/// One sentence each, and how many of what. Nothing is known of a baked file: it was said when the file was baked.
+#[derive(Debug, Default, Serialize)]
+pub struct Notes {
+    notes: Vec<String>,
+    /// By name; only those that are there.
+    scene_counts: BTreeMap<&'static str, u32>,
+}
+
+impl Notes {
+    /// Of a scene that was loaded and baked just now.
+    pub fn of(load: &LoadReport, bake: &BakeReport) -> Self {
+        let counts = [
+            ("split_polygons", "faces of more than three corners, split into triangles", load.polygons),
+            ("skipped_elements", "points and lines, left out", load.skipped_elements),
+            ("dropped_triangles", "triangles without area, left out", bake.dropped_degenerate),
+            ("dropped_lights", "triangles without area that would have been lights", bake.dropped_lights),
+            ("flattened", "smooth triangles with a vertex normal of length 0, shaded flat", bake.flattened),
+        ];
+        let mut all = Self { notes: load.notes.clone(), ..Self::default() };
+        for (name, what, count) in counts.into_iter().filter(|(.., count)| *count > 0) {
+            all.notes.push(format!("{what}: {count}"));
+            all.scene_counts.insert(name, count);
+        }
+        all
+    }
+
+    /// Adds one, and prints it.
+    pub fn add(&mut self, path: Option<&Path>, text: String) {
+        super::note(&about(path)(&text));
+        self.notes.push(text);
+    }
+
+    /// Prints them, with the scene's name in front.
+    pub fn print(&self, path: Option<&Path>) {
+        self.notes.iter().take(PRINTED).for_each(|text| super::note(&about(path)(text)));
+        if let Some(more @ 1..) = self.notes.len().checked_sub(PRINTED) {
+            super::note(&about(path)(&format!("... and {more} more notes; --json has them all")));
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! The files of a render: checked before it begins, and every one of them written when it has ended, whatever happens to
+//! the others. An hour of rendering must not be lost to a full disk or a mistyped name.
+
+use croupier_host::false_color::{Scale, draw};
+use croupier_host::image::{ImageError, Picture, part_name, write_png, write_whole};
+use croupier_host::tonemap::{Curve, tonemap};
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Layers drawn in false colours, and the titles of their legends.
+const FALSE_COLOR: [(&str, &str); 6] = [
+    ("factor1", "factor 1"),
+    ("factor2", "factor 2"),
+    ("factor3", "factor 3"),
+    ("factor4", "factor 4+"),
+    ("cost", "rays"),
+    ("paths", "paths"),
+];
+
+/// Where everything goes.
+#[derive(Debug)]
+pub struct Outputs<'a> {
+    /// All layers.
+    pub exr: &'a Path,
+    /// The tone-mapped picture, beside the EXR.
+    pub png: PathBuf,
+    /// What was learned, if asked for.
+    pub cache: Option<&'a Path>,
+    /// A picture for each of [`FALSE_COLOR`], or nothing.
+    pub false_color: Vec<PathBuf>,
+}
+
+/// What became of them.
+#[derive(Debug, Default)]
+pub struct Written {
+    /// Files that are complete, in the order in which they were written.
+    pub files: Vec<PathBuf>,
+    /// Why the first of the others is not.
+    pub error: Option<ImageError>,
+}
+
+impl Written {
+    fn add(&mut self, path: &Path, outcome: Result<(), ImageError>) {
+        match outcome {
+            Ok(()) => self.files.push(path.into()),
+            Err(e) => self.error = self.error.take().or(Some(e)),
+        }
+    }
+}
+
+impl<'a> Outputs<'a> {
+    /// Names of all files.
+    pub fn new(exr: &'a Path, cache: Option<&'a Path>, false_color: bool) -> Self {
+        let drawings = FALSE_COLOR.iter().filter(|_| false_color);
+        let false_color = drawings.map(|(layer, _)| exr.with_extension(format!("{layer}.png"))).collect();
+        Self { exr, png: exr.with_extension("png"), cache, false_color }
+    }
+
+    /// Fails unless all of them can be written, none over another.
+    pub fn check(&self) -> Result<(), String> {
+        let pictures = [self.exr, &self.png].into_iter().chain(self.false_color.iter().map(PathBuf::as_path));
+        if let Some(cache) = self.cache.filter(|c| pictures.clone().any(|p| p == *c)) {
+            return Err(format!("cannot write {}: a picture and the statistics cannot share it", cache.display()));
+        }
+        pictures.chain(self.cache).try_for_each(writable)
+    }
+
+    /// Writes everything: the PNG and the false colours are made from `picture`. `image` names the layer of the PNG.
+    pub fn write(&self, picture: &Picture, cache: Option<&[u8]>, image: &str, exposure: f32) -> Written {
+        let mut written = Written::default();
+        written.add(self.exr, picture.write_exr(self.exr));
+        if let Some((path, bytes)) = self.cache.zip(cache) {
+            let all = write_whole(path, |out| out.write_all(bytes).map_err(|e| ImageError::Write(path.into(), e)));
+            written.add(path, all);
+        }
+        written.add(&self.png, self.write_png(picture, image, exposure));
+        for (path, (layer, title)) in self.false_color.iter().zip(FALSE_COLOR) {
+            let Some(channel) = picture.layer(layer).and_then(|l| l.channels.first()) else { continue };
+            let factors = layer.starts_with("factor");
+            let scale = if factors { Scale::FACTORS } else { Scale::sequential(&channel.values) };
+            let drawing = draw(&channel.values, picture.width, &scale, title);
+            written.add(path, write_png(path, drawing.width, drawing.height, &drawing.pixels));
+        }
+        written
+    }
+
+    fn write_png(&self, picture: &Picture, layer: &str, exposure: f32) -> Result<(), ImageError> {
+        let image = picture.rgb(layer).ok_or_else(|| ImageError::NoRgb(self.exr.into()))?;
+        write_png(&self.png, picture.width, picture.height, &tonemap(&image, exposure, Curve::Shoulder))
+    }
+}
+
+/// Fails unless a file of this name can be written: makes and removes the temporary one that comes first.
+pub fn writable(path: &Path) -> Result<(), String> {
+    let failed = |why: &dyn std::fmt::Display| format!("cannot write {}: {why}", path.display());
+    if path.is_dir() {
+        return Err(failed(&"it is a folder"));
+    }
+    if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty() && !f.is_dir()) {
+        return Err(failed(&format!("{} is not a folder", folder.display())));
+    }
+    let part = part_name(path);
+    File::create(&part).and_then(|_| fs::remove_file(&part)).map_err(|e| failed(&e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Folders that vanish while a render runs take nothing else with them. Killed by: giving up at the first error,
+    /// returning the last one or none, leaving out a file that could be written.
+    #[test]
+    fn one_error_does_not_stop_the_rest() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        let mut picture = Picture::new(2, 1);
+        picture.add3("", ["R", "G", "B"], &[[0.5; 3]; 2]);
+        FALSE_COLOR.iter().for_each(|(layer, _)| picture.add1(layer, "s", &[1.0; 2]));
+        let [exr, cache, lost] = ["a.exr", "a.cache", "no/where"].map(at);
+        let whole = Outputs::new(&exr, Some(&cache), true);
+        assert_eq!(whole.write(&picture, Some(&[7]), "", 0.0).files.len(), 9);
+        for i in 0..9 {
+            let dir = tempfile::tempdir().unwrap();
+            let mut names: Vec<PathBuf> = (0..9).map(|n| dir.path().join(n.to_string())).collect();
+            names[i] = lost.join(i.to_string());
+            let (png, false_color) = (names[2].clone(), names[3..].to_vec());
+            let outputs = Outputs { exr: &names[0], png, cache: Some(&names[1]), false_color };
+            assert!(outputs.check().unwrap_err().contains("not a folder"));
+            assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+            let written = outputs.write(&picture, Some(&[7]), "", 0.0);
+            assert!(written.error.unwrap().to_string().contains(&format!("where/{i}")));
+            names.remove(i);
+            assert_eq!(written.files, names);
+            assert!(names.iter().all(|n| n.is_file()));
+        }
+        let both = Outputs { exr: &lost.join("1"), cache: Some(&lost.join("2")), ..whole };
+        let written = both.write(&picture, Some(&[7]), "", 0.0);
+        assert!(written.error.unwrap().to_string().contains("where/1") && written.files.len() == 7);
+    }
+}
