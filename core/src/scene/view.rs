@@ -5,7 +5,9 @@ use super::error::{SceneError, SectionFault};
 use super::sections::Sections;
 use super::{Effects, validate};
 
-/// A validated scene. [`Scene::from_bytes`] is the only door; nothing re-checks after it. In a scene from there
+/// A validated scene. [`Scene::from_bytes`] is the only door; nothing re-checks after it. The fields are there to be read:
+/// one that was put together or changed by hand has none of the promises below, and may be walked for ever. In a scene
+/// from that door
 ///
 /// * every index that a record holds is in range of its section or [`NONE`], and every section has fewer than 2^31
 ///   records,
