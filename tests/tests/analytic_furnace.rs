@@ -106,6 +106,36 @@ fn one_bounce_shows_the_albedo() {
     }
 }
 
+/// The layer albedo of every model at that angle: 1 where light goes through; else the oracle's, exactly for smooth surfaces
+/// and at least that for rough ones, whose masked light counts as reflected. Killed by: the parameter `reflectance` in its
+/// place, which is 0 for glass and 1 for gold.
+#[test]
+fn first_hits_have_their_albedo() {
+    for (model, case) in &pairs() {
+        for degrees in [0.0, 45.0, 75.0] {
+            let wo = at_angle(degrees, 0.0);
+            let mut expected = case.integral(wo, 512).f;
+            for lobe in case.lobes(wo) {
+                expected = std::array::from_fn(|c| expected[c] + lobe.weight[c]);
+            }
+            let scene = quad_under_sky(*model, false, degrees);
+            let image = render(&scene, &Settings { aovs: true, max_depth: 2, ..settings(&scene, "none") }, 16);
+            let hits: f64 = image.aovs.iter().map(|a| a.hits).sum();
+            assert_eq!(hits, 256.0);
+            for (c, want) in expected.into_iter().enumerate() {
+                let found = image.aovs.iter().map(|a| a.albedo[c]).sum::<f64>() / hits;
+                let what =
+                    format!("{} of roughness {} at {degrees} degrees: {found} for {want}", case.name(), case.alpha());
+                match () {
+                    () if case.two_sided() => assert!((found - 1.0).abs() < 1e-6, "{what}"),
+                    () if case.alpha() == 0.0 => assert!((found - want).abs() < 1e-3, "{what}"),
+                    () => assert!((want - 0.02..=1.0).contains(&found), "{what}"),
+                }
+            }
+        }
+    }
+}
+
 /// The back of a one-sided opaque surface is black; that of a two-sided one is its front. Killed by: a flag that is not
 /// read, a shading normal that is not turned.
 #[test]
