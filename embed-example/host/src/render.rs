@@ -7,9 +7,10 @@ use croupier::denoise::{Planes, scratch_len};
 use croupier::film::{PixelAov, PixelStats};
 use croupier::learn::{Constant, Learning};
 use croupier::profile::AnyProfile;
-use croupier::{Film, Plan, Scene, Settings, Strategy};
+use croupier::{Film, MIN_RING, Plan, Scene, Settings, SettingsError, Strategy, rrs};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::fmt;
 
 /// When a render is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,6 +59,10 @@ pub struct RenderOptions {
     pub threads: usize,
     /// Units of parallel work, >= 1. Part of what determines the image.
     pub shards: u32,
+    /// See [`Settings::ring`]; the core's own number if absent.
+    pub ring: Option<u32>,
+    /// See [`Settings::split_budget`]; the core's own number if absent.
+    pub split_budget: Option<u32>,
     /// See [`Settings::adaptive`].
     pub adaptive: bool,
     /// See [`Settings::shadow_roulette`].
@@ -86,6 +91,8 @@ impl Default for RenderOptions {
             seed: 0,
             threads: 0,
             shards: 16,
+            ring: None,
+            split_budget: None,
             adaptive: false,
             shadow_roulette: false,
             constant: Constant::default(),
@@ -161,6 +168,8 @@ pub struct RenderResult {
     pub stats: RenderStats,
     /// More of them: paths, iterations, time.
     pub statistics: Statistics,
+    /// The memory it took.
+    pub plan: PlanSummary,
     /// The saved cache, if asked for.
     pub cache: Option<Vec<u8>>,
     /// The observer ended it before its target.
@@ -178,32 +187,93 @@ pub struct PlanSummary {
     pub shard_bytes: u64,
     /// Number of shards.
     pub shards: u32,
+    /// Those of all these bytes that would not be needed if nothing were learned.
+    pub learning_bytes: u64,
+}
+
+impl PlanSummary {
+    fn new(scene: &Scene<'_>, settings: &Settings) -> Result<Self, SettingsError> {
+        let plan = Plan::new(settings)?;
+        let bytes = |p: &Plan| p.session().size as u64 + p.shard().size as u64 * u64::from(settings.shards);
+        let taught_nothing = Settings {
+            strategy: Strategy::None(rrs::None),
+            adaptive: false,
+            shadow_roulette: false,
+            constant: Constant::Off,
+            ..*settings
+        };
+        Ok(Self {
+            profile: AnyProfile::smallest(scene.effects).name().into(),
+            shared_bytes: plan.session().size as u64,
+            shard_bytes: plan.shard().size as u64,
+            shards: settings.shards,
+            learning_bytes: bytes(&plan).saturating_sub(bytes(&Plan::new(&taught_nothing)?)),
+        })
+    }
+}
+
+/// The memory, for people.
+impl fmt::Display for PlanSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { shared_bytes, shards, shard_bytes, learning_bytes, .. } = self;
+        write!(
+            f,
+            "{shared_bytes} bytes shared + {shards} shards of {shard_bytes} bytes, {learning_bytes} bytes of it to learn"
+        )
+    }
 }
 
 pub use crate::drive::DriveError as RenderError;
 
 /// Settings of the core for a scene.
 fn settings(scene: &Scene<'_>, options: &RenderOptions) -> Result<Settings, RenderError> {
-    let base = Settings::for_scene(scene);
+    choose(Settings::for_scene(scene), options)
+}
+
+/// `base` with the options that are given.
+fn choose(base: Settings, options: &RenderOptions) -> Result<Settings, RenderError> {
     Ok(Settings {
         size: options.size.unwrap_or(base.size),
         seed: options.seed,
         shards: options.shards,
         max_depth: options.max_depth.unwrap_or(base.max_depth),
         strategy: Strategy::parse(&options.strategy).map_err(RenderError::Strategy)?,
+        ring: options.ring.unwrap_or(base.ring),
+        split_budget: options.split_budget.unwrap_or(base.split_budget),
         aovs: true,
         adaptive: options.adaptive,
         shadow_roulette: options.shadow_roulette,
         constant: options.constant,
         learning: options.learning,
-        ..base
     })
+}
+
+/// Fails if the options make no sense whatever the scene: known before one is loaded.
+pub fn check(options: &RenderOptions) -> Result<(), RenderError> {
+    // the least of everything that a scene or the core would choose
+    let least = Settings {
+        size: [1, 1],
+        seed: 0,
+        shards: 1,
+        max_depth: 1,
+        strategy: Strategy::default(),
+        ring: MIN_RING,
+        split_budget: 0,
+        aovs: true,
+        adaptive: false,
+        shadow_roulette: false,
+        constant: Constant::Off,
+        learning: Learning::default(),
+    };
+    Plan::new(&choose(least, options)?)?;
+    Ok(())
 }
 
 /// Renders a scene blob.
 pub fn render(scene: &[u8], options: &RenderOptions, observer: &dyn Observer) -> Result<RenderResult, RenderError> {
     let scene = Scene::from_bytes(scene)?;
     let settings = settings(&scene, options)?;
+    let plan = PlanSummary::new(&scene, &settings)?;
     let o = Options {
         threads: options.threads,
         cache: options.cache.as_deref(),
@@ -220,6 +290,7 @@ pub fn render(scene: &[u8], options: &RenderOptions, observer: &dyn Observer) ->
         picture,
         stats: stats(&rendered),
         statistics: Statistics::of(&rendered),
+        plan,
         cache: rendered.cache,
         stopped_early: rendered.stopped_early,
     })
@@ -228,13 +299,7 @@ pub fn render(scene: &[u8], options: &RenderOptions, observer: &dyn Observer) ->
 /// What [`render`] would take, without rendering.
 pub fn plan(scene: &[u8], options: &RenderOptions) -> Result<PlanSummary, RenderError> {
     let scene = Scene::from_bytes(scene)?;
-    let plan = Plan::new(&settings(&scene, options)?)?;
-    Ok(PlanSummary {
-        profile: AnyProfile::smallest(scene.effects).name().into(),
-        shared_bytes: plan.session().size as u64,
-        shard_bytes: plan.shard().size as u64,
-        shards: options.shards,
-    })
+    Ok(PlanSummary::new(&scene, &settings(&scene, options)?)?)
 }
 
 const RGB: [&str; 3] = ["R", "G", "B"];

@@ -1,5 +1,8 @@
 //! The program's flags about learning, denoising, false colours and statistics, from outside.
 
+use croupier::{Scene, Settings};
+use croupier_host::bake::{BakeOptions, bake};
+use croupier_host::builtin;
 use croupier_host::image::Picture;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -56,6 +59,33 @@ fn help_lists_every_strategy() {
     }
 }
 
+/// Killed by: defaults that are not the core's.
+#[test]
+fn help_tells_the_defaults_of_the_core() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = bake(&builtin::cornell_box(), &BakeOptions::default(), |_, _| {}).unwrap();
+    let s = Settings::for_scene(&Scene::from_bytes(&scene.bytes).unwrap());
+    let l = s.learning;
+    for command in ["render", "info"] {
+        let help = text(&croupier(dir.path(), &[command, "-h"]).stdout);
+        for (flag, default) in [
+            ("--ring <N>", format!("{} if absent", s.ring)),
+            ("--split-budget <N>", format!("{} if absent", s.split_budget)),
+            ("--ledger <N>", format!("[default: {}]", l.ledger)),
+            ("--learn-samples <N>", format!("[default: {}]", l.samples)),
+            ("--split-count <N>", format!("[default: {}]", l.split_count)),
+            ("--carry <X>", format!("[default: {}]", l.carry)),
+            ("--factors <LO:HI>", format!("[default: {}:{}]", l.factors[0], l.factors[1])),
+            ("--estimate <denoised|blocks>", "[default: denoised]".into()),
+        ] {
+            // up to the next flag
+            let about = help.split_once(flag).unwrap_or_else(|| panic!("no {flag}: {help}")).1;
+            let about = about.split("  --").next().unwrap().split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(about.contains(&default), "{flag}: {about}");
+        }
+    }
+}
+
 /// Killed by: an argument that goes unchecked.
 #[test]
 fn usage_errors_are_status_2() {
@@ -67,13 +97,55 @@ fn usage_errors_are_status_2() {
         (["--norm", "median"], "mean, luminance or max"),
         (["--cache-bytes", "24MB"], "24MiB"),
         (["--cache-bytes", "1.5MiB"], "24MiB"),
+        (["--ring", "15"], "16..=16777216"),
+        (["--ring", "16777217"], "16..=16777216"),
+        (["--split-budget", "4294967296"], "--split-budget"),
+        (["--ledger", "0"], "1..=16777216"),
+        (["--ledger", "16777217"], "1..=16777216"),
+        (["--learn-samples", "0"], "--learn-samples"),
+        (["--split-count", "0"], "finite number above 0"),
+        (["--split-count", "-5"], "finite number above 0"),
+        (["--split-count", "nan"], "finite number above 0"),
+        (["--carry", "-0.1"], "from 0 to 1"),
+        (["--carry", "1.1"], "from 0 to 1"),
+        (["--carry", "nan"], "from 0 to 1"),
+        (["--factors", "0.5"], "from 0.05 to 1 and from 1 to 20"),
+        (["--factors", "0.04:20"], "from 0.05 to 1 and from 1 to 20"),
+        (["--factors", "0.05:21"], "from 0.05 to 1 and from 1 to 20"),
+        (["--factors", "1.1:2"], "from 0.05 to 1 and from 1 to 20"),
+        (["--factors", "nan:2"], "from 0.05 to 1 and from 1 to 20"),
+        (["--estimate", "guessed"], "denoised or blocks"),
     ] {
-        let out = croupier(dir.path(), &[&["render"], &arguments[..]].concat());
-        let error = text(&out.stderr);
-        assert_eq!(out.status.code(), Some(2), "{arguments:?}: {error}");
-        assert!(error.contains(said) && out.stdout.is_empty(), "{arguments:?}: {error}");
+        for command in ["render", "info"] {
+            let out = croupier(dir.path(), &[&[command], &arguments[..]].concat());
+            let error = text(&out.stderr);
+            assert_eq!(out.status.code(), Some(2), "{arguments:?}: {error}");
+            assert!(error.contains(said) && out.stdout.is_empty(), "{arguments:?}: {error}");
+        }
     }
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+}
+
+/// What no flag tells alone is refused by the core, before there is a scene. Killed by: a check that waits for the scene, or
+/// that takes other choices than the render does.
+#[test]
+fn flags_that_do_not_fit_together_are_status_1() {
+    let dir = tempfile::tempdir().unwrap();
+    for (arguments, said) in [
+        (&["--cache-bytes", "57KiB"][..], "cache of 58368 bytes: with so many shards it needs"),
+        (&["--shards", "65536"], "cache of 25165824 bytes: with so many shards it needs"),
+        (&["--constant", "0.5", "--rrs", "threshold"], "cannot serve threshold"),
+        (&["--constant", "cached", "--rrs", "classic"], "cached mean needs"),
+    ] {
+        for command in ["render", "info"] {
+            let out = croupier(dir.path(), &[&[command, "missing.crp"], arguments].concat());
+            let error = text(&out.stderr);
+            assert_eq!(out.status.code(), Some(1), "{arguments:?}: {error}");
+            assert!(error.contains(said) && error.lines().count() == 1, "{arguments:?}: {error}");
+        }
+    }
+    let fit = croupier(dir.path(), &["info", "missing.crp", "--cache-bytes", "57KiB", "--shards", "15"]);
+    assert!(text(&fit.stderr).contains("cannot read missing.crp"), "{}", text(&fit.stderr));
 }
 
 /// Killed by: an error after rendering instead of before, without the file's name, or none.
@@ -182,12 +254,12 @@ fn everything_at_once() {
     assert!(words.contains(" splits refused so far for lack of room"), "{words}");
 }
 
-/// Killed by: a flag that is read and forgotten.
+/// Killed by: a flag that is read and forgotten, or taken for another.
 #[test]
 fn every_flag_changes_the_picture() {
     let dir = tempfile::tempdir().unwrap();
     // enough samples that the small cache is too small
-    let flags: [&[&str]; 9] = [
+    let flags: [&[&str]; 17] = [
         &[],
         &["--adaptive"],
         &["--shadow-roulette"],
@@ -197,16 +269,92 @@ fn every_flag_changes_the_picture() {
         &["--norm", "luminance"],
         &["--norm", "max"],
         &["--cache-bytes", "16KiB"],
+        &["--ring", "16"],
+        &["--split-budget", "0"],
+        &["--ledger", "16"],
+        &["--learn-samples", "1"],
+        &["--split-count", "1000"],
+        &["--carry", "0"],
+        &["--factors", "1:1"],
+        &["--estimate", "blocks"],
     ];
+    let mut found = Vec::new();
     let pictures = flags.map(|flags| {
-        json(&render(dir.path(), &[&["--rrs", "ears", "--spp", "200", "-o", "f.exr", "--json"], flags].concat()));
+        let more = ["--rrs", "ears", "--spp", "200", "-o", "f.exr", "--stats", "--json"];
+        found.push(json(&render(dir.path(), &[&more, flags].concat())));
         Picture::read_exr(&dir.path().join("f.exr")).unwrap().rgb("").unwrap()
     });
+    let of = |flag: &str| &found[flags.iter().position(|f| f.first() == Some(&flag)).unwrap()];
+    let counter = |json: &serde_json::Value, name: &str| json["counters"][name].as_u64().unwrap();
+    let learning = |json: &serde_json::Value| json["plan"]["learning_bytes"].as_u64().unwrap();
+    let leaves =
+        |json: &serde_json::Value| json["iterations"].as_array().unwrap().last().unwrap()["leaves"].as_u64().unwrap();
+    let base = &found[0];
+    let ring = of("--ring");
+    assert!(counter(base, "ring_peak") > 16 && counter(base, "splits") > 1000, "{base}");
+    assert_eq!((counter(base, "ledger_full"), counter(base, "budget_capped")), (0, 0), "{base}");
+    assert!(counter(ring, "ring_peak") <= 16 && counter(ring, "ring_capped") > counter(base, "ring_capped"), "{ring}");
+    let budget = of("--split-budget");
+    assert!(counter(budget, "splits") == 0 && counter(budget, "budget_capped") > 1000, "{budget}");
+    let ledger = of("--ledger");
+    assert!(counter(ledger, "ledger_full") > 1000, "{ledger}");
+    // 68 bytes a record, in two shards
+    assert_eq!((learning(base) - learning(ledger)) / (2 * (2048 - 16)), 68, "{ledger}");
+    let samples = of("--learn-samples");
+    assert!(counter(samples, "samples_logged") < counter(base, "samples_logged") / 2, "{samples}");
+    assert!(leaves(of("--split-count")) > 2 * leaves(base));
+    // what the last iteration alone has given is not enough to divide as much
+    assert!(2 * leaves(of("--carry")) < leaves(base));
+    let idle = of("--factors");
+    assert!(
+        counter(idle, "splits") == 0 && counter(idle, "roulette_kills") < counter(base, "roulette_kills") / 10,
+        "{idle}"
+    );
+    // 140 bytes a pixel, or 12 for 64
+    let blocks = of("--estimate");
+    assert!((100..200).contains(&((learning(base) - learning(blocks)) / (24 * 20))), "{blocks}");
+    let cache = of("--cache-bytes");
+    assert!(learning(base) - learning(cache) > 23 << 20, "{cache}");
     for i in 0..pictures.len() {
         for j in 0..i {
             assert!(pictures[i] != pictures[j], "{:?} and {:?}", flags[i], flags[j]);
         }
     }
+}
+
+/// Killed by: flags that are not there together, memory that is planned for other choices than the render's.
+#[test]
+fn all_that_is_learned_fits_in_256_kib() {
+    let dir = tempfile::tempdir().unwrap();
+    let small =
+        ["--shards", "1", "--ring", "128", "--cache-bytes", "152KiB", "--ledger", "256", "--estimate", "blocks"];
+    let size = ["--size", "96x80", "--rrs", "ears"];
+    let run = |command: &str, more: &[&str]| croupier(dir.path(), &[&[command], &small[..], &size, more].concat());
+    let found = json(&run("render", &["--spp", "32", "--threads", "1", "--json"]));
+    let plan = &found["plan"];
+    let bytes = |name: &str| plan[name].as_u64().unwrap();
+    assert_eq!(bytes("shards"), 1);
+    assert!((150 << 10..256 << 10).contains(&bytes("learning_bytes")), "{plan}");
+    let counter = |name: &str| found["counters"][name].as_u64().unwrap();
+    assert!(counter("splits") > 1000 && counter("samples_logged") > 10_000 && counter("ring_peak") <= 128, "{found}");
+    let picture = Picture::read_exr(&dir.path().join("croupier.exr")).unwrap().rgb("").unwrap();
+    let mean = |i: usize| picture.pixels.iter().map(|p| f64::from(p[i])).sum::<f64>() / (96.0 * 80.0);
+    assert!((0..3).all(|i| (0.01..10.0).contains(&mean(i))));
+
+    // told beforehand, and in words
+    assert_eq!(json(&run("info", &["--json"]))["plan"], *plan);
+    let said = format!(
+        "{} bytes shared + 1 shards of {} bytes, {} bytes of it to learn",
+        bytes("shared_bytes"),
+        bytes("shard_bytes"),
+        bytes("learning_bytes")
+    );
+    for out in [run("info", &[]), run("render", &["--spp", "1"])] {
+        assert!(text(&out.stdout).contains(&said), "{said}: {}", text(&out.stdout));
+    }
+    // nothing to learn, nothing to pay
+    let plain = json(&croupier(dir.path(), &["info", "--rrs", "classic", "--json"]));
+    assert_eq!(plain["plan"]["learning_bytes"], 0);
 }
 
 /// Killed by: a Ctrl-C after which the statistics or the pictures are lost.

@@ -1,10 +1,12 @@
 //! `croupier info`
 
+use super::learning::LearningFlags;
 use super::notes::Notes;
+use super::settings::SettingsFlags;
 use super::{Outcome, say, say_json, scene};
 use croupier::scene::Effects;
 use croupier::{HARD_STOP, Scene, SceneError};
-use croupier_host::render::{PlanSummary, RenderOptions, plan};
+use croupier_host::render::{PlanSummary, RenderOptions, check, plan};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -15,6 +17,11 @@ pub struct Args {
     /// Print the facts as one line of JSON
     #[arg(long)]
     json: bool,
+    // What the memory of a render depends on. The heading of the last flags would hold for any after them.
+    #[command(flatten)]
+    settings: SettingsFlags,
+    #[command(flatten)]
+    learning: LearningFlags,
 }
 
 #[derive(Serialize)]
@@ -43,7 +50,7 @@ struct Facts {
 }
 
 impl Facts {
-    fn of(bytes: &[u8], notes: Notes) -> Result<Self, SceneError> {
+    fn of(bytes: &[u8], options: &RenderOptions, notes: Notes) -> Result<Self, SceneError> {
         let scene = Scene::from_bytes(bytes)?;
         let called_for = Effects::NAMES.iter().filter(|(effect, _)| scene.effects.contains(*effect));
         Ok(Self {
@@ -63,7 +70,7 @@ impl Facts {
             max_depth: scene.info.max_depth,
             longest_path: scene.info.max_depth.min(HARD_STOP),
             effects: called_for.map(|(_, name)| *name).collect(),
-            plan: plan(bytes, &RenderOptions::default()).ok(),
+            plan: plan(bytes, options).ok(),
             notes,
         })
     }
@@ -72,8 +79,13 @@ impl Facts {
 /// Runs the command.
 pub fn run(args: &Args) -> Outcome {
     let path = args.scene.as_deref();
+    let mut options = RenderOptions::default();
+    args.settings.apply(&mut options);
+    args.learning.apply(&mut options);
+    // Said before the scene is loaded.
+    check(&options)?;
     let (bytes, notes) = scene::open(path)?;
-    let f = Facts::of(&bytes, notes).map_err(|e| scene::about(path)(&e))?;
+    let f = Facts::of(&bytes, &options, notes).map_err(|e| scene::about(path)(&e))?;
     if args.json {
         return say_json(&f);
     }
@@ -91,6 +103,6 @@ pub fn run(args: &Args) -> Outcome {
     line("picture", format!("{width}x{height} pixels, paths of up to {} segments{limited}", f.longest_path))?;
     line("effects", f.effects.join(", "))?;
     let Some(p) = f.plan else { return Ok(()) };
-    line("profile", p.profile)?;
-    line("memory", format!("{} bytes shared + {} shards of {} bytes", p.shared_bytes, p.shards, p.shard_bytes))
+    line("profile", p.profile.clone())?;
+    line("memory", p.to_string())
 }

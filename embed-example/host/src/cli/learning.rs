@@ -1,9 +1,9 @@
 //! What the strategies that learn are told.
 
+use croupier::Strategy;
 use croupier::learn::cache::CacheError;
-use croupier::learn::{Constant, Learning, Objective};
-use croupier::rrs::{Norm, Space};
-use croupier::{SettingsError, Strategy};
+use croupier::learn::{Constant, Estimate, Learning, Objective};
+use croupier::rrs::{MAX_FACTOR, MIN_FACTOR, Norm, Space};
 use croupier_host::drive::DriveError;
 use croupier_host::render::RenderOptions;
 use std::error::Error;
@@ -31,6 +31,30 @@ pub struct LearningFlags {
     /// Memory for statistics of the scene, of all shards together
     #[arg(long, value_name = "N", default_value = "24MiB", value_parser = bytes)]
     cache_bytes: usize,
+    /// Samples in flight per shard that can be learned from, 1 to 2^24 of 68 bytes each
+    #[arg(long, value_name = "N", default_value_t = Learning::default().ledger, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    ledger: u32,
+    /// Camera samples per pixel that are learned from in each iteration, the first ones
+    #[arg(long, value_name = "N", default_value_t = Learning::default().samples, value_parser = clap::value_parser!(u32).range(1..))]
+    learn_samples: u32,
+    /// Samples in a leaf of the octree at which it is divided, above 0
+    #[arg(long, value_name = "N", default_value_t = Learning::default().split_count, value_parser = above_0, allow_negative_numbers = true)]
+    split_count: f32,
+    /// Part of the statistics that an iteration hands on to the next, 0 to 1
+    #[arg(long, value_name = "X", default_value_t = Learning::default().carry, value_parser = part, allow_negative_numbers = true)]
+    carry: f32,
+    /// Smallest and largest learned factor, at most and at least 1, within 0.05 and 20
+    #[arg(long, value_name = "LO:HI", default_value = "0.05:20", value_parser = factors)]
+    factors: [f32; 2],
+    /// What errors are judged by: the denoised picture (140 bytes a pixel) or means over 8x8 pixels (12 bytes for each)
+    #[arg(long, value_name = "denoised|blocks", default_value = "denoised", value_parser = estimate)]
+    estimate: Estimate,
+}
+
+/// Flags about saved statistics.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Learning")]
+pub struct CacheFlags {
     /// Begin with statistics that a render of this scene with the same objective has saved
     #[arg(long, value_name = "FILE")]
     cache_in: Option<PathBuf>,
@@ -40,7 +64,27 @@ pub struct LearningFlags {
 }
 
 impl LearningFlags {
-    /// Puts them into `options`, and reads the saved statistics.
+    /// Puts them into `options`.
+    pub fn apply(&self, options: &mut RenderOptions) {
+        options.adaptive = self.adaptive;
+        options.shadow_roulette = self.shadow_roulette;
+        options.constant = self.constant;
+        options.learning = Learning {
+            cache_bytes: self.cache_bytes,
+            ledger: self.ledger,
+            samples: self.learn_samples,
+            split_count: self.split_count,
+            carry: self.carry,
+            estimate: self.estimate,
+            objective: self.objective,
+            norm: self.norm,
+            factors: self.factors,
+        };
+    }
+}
+
+impl CacheFlags {
+    /// Puts them into `options`, whose strategy is known, and reads the saved statistics.
     pub fn apply(&self, options: &mut RenderOptions) -> Result<(), Box<dyn Error>> {
         let strategy = Strategy::parse(&options.strategy)?;
         let caches = self.cache_in.is_some() || self.cache_out.is_some();
@@ -48,15 +92,7 @@ impl LearningFlags {
         if caches && strategy.space() != Some(Space::Scene) {
             return Err(DriveError::NoCache(strategy.name()).into());
         }
-        if self.constant == Constant::Cached && strategy.space() != Some(Space::Scene) {
-            return Err(SettingsError::Constant.into());
-        }
         let read = |p: &PathBuf| std::fs::read(p).map_err(|e| format!("cannot read {}: {e}", p.display()));
-        options.adaptive = self.adaptive;
-        options.shadow_roulette = self.shadow_roulette;
-        options.constant = self.constant;
-        options.learning =
-            Learning { cache_bytes: self.cache_bytes, objective: self.objective, norm: self.norm, ..options.learning };
         options.cache = self.cache_in.as_ref().map(read).transpose()?;
         options.save_cache = self.cache_out.is_some();
         Ok(())
@@ -102,6 +138,30 @@ fn norm(text: &str) -> Result<Norm, String> {
     }
 }
 
+fn estimate(text: &str) -> Result<Estimate, String> {
+    match text {
+        "denoised" => Ok(Estimate::Denoised),
+        "blocks" => Ok(Estimate::Blocks),
+        _ => Err("write denoised or blocks".into()),
+    }
+}
+
+fn above_0(text: &str) -> Result<f32, String> {
+    let x = text.parse().ok().filter(|x: &f32| *x > 0.0 && x.is_finite());
+    x.ok_or_else(|| "must be a finite number above 0".into())
+}
+
+fn part(text: &str) -> Result<f32, String> {
+    text.parse().ok().filter(|x| (0.0..=1.0).contains(x)).ok_or_else(|| "must be a number from 0 to 1".into())
+}
+
+/// `0.5:2`.
+fn factors(text: &str) -> Result<[f32; 2], String> {
+    let both = text.split_once(':').and_then(|(lo, hi)| Some([lo.parse().ok()?, hi.parse().ok()?]));
+    both.filter(|[lo, hi]| (MIN_FACTOR..=1.0).contains(lo) && (1.0..=MAX_FACTOR).contains(hi))
+        .ok_or_else(|| format!("write it as 0.5:2, from {MIN_FACTOR} to 1 and from 1 to {MAX_FACTOR}"))
+}
+
 /// `65536`, `32KiB`, `24MiB`, `1GiB`.
 fn bytes(text: &str) -> Result<usize, String> {
     let digits = text.trim_end_matches(|c: char| !c.is_ascii_digit());
@@ -132,6 +192,14 @@ mod tests {
         let l = Learning::default();
         assert_eq!(bytes("24MiB"), Ok(l.cache_bytes));
         assert_eq!((objective("relative"), norm("mean")), (Ok(l.objective), Ok(l.norm)));
+        assert_eq!((factors("0.05:20"), estimate("denoised")), (Ok(l.factors), Ok(l.estimate)));
+        assert_eq!((factors("1:1"), factors("0.5:2")), (Ok([1.0, 1.0]), Ok([0.5, 2.0])));
+        for text in ["", "1", ":", "0.04:2", "0.5:20.1", "1.1:2", "0.5:0.9", "2:0.5", "nan:2", "0.5:nan", "0.5:1:2"] {
+            assert!(factors(text).is_err(), "{text}");
+        }
+        assert_eq!([part("0"), part("0.75"), part("1")], [Ok(0.0), Ok(0.75), Ok(1.0)]);
+        assert!(["-0.1", "1.1", "nan", ""].iter().all(|text| part(text).is_err()));
+        assert!(["-1", "0", "inf", "1e-60", "nan", ""].iter().all(|text| above_0(text).is_err()));
         assert_eq!(constant("-0.5"), Ok(Constant::Number(-0.5)));
         assert!(constant("inf").is_err() && constant("on").is_err());
     }

@@ -12,6 +12,7 @@ mod output;
 mod progress;
 mod render;
 mod scene;
+mod settings;
 
 use clap::{Parser, Subcommand};
 use std::error::Error;

@@ -1,13 +1,13 @@
 //! `croupier render`
 
-use super::learning::LearningFlags;
+use super::learning::{CacheFlags, LearningFlags};
 use super::notes::Notes;
 use super::output::Outputs;
 use super::progress::Rendering;
+use super::settings::SettingsFlags;
 use super::{Outcome, say, say_json, scene};
-use croupier::rrs::ParseError;
-use croupier::{HARD_STOP, Scene, SceneError, Strategy};
-use croupier_host::render::{RenderOptions, RenderResult, RenderStats, Target, render};
+use croupier::{HARD_STOP, Scene, SceneError};
+use croupier_host::render::{PlanSummary, RenderOptions, RenderResult, RenderStats, Target, check, render};
 use croupier_host::statistics::Statistics;
 use serde::Serialize;
 use std::error::Error;
@@ -27,26 +27,16 @@ pub struct Flags {
     /// Where the picture goes; a tone-mapped PNG goes beside it
     #[arg(short, long, value_name = "FILE", default_value = "croupier.exr", value_parser = exr_path)]
     output: PathBuf,
-    /// Roulette strategy; --help lists them
-    #[arg(long, value_name = "NAME", long_help = strategies(), default_value_t = RenderOptions::default().strategy, value_parser = strategy)]
-    rrs: String,
+    #[command(flatten)]
+    settings: SettingsFlags,
     #[command(flatten)]
     until: Until,
-    /// Path segments from the camera: 1 shows emitters only; the scene's own number if absent
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(HARD_STOP)))]
-    max_depth: Option<u32>,
-    /// Size in pixels; the scene's own if absent
-    #[arg(long, value_name = "WxH", value_parser = size)]
-    size: Option<[u32; 2]>,
     /// Another number gives another, independent image
     #[arg(long, value_name = "N", default_value_t = RenderOptions::default().seed)]
     seed: u64,
     /// Threads, 0 for one per processor; the image does not depend on them
     #[arg(long, value_name = "N", default_value_t = RenderOptions::default().threads)]
     threads: usize,
-    /// Units of parallel work; the image depends on their number
-    #[arg(long, value_name = "N", default_value_t = RenderOptions::default().shards, value_parser = clap::value_parser!(u32).range(1..=65536))]
-    shards: u32,
     /// Stops of exposure for the PNG; 0 if absent, 1 for the built-in scene
     #[arg(long, value_name = "STOPS", value_parser = super::stops, allow_negative_numbers = true)]
     exposure: Option<f32>,
@@ -66,6 +56,8 @@ pub struct Flags {
     // The heading of the last flags would hold for any after them.
     #[command(flatten)]
     learning: LearningFlags,
+    #[command(flatten)]
+    cache: CacheFlags,
 }
 
 /// When to stop; 64 samples per pixel if nothing is given.
@@ -99,18 +91,18 @@ impl Flags {
     /// The same for the library.
     fn options(&self) -> Result<RenderOptions, Box<dyn Error>> {
         let mut options = RenderOptions {
-            strategy: self.rrs.clone(),
             target: self.until.target(),
-            max_depth: self.max_depth,
-            size: self.size,
             seed: self.seed,
             threads: self.threads,
-            shards: self.shards,
             denoise: self.denoise,
             calibrate: self.stats,
             ..RenderOptions::default()
         };
-        self.learning.apply(&mut options)?;
+        self.settings.apply(&mut options);
+        self.learning.apply(&mut options);
+        // Said before the scene is loaded.
+        check(&options)?;
+        self.cache.apply(&mut options)?;
         Ok(options)
     }
 }
@@ -125,6 +117,7 @@ struct Report<'a> {
     statistics: Option<&'a Statistics>,
     width: usize,
     height: usize,
+    plan: &'a PlanSummary,
     strategy: &'a str,
     seed: u64,
     stopped_early: bool,
@@ -140,19 +133,19 @@ struct Report<'a> {
 
 /// Runs the command.
 pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
-    let outputs = Outputs::new(&flags.output, flags.learning.cache_out.as_deref(), flags.false_color);
+    let outputs = Outputs::new(&flags.output, flags.cache.cache_out.as_deref(), flags.false_color);
     // Said now, not after an hour of rendering.
     outputs.check()?;
     let options = flags.options()?;
     let (bytes, mut notes) = scene::open(path)?;
-    if let Some(text) = shortened(&bytes, flags.max_depth).map_err(|e| scene::about(path)(&e))? {
+    if let Some(text) = shortened(&bytes, options.max_depth).map_err(|e| scene::about(path)(&e))? {
         notes.add(path, text);
     }
     let watch = Rendering::start(options.target);
     let result = render(&bytes, &options, &watch)
-        .map_err(|e| flags.learning.about(&e).unwrap_or_else(|| scene::about(path)(&e)))?;
+        .map_err(|e| flags.cache.about(&e).unwrap_or_else(|| scene::about(path)(&e)))?;
     drop(watch);
-    let RenderResult { picture, stats, statistics, cache, stopped_early } = &result;
+    let RenderResult { picture, stats, statistics, plan, cache, stopped_early } = &result;
     if let Some([x, y]) = stats.first_non_finite {
         let count = stats.counters.get("non_finite").unwrap_or(&1);
         notes.add(path, format!("{count} contributions were not finite and left out, the first in pixel ({x}, {y})"));
@@ -167,6 +160,7 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
         statistics: flags.stats.then_some(statistics),
         width: picture.width,
         height: picture.height,
+        plan,
         strategy: &options.strategy,
         seed: options.seed,
         stopped_early: *stopped_early,
@@ -208,17 +202,12 @@ fn print(r: &Report<'_>) -> Outcome {
     for (name, count) in r.stats.counters.iter().filter(|(_, count)| **count > 0) {
         say(&format!("{name}: {count}"))?;
     }
+    say(&format!("memory: {}", r.plan))?;
     if let Some(statistics) = r.statistics {
         say(&format!("\n{statistics}"))?;
     }
     let names: Vec<_> = r.written.iter().map(|p| p.display().to_string()).collect();
     if names.is_empty() { Ok(()) } else { say(&format!("wrote {}", names.join(", "))) }
-}
-
-/// Help of `--rrs`.
-fn strategies() -> String {
-    let lines = Strategy::TABLE.iter().map(|(name, help)| format!("\n  {name}: {help}"));
-    format!("Roulette strategy:{}", lines.collect::<String>())
 }
 
 fn exr_path(text: &str) -> Result<PathBuf, String> {
@@ -227,20 +216,6 @@ fn exr_path(text: &str) -> Result<PathBuf, String> {
         Ok(path)
     } else {
         Err("the name must end in .exr".into())
-    }
-}
-
-fn strategy(name: &str) -> Result<String, ParseError> {
-    Strategy::parse(name).map(|_| name.into())
-}
-
-fn size(text: &str) -> Result<[u32; 2], String> {
-    let parts = text.split_once(['x', 'X']).ok_or("write it as 640x480")?;
-    let side = |s: &str| s.parse::<u32>().map_err(|e| format!("{s:?}: {e}"));
-    match [side(parts.0)?, side(parts.1)?] {
-        [0, _] | [_, 0] => Err("a picture needs at least 1x1 pixels".into()),
-        [w, h] if u64::from(w) * u64::from(h) > 1 << 30 => Err("more than 2^30 pixels".into()),
-        size => Ok(size),
     }
 }
 

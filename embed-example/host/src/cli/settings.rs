@@ -1,0 +1,60 @@
+//! What every strategy is told, and what a render's memory depends on.
+
+use croupier::rrs::ParseError;
+use croupier::{HARD_STOP, MIN_RING, Strategy};
+use croupier_host::render::RenderOptions;
+
+/// Flags of the core's settings.
+#[derive(clap::Args)]
+pub struct SettingsFlags {
+    /// Roulette strategy; --help lists them
+    #[arg(long, value_name = "NAME", long_help = strategies(), default_value_t = RenderOptions::default().strategy, value_parser = strategy)]
+    rrs: String,
+    /// Path segments from the camera: 1 shows emitters only; the scene's own number if absent
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(HARD_STOP)))]
+    max_depth: Option<u32>,
+    /// Size in pixels; the scene's own if absent
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    size: Option<[u32; 2]>,
+    /// Units of parallel work; the image depends on their number
+    #[arg(long, value_name = "N", default_value_t = RenderOptions::default().shards, value_parser = clap::value_parser!(u32).range(1..=65536))]
+    shards: u32,
+    /// Path vertices that may wait in a shard, 16 to 2^24; 512 if absent. With fewer, factors above 1 become 1 more often
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(i64::from(MIN_RING)..=1 << 24))]
+    ring: Option<u32>,
+    /// Samples that splitting may add to one camera sample; 4096 if absent
+    #[arg(long, value_name = "N")]
+    split_budget: Option<u32>,
+}
+
+impl SettingsFlags {
+    /// Puts them into `options`.
+    pub fn apply(&self, options: &mut RenderOptions) {
+        options.strategy = self.rrs.clone();
+        options.max_depth = self.max_depth;
+        options.size = self.size;
+        options.shards = self.shards;
+        options.ring = self.ring;
+        options.split_budget = self.split_budget;
+    }
+}
+
+/// Help of `--rrs`.
+fn strategies() -> String {
+    let lines = Strategy::TABLE.iter().map(|(name, help)| format!("\n  {name}: {help}"));
+    format!("Roulette strategy:{}", lines.collect::<String>())
+}
+
+fn strategy(name: &str) -> Result<String, ParseError> {
+    Strategy::parse(name).map(|_| name.into())
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let parts = text.split_once(['x', 'X']).ok_or("write it as 640x480")?;
+    let side = |s: &str| s.parse::<u32>().map_err(|e| format!("{s:?}: {e}"));
+    match [side(parts.0)?, side(parts.1)?] {
+        [0, _] | [_, 0] => Err("a picture needs at least 1x1 pixels".into()),
+        [w, h] if u64::from(w) * u64::from(h) > 1 << 30 => Err("more than 2^30 pixels".into()),
+        size => Ok(size),
+    }
+}
