@@ -137,11 +137,11 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
             plan: *plan,
             intersector,
             selector,
-            film: Film {
-                size: s.size,
-                pixels: c.take(pixels).map_err(SessionError::Memory)?,
-                aovs: c.take(if s.aovs { pixels } else { 0 }).map_err(SessionError::Memory)?,
-            },
+            film: Film::new(
+                s.size,
+                c.take(pixels).map_err(SessionError::Memory)?,
+                c.take(if s.aovs { pixels } else { 0 }).map_err(SessionError::Memory)?,
+            ),
             counters: Counters::default(),
             knowledge: Knowledge::carve(&mut c, s, plan.cache, &scene).map_err(SessionError::Memory)?,
             iteration: Iteration::default(),
@@ -207,6 +207,7 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
                 self.film.merge(i, sums, aov, w);
             });
         }
+        self.film.end_iteration();
         self.counters.merge(&counters);
         passed(Phase::Merged);
         self.knowledge.learn_picture(&self.film, &counters, visit);

@@ -82,19 +82,23 @@ fn the_error_estimate_is_right_on_average() {
 }
 
 /// A diffuse box with strategies that end and split paths: `classic`, which starts late, states the true relMSE; where
-/// roulette or splitting meets every path, packets' combs make the true one smaller than stated, up to 2.4 times: then the
-/// interval is that of an upper bound. (With 64 samples 84 of 100 intervals of `classic` hold the true error, the others are
-/// below: few samples have met the rare bright paths.) Killed by: a sum of squares per path instead of per camera sample, weights of
-/// iterations that the sums of squares do not have.
+/// roulette or splitting meets every path, packets' combs make the true one smaller, up to 2.4 times: one iteration states
+/// an upper bound, several show it. (With 64 samples 84 of 100 intervals of `classic` hold the true error, the others are
+/// below: few samples have met the rare bright paths.) Killed by: a sum of squares per path instead of per camera sample,
+/// weights of iterations that the sums of squares do not have, a ratio upside down, samples of one iteration compared
+/// instead of iterations.
 #[test]
-fn the_error_estimate_is_an_upper_bound_with_roulette() {
+fn the_error_estimate_is_right_with_roulette_after_iterations() {
     let scene = blob(&cornell([16, 16]));
-    let learning = [1, 1, 2, 4, 8, 16, 32];
+    let growing = [1, 1, 2, 4, 8, 16, 32];
     for (strategy, max_depth, iterations, [least, most]) in [
         ("classic", 12, &[256][..], [0.93, 1.07]),
+        ("classic", 12, &[64; 4], [0.93, 1.07]),
         ("classic:1", 12, &[64], [1.9, 2.7]),
+        ("classic:1", 12, &growing, [0.9, 1.1]),
         ("fixed:3.3", 3, &[16], [1.2, 1.5]),
-        ("ears", 12, &learning, [1.0, 1.4]),
+        ("fixed:3.3", 3, &[16; 4], [0.9, 1.1]),
+        ("ears", 12, &growing, [0.9, 1.1]),
     ] {
         let base = Settings { max_depth, ..settings(&scene, strategy) };
         let run = |seed| scheduled(&scene, &Settings { seed, ..base }, iterations, Schedule::InOrder(1 << 20));
@@ -106,8 +110,8 @@ fn the_error_estimate_is_an_upper_bound_with_roulette() {
             (count(&|i| i.error.high < truth), count(&|i| i.error.low <= truth && truth <= i.error.high));
         println!("{strategy}: {ratio:.3} of the true relMSE; {held} of 100 intervals hold it, {below} are below");
         assert!((least..=most).contains(&ratio), "{strategy}: {ratio} of the true relMSE is stated");
-        assert!(below <= 6, "{strategy}: {below} of 100 intervals are below the true error");
-        assert!(strategy != "classic" || held >= 90, "{strategy}: {held} of 100 intervals hold the true error");
+        assert!(below <= 10, "{strategy}: {below} of 100 intervals are below the true error");
+        assert!(most > 1.1 || held >= 85, "{strategy}: {held} of 100 intervals hold the true error");
     }
 }
 
