@@ -123,6 +123,52 @@ fn jitter_stays_within_half_a_leaf() {
     assert!(seen > 30_000 && (share - 37.0 / 64.0).abs() < 0.02, "{share} of {seen}");
 }
 
+/// From the middle of a dark cell to the middle of a bright one: what is looked up, averaged over the jitter, goes up in a
+/// straight line from cell to cell, also where one has half the edge of the other; without jitter it jumps by all of the
+/// difference at the border. So blocks of cells do not show. Killed by: no jitter or half of it, an edge that is not that of
+/// the place's own cell.
+#[test]
+fn borders_of_cells_do_not_show() {
+    for (samples, edge) in [(1000, 2.0f32), (4000, 1.0)] {
+        let (mut blocks, mut rng) = (Blocks::leaves(60, 1), SplitMix(12));
+        let (mut cache, mut shards) = blocks.carve(LO, HI);
+        // once, so that the border is halfway along x
+        iterate(&mut cache, &mut shards, 4000, 500.0, &mut rng);
+        let (border, up) = (LO[0] + 2.0, [0.0, 0.0, 1.0]);
+        let t = &mut shards[0];
+        t.clear(cache.bins());
+        for [x, y, z] in (0..8u32).map(|i| [0, 1, 2].map(|a| (i >> a & 1) as f32)) {
+            let bin = find(&cache, 0, [border - 1.0 + 2.0 * x, LO[1] + 1.0 + 2.0 * y, LO[2] + 1.0 + 2.0 * z], up);
+            (0..if x > 0.0 { samples } else { 1000 }).for_each(|_| assert!(t.log(bin, [2.0 * x; 3], 1.0)));
+        }
+        cache.begin_merge(0.0);
+        cache.absorb(t);
+        // the bright cells are divided if they have many samples
+        cache.freeze(3000.0);
+        let mean = |bins: U32x8| cache.local(bins, ALL()).mean.x.to_array().iter().sum::<f32>() / 8.0;
+        let at = |x: f32| Vec3x8::splat(x, LO[1] + 0.7, LO[2] + 1.1);
+        let (kind, dir) = (U32x8::splat(0), Vec3x8::splat(0.0, 0.0, 1.0));
+        let mut smooth = |x: f32| {
+            let draw = |k: u32| {
+                let mut any = || F32x8::from_fn(|_| rng.f32());
+                let u = [F32x8::from_fn(|i| (8 * k + i as u32) as f32 / 1024.0 + 0.0005), any(), any()];
+                mean(cache.find_jittered(kind, at(x), dir, u, ALL()))
+            };
+            (0..128).map(draw).sum::<f32>() / 128.0
+        };
+        let places: Vec<f32> = (-31..=31).map(|k| (k as f32 + 0.5) / 32.0).filter(|x| *x < 0.5 * edge).collect();
+        let found: Vec<f32> = places.iter().copied().map(|x| smooth(border + x)).collect();
+        for (x, found) in places.iter().zip(&found) {
+            // the box around the place has the edge of its own cell
+            let own = if *x < 0.0 { 2.0 } else { edge };
+            assert!((found - (1.0 + 2.0 * x / own)).abs() < 0.03, "{found} at {x}, edge {edge}");
+        }
+        let step = |of: &[f32]| of.windows(2).map(|w| w[1] - w[0]).fold(0.0, f32::max);
+        let plain: Vec<f32> = places.iter().map(|x| mean(cache.find(kind, at(border + x), dir, ALL()))).collect();
+        assert!(step(&found) < 0.05 * 2.0 && step(&plain) > 0.97 * 2.0, "{} and {}", step(&found), step(&plain));
+    }
+}
+
 /// Sums of several shards and iterations, discounted, against f64. Killed by: a field left out or added to another, a
 /// discount applied twice or to the new samples, `clear` that keeps something.
 #[test]

@@ -6,15 +6,15 @@
 //! Here the iterations of a render are not independent; where that may matter the error comes from renders with different
 //! seeds.
 
-use croupier::film::PixelStats;
+use croupier::film::{PixelAov, PixelStats};
 use croupier::learn::{Constant, Estimate, Learning, Objective};
 use croupier::rrs::Norm;
 use croupier::{Settings, Strategy};
 use croupier_host::builtin;
-use croupier_host::description::SceneDescription;
+use croupier_host::description::*;
 use croupier_tests::cache::{overwrite, random_sums};
 use croupier_tests::runner::{Image, Learned, Schedule, learning, render, scheduled, settings};
-use croupier_tests::scenes::{blob, cornell, everything, glowing_box, mirror_and_glass};
+use croupier_tests::scenes::*;
 use croupier_tests::stats::{Mean, SplitMix, equivalent};
 
 /// Half-width of what counts as equal, relative to the mean.
@@ -147,6 +147,43 @@ fn strategies_that_learn_agree_on_all_materials() {
     for strategy in ["adrrs", "ear", "ears", "ears:plain", "winners"] {
         let s = Settings { seed: 4, ..learns(&scene, strategy, 9) };
         assert_equivalent(strategy, Known::of(&run(&scene, &s)), none);
+    }
+}
+
+/// A floor under a point light, between two mirrors or panes of glass that show nothing but a dim sky: all vertices of depth
+/// 2 are on a surface whose lobes are deltas, and paths end at depth 3. What is learned kills most of them; the mean stays.
+/// Killed by: a delta surface that always goes on (factor 1), a death there that nothing makes up for.
+#[test]
+fn mirrors_and_glass_play_learned_roulette() {
+    let mirror = Model::Mirror { reflectance: Reflectance::Constant([1.0; 3]) };
+    for (what, model) in [("mirror", mirror), ("glass", Model::Dielectric { int_ior: 1.5, ext_ior: 1.0 })] {
+        let mut s = under_white_sky(camera([0.0, 0.6, 0.8], [0.0; 3], 5.0, [16, 16]));
+        s.environment = Some(Environment::Constant { radiance: [0.03; 3] });
+        let [floor, side] = [grey(0.8), model].map(|m| s.add_material(what, m));
+        add_quad(&mut s, "floor", floor, facing_y(0.3, 0.0, 1.0));
+        for x in [-0.5f32, 0.5] {
+            let z = 1.0f32.copysign(x);
+            add_quad(&mut s, "side", side, [[x, -0.3, -z], [x, -0.3, z], [x, 0.3, z], [x, 0.3, -z]]);
+        }
+        // the lower one is chosen in vain: noise beside which the sides are of no account
+        for (y, intensity) in [(1.0, 1.0), (-1.0, 0.25)] {
+            s.emitters.push(Emitter::Point { position: [0.0, y, 0.0], intensity: [intensity; 3] });
+        }
+        let scene = blob(&s);
+        let none = Known::of(&render(&scene, &Settings { seed: 15, ..learns(&scene, "none", 3) }, 14_000));
+        for strategy in ["adrrs", "ears"] {
+            let s = Settings { seed: 17, aovs: true, ..learns(&scene, strategy, 3) };
+            let image = scheduled(&scene, &s, &doubling(7000), IN_ORDER);
+            let sum = |of: fn(&PixelAov) -> f64| image.aovs.iter().map(of).sum::<f64>();
+            let vertices = sum(|a| a.vertices[1]);
+            let [first, delta] = [sum(|a| a.factor[0]) / sum(|a| a.vertices[0]), sum(|a| a.factor[1]) / vertices];
+            let killed = image.counters.roulette_kills as f64 / vertices;
+            println!(
+                "{what}, {strategy}: factors {first:.3} and {delta:.3}, {killed:.3} of the second vertices killed"
+            );
+            assert!(first > 0.95 && delta < 0.5 && killed > 0.5, "{what}, {strategy}: {first}, {delta}, {killed}");
+            assert_equivalent(&format!("{what}, {strategy}"), Known::of(&image), none);
+        }
     }
 }
 

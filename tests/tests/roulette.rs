@@ -260,6 +260,20 @@ fn ignorance_is_classic() {
     assert!(few[0] < 1.0 && few.is_sorted_by(|a, b| a > b) && few[3] > 0.05, "{few:?}");
 }
 
+/// However little is expected, what roulette leaves alive has a throughput of 10 at most; what had more is not split for it.
+/// Killed by: a limit that is left out, that forgets the albedo, that raises factors above 1.
+#[test]
+fn roulette_does_not_raise_throughput_above_ten() {
+    for strategy in ["ear", "ears"] {
+        for (beta, albedo, expected) in [(0.5, 0.5, MIN_FACTOR), (4.0, 0.5, 0.2), (16.0, 0.5, 0.8), (400.0, 0.5, 1.0)] {
+            let v = learned(0.0, 1e-20, 1e-20, 1.0);
+            let grey = |x: f32| Vec3x8::splat(x, x, x);
+            let s = with(strategy, &Vertices8 { beta: grey(beta), albedo: grey(albedo), ..v });
+            assert!((s / expected - 1.0).abs() < 1e-3, "{strategy}, throughput {beta}: {s} for {expected}");
+        }
+    }
+}
+
 /// Expected contributions are brought into [1/3, 5/3] of the pixel. Killed by: a factor that aims at the middle of the window,
 /// a pixel that multiplies.
 #[test]

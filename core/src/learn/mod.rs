@@ -3,6 +3,8 @@
 //!
 //! This layer knows places, directions, values and costs. It must not know materials, lights or how paths are traced.
 //! Statistics change efficiency only: whatever they hold, no estimate's mean moves.
+//!
+//! How it works as a whole, where it departs from the papers, and what is not done: docs/LEARNING.md.
 
 mod adaptive;
 mod bins;
