@@ -225,7 +225,7 @@ pub struct ErrorEstimate {
     pub independence: f64,
 }
 
-/// Stabiliser of relMSE's denominator (DESIGN.md section 4).
+/// What relMSE adds to the squared mean in its denominator, so that black pixels do not decide it.
 pub const REL_MSE_EPSILON: f64 = 1e-2;
 
 impl<'m> Film<'m> {

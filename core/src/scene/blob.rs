@@ -189,7 +189,7 @@ pub struct SceneInfo {
     pub bounds_min: [f32; 3],
     /// Largest coordinates.
     pub bounds_max: [f32; 3],
-    /// Path segments from the camera (FORMAT.md, `max_depth`); a default for the settings.
+    /// Path segments from the camera (1 sees emitters only, 2 adds direct light); a default for the settings.
     pub max_depth: u32,
     /// Degenerate triangles that baking dropped.
     pub dropped_triangles: u32,

@@ -2,7 +2,7 @@
 //!
 //! | file | reads |
 //! |---|---|
-//! | `scene_json` | a folder with `scene.json` (the format of `scenes/FORMAT.md`) |
+//! | `scene_json` | a folder with `scene.json` (the format of docs/SCENES.md) |
 //! | `obj` | geometry: Wavefront OBJ |
 //! | `mtl` | materials of a bare OBJ |
 //! | `images` | PNG and JPEG textures, EXR environment maps |

@@ -1,11 +1,4 @@
-//! `scene.json`, in the format of `scenes/FORMAT.md`, without media.
-//!
-//! Beside the emitters that FORMAT.md spells out, these are read:
-//!
-//! | `type` | fields |
-//! |---|---|
-//! | `point` | `position`; `intensity` (RGB, power per steradian) |
-//! | `directional` | `direction` in which the light travels; `irradiance` (RGB) of a surface facing it |
+//! `scene.json`: every key, its unit and what is refused are in docs/SCENES.md.
 
 use super::json::{self, Place};
 use super::{LoadError, Loader, obj};
