@@ -14,9 +14,6 @@ use serde_json::{Value, json};
 use std::error::Error;
 use std::sync::{Mutex, PoisonError};
 
-/// Pixels that the robust error leaves out.
-pub const ROBUST: f64 = 1e-3;
-
 /// The picture after an iteration.
 #[derive(Clone, Copy, Debug)]
 pub struct Snapshot {
@@ -30,7 +27,7 @@ pub struct Snapshot {
     pub rays: u64,
     /// relMSE without the worst 0.01 % of the pixels.
     pub error: f64,
-    /// relMSE without the worst part [`ROBUST`] of the pixels and without what the reference's noise adds in the others.
+    /// relMSE without the worst part of the pixels and without what the reference's noise adds in the others.
     pub robust: f64,
 }
 
@@ -74,12 +71,18 @@ impl Run {
     }
 }
 
-/// Renders with one thread.
-pub fn render(subject: &Subject, variant: &Variant, seed: u64, target: Target) -> Result<Run, Box<dyn Error>> {
+/// Renders with one thread; the robust error leaves the part `outliers` of the pixels out.
+pub fn render(
+    subject: &Subject,
+    variant: &Variant,
+    seed: u64,
+    target: Target,
+    outliers: f64,
+) -> Result<Run, Box<dyn Error>> {
     let scene = Scene::from_bytes(&subject.baked.bytes)?;
     let size = [subject.image.width as u32, subject.image.height as u32];
     let settings = Settings { size, seed, shards: 16, aovs: true, ..Settings::for_scene(&scene) };
-    let watch = Watch { subject, start: cpu_seconds(), state: Mutex::default() };
+    let watch = Watch { subject, outliers, start: cpu_seconds(), state: Mutex::default() };
     let estimate = variant.truth().then_some(&*subject.image.pixels);
     let options = Options { threads: 1, estimate, ..Options::new(variant.apply(settings), target) };
     drive_scene(scene, &options, &watch)?;
@@ -92,6 +95,7 @@ pub fn render(subject: &Subject, variant: &Variant, seed: u64, target: Target) -
 /// Takes the snapshots.
 struct Watch<'a> {
     subject: &'a Subject,
+    outliers: f64,
     /// CPU time of the calling thread at the start.
     start: Option<f64>,
     state: Mutex<State>,
@@ -118,7 +122,7 @@ impl Watch<'_> {
             samples: sum(|p| p.samples),
             rays: sum(|p| p.rays),
             error: relmse(&image, &self.subject.image, false)?.value,
-            robust: self.subject.error_beyond_noise(&image, ROBUST)?,
+            robust: self.subject.error_beyond_noise(&image, self.outliers)?,
         })
     }
 }

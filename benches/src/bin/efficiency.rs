@@ -5,10 +5,10 @@
 //! time; its cost is the CPU time of its threads, everything inside: setting up, learning, estimating errors. Its error
 //! is relMSE against the scene's reference, without the worst 0.01 % of the pixels. It has two faults: small pictures keep
 //! fireflies in it, and it contains the noise of the reference, which pulls all ratios to 1 and has a column. So a second
-//! figure, with a star, leaves the worst 0.1 % of the pixels out and subtracts, in those that are left, the variance that
+//! figure, with a star, leaves the worst 0.1 % of the pixels (`--outliers`) out and subtracts, in those that are left, the variance that
 //! the reference states for itself. relMSE falls as 1 / cost, so that their product hardly depends on when the render
 //! ended. Where a few bright samples carry the error, leaving pixels out flatters the render with fewer samples, which
-//! has met fewer of them: compare such rows at equal samples.
+//! has met fewer of them: compare such rows at equal samples, or leave more out than any has met.
 //!
 //! Figures are medians over the seeds, with the interval of [`Median`]. Speed-ups are ratios of the products of two
 //! strategies with the same seed, then their median; over all scenes, the geometric mean of these ratios per seed, then
@@ -91,6 +91,9 @@ struct Args {
     /// Wall-clock seconds of each render [default: 30, quick: 5].
     #[arg(long)]
     seconds: Option<f64>,
+    /// Per cent of the pixels that the figures with a star leave out, the worst ones.
+    #[arg(long, value_name = "PERCENT", default_value_t = 0.1)]
+    outliers: f64,
     /// Samples per pixel of each render, instead of a time.
     #[arg(long, value_name = "N", conflicts_with = "seconds", value_parser = clap::value_parser!(u32).range(1..))]
     equal_samples: Option<u32>,
@@ -150,7 +153,8 @@ impl Group {
                 }
                 let seed = args.first_seed.wrapping_add(i as u64);
                 let name = format!("{}, {}, seed {seed}", subject.name, strategies[s].name);
-                let run = render(subject, &strategies[s], seed, args.target()).map_err(|e| format!("{name}: {e}"))?;
+                let run = render(subject, &strategies[s], seed, args.target(), args.outliers / 100.0)
+                    .map_err(|e| format!("{name}: {e}"))?;
                 let [spp, seconds, error] = [run.spp(), run.end.core_seconds, run.end.error].map(digits);
                 eprintln!("{name}: {spp} spp, {seconds} core-s, relMSE {error}");
                 done.push((s, run));
@@ -240,9 +244,10 @@ impl Report<'_> {
             "# Error times cost\n\n\
              Made by `cargo run --release -p croupier-benches --bin efficiency`; what the figures are is said in\n\
              `benches/src/bin/efficiency.rs`. {n} seeds, {what}.\nMedians [intervals] over the seeds: the \
-             chance that the true median lies inside is {:.0} %. A star: without the worst 0.1 % of\nthe pixels and \
+             chance that the true median lies inside is {:.0} %. A star: without the worst {} % of\nthe pixels and \
              without the reference's noise; else without 0.01 % and with it.",
-            100.0 * coverage(n as usize)
+            100.0 * coverage(n as usize),
+            self.args.outliers
         )
     }
 
