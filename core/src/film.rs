@@ -172,7 +172,7 @@ impl Independence {
     /// The ratio after an iteration: the picture before had variance r S, the iteration has what was found beyond that.
     fn after(self, d: &Differences) -> Self {
         let [s, t] = d.stated;
-        if !(s + t > 0.0) {
+        if s + t <= 0.0 {
             return self;
         }
         let r = d.found / (s + t);
