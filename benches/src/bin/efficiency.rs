@@ -32,7 +32,7 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 const SCENES: [&str; 7] = ["kitchen", "bathroom", "living_room", "pool", "water_caustic", "cbox", "veach_mis"];
-const STRATEGIES: [&str; 7] = ["classic", "classic:5:relative", "throughput", "adrrs", "ear", "ears", "ears+adaptive"];
+const STRATEGIES: [&str; 7] = ["classic", "classic:5:relative", "throughput", "adrrs", "ear", "ears", "ears+shadow"];
 /// With `--all`.
 const ALL: [&str; 26] = [
     "none",
