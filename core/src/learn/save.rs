@@ -331,8 +331,9 @@ impl Cache<'_> {
         Ok(needed)
     }
 
-    /// Takes over a saved cache of the same bounds and objective, in place of what it has. Bytes with more leaves than there is room
-    /// for are refused; [`Self::merge`] into an empty cache takes what fits. After an error the cache is as before.
+    /// Takes over a saved cache of the same bounds and objective, in place of what it has. Bytes with more leaves than
+    /// there is room for are refused; [`Self::merge`] into an empty cache takes what fits. After an error the cache is as
+    /// before.
     pub fn load(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
         let saved = Saved::check(bytes, self)?;
         let room = self.size.leaves();
@@ -344,9 +345,9 @@ impl Cache<'_> {
         Ok(())
     }
 
-    /// Adds a saved cache of the same bounds and objective. Where its tree is finer, this one grows as long as there is room, else the
-    /// finer sums join in one leaf; where it is coarser, leaves get an eighth per level. After an error the cache is as
-    /// before.
+    /// Adds a saved cache of the same bounds and objective. Where its tree is finer, this one grows as long as there is
+    /// room, else the finer sums join in one leaf; where it is coarser, leaves get an eighth per level. After an error the
+    /// cache is as before.
     pub fn merge(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
         let saved = Saved::check(bytes, self)?;
         self.add(&saved);

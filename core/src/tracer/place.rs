@@ -46,7 +46,6 @@ fn inverse(x: Vec3x8, floor: f32) -> Vec3x8 {
 pub(super) fn place<P: Profile, I: Intersector, L: LightSelector>(
     session: &Session<'_, '_, P, I, L>,
     a: &Arrival8,
-    albedo: Vec3x8,
     space: Space,
     mut root_film: impl FnMut(usize) -> u32,
 ) -> Place8 {
@@ -71,7 +70,7 @@ pub(super) fn place<P: Profile, I: Intersector, L: LightSelector>(
             });
             let pixel = inverse(Vec3x8::from_fn(|i| own[i]), f32::MIN_POSITIVE);
             let pixel = Vec3x8::new(pixel.x.sqrt(), pixel.y.sqrt(), pixel.z.sqrt());
-            let unscale = Vec3x8::select(seen, pixel, albedo);
+            let unscale = Vec3x8::select(seen, pixel, a.albedo);
             Place8 { bin, scale: inverse(unscale, DARKEST), unscale }
         }
         Space::Image => {

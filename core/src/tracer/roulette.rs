@@ -7,14 +7,13 @@ use super::settle::Found8;
 use super::shard::Shard;
 use super::vertex::{RESERVE, Vertex8};
 use crate::accel::Intersector;
-use crate::bsdf::{self, Bsdf, Inputs8, Visitor};
 use crate::light::LightSelector;
 use crate::profile::Profile;
 use crate::rrs::{self, Learned8, Vertices8};
 use crate::scene::Scene;
 use crate::scene::blob::MaterialKind;
 use crate::session::Session;
-use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Phong exponent of a perfect mirror.
 const MIRROR_SHININESS: f32 = 1e4;
@@ -26,41 +25,9 @@ pub(super) struct Arrival8 {
     pub weight: Vec3x8,
     /// [`MaterialKind`] per lane.
     pub kind: [u32; 8],
+    /// 0 unless the strategy needs it.
+    pub albedo: Vec3x8,
     pub active: Mask8,
-}
-
-struct AlbedoOf<'a, 's> {
-    scene: &'a Scene<'s>,
-    vertex: &'a Vertex8,
-    mask: Mask8,
-}
-
-impl<'s> Visitor<'s> for AlbedoOf<'_, 's> {
-    type Out = Vec3x8;
-
-    #[inline(never)]
-    fn visit<B: Bsdf<'s>>(self) -> Vec3x8 {
-        let v = self.vertex;
-        let inputs = Inputs8 { material: v.material, reflectance: v.reflectance };
-        let wo = Frame8::from_normal(v.ns).to_local(v.wo);
-        B::gather(self.scene, &inputs, self.mask).albedo(wo)
-    }
-}
-
-/// Albedos of vertices of any classes, 0 in other lanes.
-pub(super) fn albedo<P: Profile>(scene: &Scene<'_>, vertex: &Vertex8, kinds: &[u32; 8], active: Mask8) -> Vec3x8 {
-    let mut out = Vec3x8::ZERO;
-    let mut left = active.bits();
-    while left != 0 {
-        let kind = kinds[left.trailing_zeros() as usize & 7];
-        let bits = active.lanes().filter(|&i| kinds[i] == kind).fold(0, |m, i| m | 1 << i);
-        left &= !bits;
-        let mask = Mask8::from_bits(bits);
-        let of = MaterialKind::from_u32(kind)
-            .and_then(|k| bsdf::dispatch_in(P::EFFECTS, k, AlbedoOf { scene, vertex, mask }));
-        out = Vec3x8::select(mask, of.unwrap_or(Vec3x8::ONE), out);
-    }
-    out
 }
 
 /// Phong exponents that correspond to the materials' GGX widths: 2 / alpha^2 - 2.
@@ -89,8 +56,6 @@ impl Shard<'_> {
         let strategy = settings.strategy;
         let knowledge = session.knowledge();
         let mut v = a.vertex;
-        let albedo =
-            if strategy.needs_albedo() { albedo::<P>(session.scene(), &v, &a.kind, a.active) } else { Vec3x8::ZERO };
         let mut logged = None;
         let mut learned = Learned8::NONE;
         if strategy.needs_image() {
@@ -98,7 +63,7 @@ impl Shard<'_> {
         }
         if let Some(space) = strategy.space() {
             let root = v.root.to_array();
-            let found = place(session, &a, albedo, space, |i| self.roots.get(root[i]).film);
+            let found = place(session, &a, space, |i| self.roots.get(root[i]).film);
             knowledge.local8(&mut learned, found.bin, found.unscale, a.active);
             self.counters.look_ups.count(a.active.count());
             logged = Some(found);
@@ -106,7 +71,7 @@ impl Shard<'_> {
         let (s, finite) = strategy.checked_factor(&Vertices8 {
             beta: v.beta,
             last_weight: a.weight,
-            albedo,
+            albedo: a.albedo,
             albedo_product: v.albedo_product,
             depth: v.depth,
             shininess: if strategy.needs_shininess() { shininess(session.scene(), &a) } else { F32x8::ZERO },
@@ -128,7 +93,7 @@ impl Shard<'_> {
             self.record_places(a.active, &v, &p, a.weight / s);
         }
         v.beta = v.beta / s;
-        v.albedo_product *= albedo.mean();
+        v.albedo_product *= a.albedo.mean();
         v.count = U32x8::new(n);
         let (root, ledger, depth) = (v.root.to_array(), v.ledger.to_array(), v.depth.to_array());
         let records = v.to_records();

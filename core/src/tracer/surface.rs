@@ -1,11 +1,12 @@
 //! Stage `surface`: what was hit, what it emits, and the vertex that it becomes.
 
 use super::flight::Flight8;
-use super::roulette::{Arrival8, albedo};
+use super::roulette::Arrival8;
 use super::settle::Found8;
 use super::shard::Shard;
 use super::vertex::Vertex8;
 use crate::accel::{self, Hit8, Intersector};
+use crate::bsdf::{self, Bsdf, Inputs8, Visitor};
 use crate::light::{self, LightSelector, power_heuristic};
 use crate::profile::Profile;
 use crate::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind, NONE, TRIANGLE_SMOOTH};
@@ -13,7 +14,7 @@ use crate::scene::{Effects, Scene};
 use crate::session::Session;
 use crate::settings::HARD_STOP;
 use crate::texture;
-use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
 
 /// Kinds that scatter from behind as well.
 pub(super) const TRANSMISSIVE: u32 = 1 << MaterialKind::Dielectric as u32
@@ -84,16 +85,20 @@ impl Shard<'_> {
             count: U32x8::splat(0),
             next: U32x8::splat(0),
         };
+        going &= s.scatters;
+        let lanes_if = |wanted: bool, lanes: Mask8| if wanted { lanes } else { Mask8::NONE };
+        let needs_albedo = self.plan.settings().strategy.needs_albedo();
+        let wanted = lanes_if(wants_aov, first & s.scatters) | lanes_if(needs_albedo, going);
+        let albedo = albedo::<P>(scene, &vertex, &s.kind, wanted);
         if wants_aov {
-            let albedo = albedo::<P>(scene, &vertex, &s.kind, first & s.scatters);
             self.record_first_hit(first, f, hit, s.ns, albedo);
         }
-        going &= s.scatters;
         self.close_lanes(mask.and_not(going), f.root, f.ledger, f.depth);
         if going.none() {
             return;
         }
-        self.roulette(session, Arrival8 { vertex, weight: f.weight, kind: s.kind, active: going });
+        let albedo = if needs_albedo { albedo } else { Vec3x8::ZERO };
+        self.roulette(session, Arrival8 { vertex, weight: f.weight, kind: s.kind, albedo, active: going });
     }
 
     /// Emission of hit area lights, weighted against the light sample that could have found them.
@@ -147,6 +152,40 @@ impl Shard<'_> {
             aov.hits += 1.0;
         }
     }
+}
+
+struct AlbedoOf<'a, 's> {
+    scene: &'a Scene<'s>,
+    vertex: &'a Vertex8,
+    mask: Mask8,
+}
+
+impl<'s> Visitor<'s> for AlbedoOf<'_, 's> {
+    type Out = Vec3x8;
+
+    #[inline(never)]
+    fn visit<B: Bsdf<'s>>(self) -> Vec3x8 {
+        let v = self.vertex;
+        let inputs = Inputs8 { material: v.material, reflectance: v.reflectance };
+        let wo = Frame8::from_normal(v.ns).to_local(v.wo);
+        B::gather(self.scene, &inputs, self.mask).albedo(wo)
+    }
+}
+
+/// Albedos of vertices of any classes, 0 in other lanes.
+fn albedo<P: Profile>(scene: &Scene<'_>, vertex: &Vertex8, kinds: &[u32; 8], active: Mask8) -> Vec3x8 {
+    let mut out = Vec3x8::ZERO;
+    let mut left = active.bits();
+    while left != 0 {
+        let kind = kinds[left.trailing_zeros() as usize & 7];
+        let bits = active.lanes().filter(|&i| kinds[i] == kind).fold(0, |m, i| m | 1 << i);
+        left &= !bits;
+        let mask = Mask8::from_bits(bits);
+        let of = MaterialKind::from_u32(kind)
+            .and_then(|k| bsdf::dispatch_in(P::EFFECTS, k, AlbedoOf { scene, vertex, mask }));
+        out = Vec3x8::select(mask, of.unwrap_or(Vec3x8::ONE), out);
+    }
+    out
 }
 
 /// Shading data of eight hits.

@@ -361,6 +361,8 @@ fn stats(r: &Rendered) -> RenderStats {
         ("samples_logged", c.samples_logged),
         ("samples_refused", c.samples_refused),
         ("ledger_full", c.ledger_full),
+        ("factors_not_finite", c.factors_not_finite),
+        ("hard_stopped", c.hard_stopped),
         ("non_finite", c.non_finite),
     ];
     RenderStats {
