@@ -61,25 +61,32 @@ impl Measure {
     }
 }
 
-/// Hands out successive zeroed slices of a block.
+/// Hands out successive slices of a block.
 pub(crate) struct Carver<'m> {
     rest: &'m mut [u8],
 }
 
 impl<'m> Carver<'m> {
-    /// Checks the block and zeroes what will be used.
+    /// Checks the block.
     pub(crate) fn new(block: &'m mut [u8], layout: Layout) -> Result<Self, MemoryError> {
         let given = block.len();
         let rest = block.get_mut(..layout.size).ok_or(MemoryError::TooSmall { needed: layout.size, given })?;
         if layout.size > 0 && rest.as_ptr().addr() % BLOCK_ALIGN != 0 {
             return Err(MemoryError::Misaligned);
         }
-        rest.fill(0);
         Ok(Self { rest })
     }
 
     /// The next `n` records, zeroed; the sequence of calls must be that of [`Measure::add`].
     pub(crate) fn take<T: Pod>(&mut self, n: usize) -> Result<&'m mut [T], MemoryError> {
+        let records = self.take_unset(n)?;
+        records.fill(T::zeroed());
+        Ok(records)
+    }
+
+    /// The next `n` records with whatever the caller's memory holds: for slabs that are written before they are read and
+    /// seldom used to their end. The system need not provide the pages beyond.
+    pub(crate) fn take_unset<T: Pod>(&mut self, n: usize) -> Result<&'m mut [T], MemoryError> {
         let used = n * size_of::<T>();
         let padded = (used + BLOCK_ALIGN - 1) & !(BLOCK_ALIGN - 1);
         let given = self.rest.len();

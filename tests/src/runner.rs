@@ -180,8 +180,8 @@ fn learning_with<P: Profile + Sync, I: Intersector + Sync>(
     before: &mut dyn FnMut(usize, &mut dyn Learned),
 ) -> Image {
     let plan = Plan::new(settings).expect("settings that can be used");
-    let mut shared = AlignedBytes::zeroed(plan.session().size);
-    let mut blocks: Vec<_> = (0..settings.shards).map(|_| AlignedBytes::zeroed(plan.shard().size)).collect();
+    let mut shared = used_memory(plan.session().size);
+    let mut blocks: Vec<_> = (0..settings.shards).map(|_| used_memory(plan.shard().size)).collect();
     let mut session = Session::<P, _>::new(scene, intersector, &plan, shared.as_mut()).expect("a session");
     let shards = blocks.iter_mut().enumerate().map(|(i, b)| Shard::new(&plan, i as u32, b.as_mut()));
     let mut shards: Vec<_> = shards.collect::<Result<_, _>>().expect("shards");
@@ -199,6 +199,13 @@ fn learning_with<P: Profile + Sync, I: Intersector + Sync>(
         counters: *session.counters(),
         error: film.error_estimate(),
     }
+}
+
+/// A block as a host's pool may give it: NaNs, and indices beyond everything. Nothing may hang on what it holds.
+fn used_memory(bytes: usize) -> AlignedBytes {
+    let mut block = AlignedBytes::zeroed(bytes);
+    block.as_mut().fill(0xff);
+    block
 }
 
 /// Steps a shard until it is done.

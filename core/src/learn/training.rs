@@ -30,7 +30,7 @@ impl<'m> Training<'m> {
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, size: CacheSize) -> Result<Self, MemoryError> {
-        Ok(Self { records: c.take(size.bins())?, used: 0 })
+        Ok(Self { records: c.take_unset(size.bins())?, used: 0 })
     }
 
     /// Forgets everything and takes samples of bins below `used_bins` ([`super::cache::Cache::bins`]).

@@ -68,7 +68,7 @@ impl<'m> Tree<'m> {
         let cube = cube(lo, hi);
         let [.., edge] = cube;
         let mut tree = Self {
-            nodes: c.take(nodes as usize)?,
+            nodes: c.take_unset(nodes as usize)?,
             grid: c.take(grid_len(max_leaves))?,
             grid_bits: grid_bits(max_leaves),
             used: 0,
