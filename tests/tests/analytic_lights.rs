@@ -378,3 +378,25 @@ fn needles_shine_like_other_triangles() {
         }
     }
 }
+
+/// A point light within 1e-10 of what it lights is taken for one at that distance, and every such sample is counted. Killed by:
+/// a silent clamp, a count of other lanes or lights.
+#[test]
+fn lights_that_are_too_near_are_counted() {
+    for (exponent, clamped) in [(0, false), (-32, false), (-40, true)] {
+        let scale = 2f32.powi(exponent);
+        let mut s = spot(0.5, [8, 8]);
+        place(&mut s, scale, 0.0);
+        s.emitters.push(Emitter::Point { position: [0.0, 2.0 * scale, 0.0], intensity: [scale * scale; 3] });
+        s.emitters.push(Emitter::Directional { direction: [0.0, -1.0, 0.0], irradiance: [1.0; 3] });
+        let image = render_depth(&s, 2, 64);
+        let counted = image.counters.distances_clamped;
+        assert_eq!(counted > 0, clamped, "{scale}: {counted}");
+        assert!(counted < image.counters.vertex_samples, "{scale}: the sun's samples are not");
+        assert!(
+            image.pixels.iter().all(|p| p.mean()[0].is_finite()) && image.mean() > 0.1,
+            "{scale}: {}",
+            image.mean()
+        );
+    }
+}

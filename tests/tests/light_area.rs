@@ -288,6 +288,7 @@ fn delta_lights_have_their_closed_forms() {
         let owner = LightScene::default().delta(LightKind::Point, [0.0; 3], [1.0; 3]).finish();
         let s = draw(&owner, Vec3x8::splat(offset, 0.0, 0.0), &mut rng);
         assert_eq!(s.valid.all(), valid, "{offset}");
+        assert_eq!([s.clamped.any(), s.clamped.all()], [offset < 1e-10; 2], "{offset}");
         assert!(s.radiance.is_finite().all() && s.pdf.is_finite().all());
     }
 }

@@ -51,6 +51,8 @@ pub struct LightSample8 {
     pub infinite: Mask8,
     /// Lanes with a usable sample.
     pub valid: Mask8,
+    /// Lanes so near to a point light that its distance was taken for larger, or that it has no direction.
+    pub clamped: Mask8,
 }
 
 impl LightSample8 {
@@ -65,6 +67,7 @@ impl LightSample8 {
         delta: Mask8::NONE,
         infinite: Mask8::NONE,
         valid: Mask8::NONE,
+        clamped: Mask8::NONE,
     };
 
     /// Takes over the lanes of `mask` from `other`.
@@ -79,6 +82,7 @@ impl LightSample8 {
         self.delta = (mask & other.delta) | self.delta.and_not(mask);
         self.infinite = (mask & other.infinite) | self.infinite.and_not(mask);
         self.valid = (mask & other.valid) | self.valid.and_not(mask);
+        self.clamped = (mask & other.clamped) | self.clamped.and_not(mask);
     }
 }
 

@@ -15,7 +15,10 @@ const MIN_DISTANCE_SQR: f32 = 1e-20;
 #[inline(always)]
 pub(super) fn sample(light: &Chosen, p: Vec3x8) -> LightSample8 {
     let d = light.vector - p;
-    let distance_sqr = d.length_sqr().max(F32x8::splat(MIN_DISTANCE_SQR));
+    let least = F32x8::splat(MIN_DISTANCE_SQR);
+    let distance_sqr = d.length_sqr();
+    let clamped = distance_sqr.lt(least);
+    let distance_sqr = distance_sqr.max(least);
     let wi = d.normalize();
     LightSample8 {
         wi,
@@ -25,6 +28,7 @@ pub(super) fn sample(light: &Chosen, p: Vec3x8) -> LightSample8 {
         pdf: F32x8::ONE,
         delta: Mask8::all_lanes(),
         valid: wi.is_finite(),
+        clamped,
         ..LightSample8::NONE
     }
 }

@@ -63,6 +63,8 @@ pub struct Counters {
     pub factors_not_finite: u64,
     /// Hits at which a path ended because of the hard stop ([`crate::HARD_STOP`]) before its `max_depth`.
     pub hard_stopped: u64,
+    /// Light samples so near to a point light that its distance was taken for larger (NUMERICS SOL-5).
+    pub distances_clamped: u64,
     /// Contributions or weights that were not finite and were not added.
     pub non_finite: u64,
     /// Film index of the pixel of the first of them, plus 1; 0 if there is none.
@@ -110,6 +112,7 @@ impl Counters {
         self.ledger_full += o.ledger_full;
         self.factors_not_finite += o.factors_not_finite;
         self.hard_stopped += o.hard_stopped;
+        self.distances_clamped += o.distances_clamped;
         self.non_finite += o.non_finite;
         if self.first_non_finite == 0 {
             self.first_non_finite = o.first_non_finite;

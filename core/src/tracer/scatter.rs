@@ -111,6 +111,7 @@ impl Shard<'_> {
         let kernel = Scatter { scene, vertex: v, active, light: light.map(|l| l.wi), u: [u0, u1, u2] };
         let out = bsdf::dispatch_in(P::EFFECTS, kind, kernel)?;
         if let Some(l) = light {
+            self.counters.distances_clamped += u64::from((lit & l.clamped).count());
             self.light_contribution(session, &LitSamples { vertex: v, ledger, key }, &l, &out.light, lit & l.valid);
         }
 

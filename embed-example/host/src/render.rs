@@ -363,6 +363,7 @@ fn stats(r: &Rendered) -> RenderStats {
         ("ledger_full", c.ledger_full),
         ("factors_not_finite", c.factors_not_finite),
         ("hard_stopped", c.hard_stopped),
+        ("distances_clamped", c.distances_clamped),
         ("non_finite", c.non_finite),
     ];
     RenderStats {
