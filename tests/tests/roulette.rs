@@ -191,7 +191,7 @@ fn moment_and_variance_decide_together() {
             assert_eq!([with("ears", &v), with("ear", &v)], [1.0; 2], "moment {moment}, variance {variance}");
         }
         if moment.is_finite() && variance.is_finite() {
-            let s = with("bolin-meyer", &v);
+            let s = with("bolin-meyer:plain", &v);
             assert_eq!(s, ears, "bolin-meyer, moment {moment}, variance {variance}");
         }
     }
@@ -232,7 +232,7 @@ fn factors_are_the_most_efficient_ones() {
 /// picture taken for a picture without variance, confidence that shrinks with the samples.
 #[test]
 fn ignorance_is_classic() {
-    for strategy in ["ear", "ears", "ear:plain", "ears:plain"] {
+    for strategy in ["ear", "ears", "ear:plain", "ears:plain", "bolin-meyer"] {
         for depth in [1, 5, 9] {
             let classic = factor("classic", 0.25, 0.5, depth);
             let with = |f: &dyn Fn(&mut Learned8)| {

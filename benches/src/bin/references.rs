@@ -122,7 +122,7 @@ const PLANS: &[Plan] = &[
     Plan { quick: true, ..Plan::unbiased("classic") },
     Plan::unbiased("classic:5:relative"),
     Plan::unbiased("winners"),
-    Plan { effort: 0.25, ..Plan::unbiased("bolin-meyer") },
+    Plan::unbiased("bolin-meyer"),
     Plan::unbiased("adrr"),
     Plan::unbiased("adrrs"),
     Plan::unbiased("ear"),

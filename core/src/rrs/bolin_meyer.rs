@@ -1,16 +1,22 @@
 //! Factors per pixel and path length (Bolin and Meyer 1997): those of EARS with statistics that know nothing but the block of
 //! pixels and the depth. Two vertices of one depth under one pixel get the same factor however much they differ.
+//!
+//! Guarded as [`super::Ears`] is: trusted at once, statistics of a few fireflies split paths for ever or kill them, and come
+//! back as samples so rare that a picture of 512 samples a pixel looks biased (kitchen).
 
 use super::{RrsStrategy, Space, Vertices8, ears};
 use croupier_simd::F32x8;
 
-/// The most efficient factor for the contributions of this depth; 1 until there are any.
+/// The most efficient factor for the contributions of this depth; that of `classic` where little is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BolinMeyer;
+pub struct BolinMeyer {
+    /// Trust statistics at once.
+    pub plain: bool,
+}
 
 impl BolinMeyer {
     pub(super) fn parse(options: &str) -> Option<Self> {
-        options.is_empty().then_some(Self)
+        ears::parse_plain(options).map(|plain| Self { plain })
     }
 }
 
@@ -20,8 +26,6 @@ impl RrsStrategy for BolinMeyer {
 
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
-        let l = &v.learned;
-        let known = l.count.gt(F32x8::ZERO) & l.cost_over_variance.gt(F32x8::ZERO);
-        known.select(ears::split_or_kill(l, v.beta), F32x8::ONE)
+        ears::grown(v, ears::split_or_kill(&v.learned, v.beta), self.plain)
     }
 }

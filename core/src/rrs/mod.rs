@@ -174,7 +174,7 @@ strategies! {
     /// Go with the winners.
     Winners, "winners", "winners[:VR:VV]: throughput x albedo x sqrt(VR + VV / (shininess + 1)^2)";
     /// Factors per pixel and path length.
-    BolinMeyer, "bolin-meyer", "most efficient factor per pixel block and path length, learned";
+    BolinMeyer, "bolin-meyer", "bolin-meyer[:plain]: most efficient factor per pixel block and path length, learned";
     /// Adjoint-driven roulette.
     Adrr, "adrr", "adjoint-driven roulette: expected contribution over the pixel, weight window, learned";
     /// Adjoint-driven roulette and splitting.
