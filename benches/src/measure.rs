@@ -137,11 +137,17 @@ impl Observer for Watch<'_> {
     }
 
     fn iteration(&self, film: &Film<'_>, seconds: f64) {
+        let cpu = self.seconds();
         let now = cpu_seconds();
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let cpu = self.start.zip(now).zip(state.tracer).map(|((a, b), tracer)| b - a - state.paused + tracer);
         let snapshot = self.snapshot(film, cpu.unwrap_or(seconds), seconds);
         state.snapshots.push(snapshot);
         state.paused += cpu_seconds().zip(now).map_or(0.0, |(b, a)| b - a);
+    }
+
+    fn seconds(&self) -> Option<f64> {
+        let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let caller = self.start.zip(cpu_seconds()).map(|(start, now)| now - start - state.paused);
+        caller.map(|caller| caller + state.tracer.unwrap_or(0.0))
     }
 }

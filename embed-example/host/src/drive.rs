@@ -262,7 +262,7 @@ pub fn drive_with<P: Profile + Send + Sync>(
     let mut stopped_early = false;
     while !stopped_early {
         let (last, error) = iterations.last().map_or((Work::default(), None), |i| (i.work, Some(i.error)));
-        let now = Work { seconds: start.elapsed().as_secs_f64(), ..all };
+        let now = Work { seconds: observer.seconds().unwrap_or_else(|| start.elapsed().as_secs_f64()), ..all };
         let samples = schedule::next(options.target, learns(settings), &now, &last, error);
         if samples == 0 {
             break;
@@ -278,6 +278,9 @@ pub fn drive_with<P: Profile + Send + Sync>(
         stopped_early = pool.install(|| run.all(&mut shards));
         let mut record = end_iteration(&mut session, &shards, begun)?;
         record.work.samples = samples;
+        if let Some(seconds) = observer.seconds() {
+            record.work.seconds = seconds - now.seconds;
+        }
         record.picture = learns(settings).then(|| session.picture_statistics()[0]);
         iterations.push(record);
         if stopped_early {

@@ -133,6 +133,12 @@ pub trait Observer: Sync {
     /// An iteration is finished: the picture so far and the wall-clock seconds it took. Called from the thread that
     /// called [`render`]; the time spent in here does not count as rendering.
     fn iteration(&self, _film: &Film<'_>, _seconds: f64) {}
+    /// Seconds of rendering so far, for [`Target::Seconds`]; `None` is time on the wall without that in
+    /// [`Self::iteration`]. On a machine with other work a host may count CPU time instead. Asked between iterations, by
+    /// the thread that called [`render`].
+    fn seconds(&self) -> Option<f64> {
+        None
+    }
 }
 
 /// Figures of a finished render.
