@@ -200,10 +200,10 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
         let visit = |show: &mut dyn FnMut(usize, &PixelSums)| {
             shards.clone().into_iter().for_each(|s| s.for_each_pixel(|i, sums, _| show(i, sums)));
         };
-        let weight = self.knowledge.weigh(&counters, visit);
+        self.knowledge.measure_picture(&counters, visit);
         for s in shards.clone() {
             s.for_each_pixel(|i, sums, aov| {
-                let w = self.knowledge.weight_of(i, weight);
+                let w = self.knowledge.weight_of(i);
                 self.film.merge(i, sums, aov, w);
             });
         }

@@ -42,7 +42,7 @@ impl PixelSums {
 }
 
 /// Weighted sums over the camera samples of one pixel. All samples of the pixel in an iteration have the same
-/// weight `w`: 1, less in the first iteration of strategies that learn, and less where adaptive sampling took more.
+/// weight `w`: 1, less where adaptive sampling took more.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct PixelStats {

@@ -2,7 +2,7 @@
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use bytemuck::{Pod, Zeroable};
-use croupier_simd::{F32x8, Vec3x8};
+use croupier_simd::{F32x8, U32x8, Vec3x8};
 
 /// Direction bins of a leaf.
 pub(super) const BINS: usize = 16;
@@ -121,17 +121,18 @@ impl BinSums {
     }
 }
 
-/// What look-ups read: all numbers finite, none negative.
+/// What look-ups read: all numbers finite, none negative. One row of eight words, half a cache line: a render reads one at
+/// every vertex, so colours are [`short`].
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-#[repr(C)]
+#[repr(C, align(32))]
 pub(super) struct Frozen {
-    mean: [f32; 3],
-    cost: f32,
-    moment: [f32; 3],
     count: f32,
-    variance: [f32; 3],
-    /// Makes rows of twelve.
-    reserved: f32,
+    cost: f32,
+    mean: [u16; 3],
+    moment: [u16; 3],
+    variance: [u16; 3],
+    /// Makes rows of eight words.
+    reserved: [u16; 3],
 }
 
 /// `x`, between 0 and `max`; a NaN is 0.
@@ -139,9 +140,23 @@ fn saturate(x: f64, max: f32) -> f32 {
     if x > 0.0 { x.min(f64::from(max)) as f32 } else { 0.0 }
 }
 
+/// The upper half of a number that is finite and not negative: 8 significant bits. Rounded towards 0, so at most 0.8 % too small.
+fn short(x: f32) -> u16 {
+    (x.to_bits() >> 16) as u16
+}
+
+/// Rounded up. [`MAX_SQUARE`] is a power of two, which stays what it is.
+fn short_above(x: f32) -> u16 {
+    short(f32::from_bits(x.to_bits() + 0xffff))
+}
+
+fn long(x: u16) -> f32 {
+    f32::from_bits(u32::from(x) << 16)
+}
+
 impl Frozen {
     pub(super) const ZERO: Self =
-        Self { mean: [0.0; 3], cost: 0.0, moment: [0.0; 3], count: 0.0, variance: [0.0; 3], reserved: 0.0 };
+        Self { count: 0.0, cost: 0.0, mean: [0; 3], moment: [0; 3], variance: [0; 3], reserved: [0; 3] };
 
     /// What is known of one sample with the sums `s`.
     fn of(s: &BinSums) -> Self {
@@ -153,11 +168,11 @@ impl Frozen {
         let out = f.mean.iter_mut().zip(&mut f.moment).zip(&mut f.variance);
         for (((mean, moment), variance), ((s1, s2), p)) in out.zip(sums) {
             let (m, m2) = (s1 / n, s2 / n);
-            *mean = saturate(m, MAX_VALUE);
-            *moment = saturate(m2, MAX_SQUARE).max(*mean * *mean);
+            *mean = short(saturate(m, MAX_VALUE));
+            *moment = short_above(saturate(m2, MAX_SQUARE).max(long(*mean) * long(*mean)));
             let spread = (m2 - m * m).max(0.0);
             let v = (p + SPREAD_PAIRS * spread) / (s.pairs + SPREAD_PAIRS);
-            *variance = saturate(v, MAX_SQUARE).min(*moment);
+            *variance = short(saturate(v, MAX_SQUARE)).min(*moment);
         }
         f
     }
@@ -178,7 +193,8 @@ pub(super) fn freeze_leaf(sums: &[BinSums], frozen: &mut [Frozen], prior: &BinSu
     }
 }
 
-/// What the cache knows of eight bins. All values are finite and none is negative; where `count` is 0 all are 0.
+/// What the cache knows of eight bins. All values are finite and none is negative; where `count` is 0 all are 0. Means and
+/// variances are up to 0.8 % too small, moments too large.
 #[derive(Clone, Copy, Debug)]
 pub struct Local8 {
     /// Mean of the values.
@@ -195,13 +211,21 @@ pub struct Local8 {
 }
 
 impl Local8 {
-    pub(super) fn gather(row: impl Fn(usize) -> Frozen) -> Self {
-        let rows: [Frozen; 8] = [row(0), row(1), row(2), row(3), row(4), row(5), row(6), row(7)];
-        let first = rows.map(|f| {
-            F32x8::new([f.mean[0], f.mean[1], f.mean[2], f.cost, f.moment[0], f.moment[1], f.moment[2], f.count])
-        });
-        let [mx, my, mz, cost, qx, qy, qz, count] = F32x8::transpose(first);
-        let variance = Vec3x8::from_fn(|i| rows.get(i).map_or([0.0; 3], |f| f.variance));
-        Self { mean: Vec3x8::new(mx, my, mz), moment: Vec3x8::new(qx, qy, qz), variance, cost, count }
+    #[inline(always)]
+    pub(super) fn gather(rows: [&Frozen; 8]) -> Self {
+        let row = |f: &Frozen| F32x8::new(*bytemuck::cast_ref::<_, [f32; 8]>(f));
+        let [f0, f1, f2, f3, f4, f5, f6, f7] = rows;
+        let rows = [row(f0), row(f1), row(f2), row(f3), row(f4), row(f5), row(f6), row(f7)];
+        let [count, cost, a, b, c, d, e, _] = F32x8::transpose(rows);
+        // a word has two shorts, the first one below on every machine that blobs are for
+        let below = |w: F32x8| F32x8::from_bits(w.to_bits() << 16);
+        let above = |w: F32x8| F32x8::from_bits(w.to_bits() & U32x8::splat(0xffff_0000));
+        Self {
+            mean: Vec3x8::new(below(a), above(a), below(b)),
+            moment: Vec3x8::new(above(b), below(c), above(c)),
+            variance: Vec3x8::new(below(d), above(d), below(e)),
+            cost,
+            count,
+        }
     }
 }

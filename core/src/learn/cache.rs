@@ -125,8 +125,10 @@ impl<'m> Cache<'m> {
         objective: Objective,
     ) -> Result<Self, MemoryError> {
         let tree = Tree::carve(c, Tree::nodes_for(size.splits), size.leaves(), lo, hi)?;
-        let (sums, frozen) = (c.take(size.bins())?, c.take(size.bins())?);
-        Ok(Self { tree, sums, frozen, size, objective, splits_refused: 0, flat: None })
+        let (sums, frozen) = (c.take_unset(size.bins())?, c.take_unset(size.bins())?);
+        let mut cache = Self { tree, sums, frozen, size, objective, splits_refused: 0, flat: None };
+        cache.reset();
+        Ok(cache)
     }
 
     /// The bins of eight vertices, `u32::MAX` in inactive lanes. `kind` holds [`Kind`]s, `dir` unit vectors in world space.
@@ -151,8 +153,9 @@ impl<'m> Cache<'m> {
     /// What is known of eight bins; 0 in inactive lanes.
     #[inline]
     pub fn local(&self, bin: U32x8, active: Mask8) -> Local8 {
-        let bin = U32x8::select(active, bin, U32x8::splat(u32::MAX)).to_array();
-        Local8::gather(|i| *bin.get(i).and_then(|b| self.frozen.get(*b as usize)).unwrap_or(&Frozen::ZERO))
+        let row = |b: u32| self.frozen.get(b as usize).unwrap_or(&Frozen::ZERO);
+        let [a, b, c, d, e, f, g, h] = U32x8::select(active, bin, U32x8::splat(u32::MAX)).to_array();
+        Local8::gather([row(a), row(b), row(c), row(d), row(e), row(f), row(g), row(h)])
     }
 
     /// Begins the end of an iteration: everything so far counts `keep` times as much, 0 to 1.
@@ -301,6 +304,7 @@ impl<'m> Cache<'m> {
     /// [`CacheSize::leaves`].
     pub(crate) fn flatten(&mut self, leaves: u32) {
         self.flat = Some(leaves.min(self.size.leaves()));
+        self.reset();
     }
 
     /// Does the caller number the bins?

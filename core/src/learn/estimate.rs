@@ -109,6 +109,21 @@ impl<'m> Pixels<'m> {
         self.value(film).map(|x| 1.0 / (x * x + REL_MSE_EPSILON as f32))
     }
 
+    /// A plane with room for one value per pixel, until [`Self::take_back`]; empty if there is none.
+    pub(super) fn lend(&mut self) -> &'m mut [f32] {
+        match &mut self.values {
+            Values::Denoised { planes, .. } => core::mem::take(&mut planes.color[0]),
+            Values::None | Values::Blocks(_) => &mut [],
+        }
+    }
+
+    /// What [`Self::lend`] gave.
+    pub(super) fn take_back(&mut self, plane: &'m mut [f32]) {
+        if let Values::Denoised { planes, .. } = &mut self.values {
+            planes.color[0] = plane;
+        }
+    }
+
     /// All values, if there is one per pixel.
     pub(super) fn planes(&self) -> Option<[&[f32]; 3]> {
         match &self.values {

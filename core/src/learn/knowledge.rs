@@ -17,13 +17,6 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 /// Bins of path lengths per block of pixels, for statistics over the picture.
 const DEPTHS: u32 = 16;
 
-/// What a sample of the first iteration weighs, in which factors are not learned yet, if those of all others weigh 1.
-///
-/// Weights are constants because others make pictures wrong. EARS merges iterations by inverse variance, but bright iterations
-/// are the noisy ones: pictures of 16 pixels with caustics came out 0.9 % too dark, and with weights by the variance or the
-/// work of earlier iterations up to 2 % too bright. As lengths double, little is lost: about 1 % of error.
-const FIRST_WEIGHT: f64 = 0.25;
-
 /// Everything learned.
 #[derive(Debug)]
 pub(crate) struct Knowledge<'m> {
@@ -120,11 +113,12 @@ impl<'m> Knowledge<'m> {
         self.allotment.of_tile(tile)
     }
 
-    /// What a squared error of a sample of a pixel counts, per channel: less if the pixel has more samples.
+    /// What a squared error of a sample of a pixel counts, per channel: less if the pixel has more samples. And its samples
+    /// over those of the mean pixel.
     #[inline]
-    pub(crate) fn importance(&self, film: u32) -> [f32; 3] {
+    pub(crate) fn importance(&self, film: u32) -> ([f32; 3], f32) {
         let share = self.allotment.share(film) as f32;
-        self.pixels.importance(film).map(|x| x / (share * share))
+        (self.pixels.importance(film).map(|x| x / (share * share)), share)
     }
 
     /// Mean cost of a camera sample over its mean error; 0 while unknown.
@@ -137,11 +131,6 @@ impl<'m> Knowledge<'m> {
     pub(crate) fn outlier(&self) -> f32 {
         let limit = self.picture.blended.limit;
         if limit > 0.0 { limit as f32 } else { f32::INFINITY }
-    }
-
-    /// The same, however many samples the pixel has.
-    pub(crate) fn pixel_importance(&self, film: u32) -> [f32; 3] {
-        self.pixels.importance(film)
     }
 
     /// What is known of the picture, for vertices of pixels of this importance.
@@ -188,18 +177,23 @@ impl<'m> Knowledge<'m> {
         self.pixels.give(rgb)
     }
 
-    /// Weight of the samples of an iteration whose pixels `visit` shows, measured against the estimate made before it.
-    pub(crate) fn weigh(&mut self, counters: &Counters, visit: impl Visit) -> f64 {
-        let weight = if self.cache.is_some() && !self.picture.known() { FIRST_WEIGHT } else { 1.0 };
+    /// Measures error and cost of an iteration, whose pixels `visit` shows, against the estimate made before it.
+    pub(crate) fn measure_picture(&mut self, counters: &Counters, visit: impl Visit) {
         if self.needed && self.pixels.known() {
-            self.picture.measure(&self.learning, &self.pixels, &self.allotment, counters, visit);
+            self.picture.measure(&self.learning, &mut self.pixels, &self.allotment, counters, visit);
         }
-        weight
     }
 
-    /// Weight of the samples of one pixel in an iteration of this weight.
-    pub(crate) fn weight_of(&self, film: usize, weight: f64) -> f64 {
-        weight / self.allotment.share(film as u32)
+    /// Weight of the samples of a pixel: less where adaptive sampling took more, so that every iteration counts as much in
+    /// all pixels.
+    ///
+    /// All iterations weigh the same per sample, because other weights make pictures wrong. EARS merges iterations by inverse
+    /// variance, but bright iterations are the noisy ones: pictures of 16 pixels with caustics came out 0.9 % too dark, and
+    /// with weights by the variance or the work of earlier iterations up to 2 % too bright. As lengths double, little is lost
+    /// with the first ones, which have learned least. A quarter of the weight for the very first made the next pictures up to a
+    /// third worse and no later one better.
+    pub(crate) fn weight_of(&self, film: usize) -> f64 {
+        1.0 / self.allotment.share(film as u32)
     }
 
     /// Ends an iteration: a new estimate of the pixels from the film. The first iteration is measured against its own.
@@ -207,7 +201,7 @@ impl<'m> Knowledge<'m> {
         if self.needed {
             self.pixels.refresh(film);
             if !self.picture.known() {
-                self.picture.measure(&self.learning, &self.pixels, &self.allotment, counters, visit);
+                self.picture.measure(&self.learning, &mut self.pixels, &self.allotment, counters, visit);
             }
         }
     }

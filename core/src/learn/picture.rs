@@ -60,21 +60,32 @@ impl Picture {
     pub(super) fn measure(
         &mut self,
         learning: &Learning,
-        pixels: &Pixels<'_>,
+        pixels: &mut Pixels<'_>,
         allotment: &Allotment<'_>,
         counters: &Counters,
         visit: impl Visit,
     ) {
+        // errors are read six times; where there is room they are computed once
+        let kept = pixels.lend();
+        let error = |film: usize, sums: &PixelSums| {
+            error_of(film as u32, sums, learning.norm, pixels, allotment).min(f64::from(f32::MAX)) as f32
+        };
         let mut n = 0u64;
-        visit(&mut |_, sums| n += u64::from(sums.samples > 0));
+        visit(&mut |film, sums| {
+            if sums.samples > 0 {
+                n += 1;
+                kept.get_mut(film).into_iter().for_each(|e| *e = error(film, sums));
+            }
+        });
         let outliers = (n as f64 * OUTLIERS) as u64 + 1;
         let t = trimmed(outliers.min(n.saturating_sub(1)) as usize, |show| {
             visit(&mut |film, sums| {
                 if sums.samples > 0 {
-                    show(error_of(film as u32, sums, learning.norm, pixels, allotment));
+                    show(f64::from(kept.get(film).copied().unwrap_or_else(|| error(film, sums))));
                 }
             });
         });
+        pixels.take_back(kept);
         let n = n.max(1) as f64;
         let mut s = PictureStatistics {
             variance: t.sum / t.count.max(1) as f64,

@@ -87,7 +87,7 @@ impl Default for Learning {
         Self {
             cache_bytes: 24 << 20,
             ledger: 2048,
-            samples: 16,
+            samples: 8,
             split_count: 10_000.0,
             carry: 0.75,
             estimate: Estimate::Denoised,

@@ -74,7 +74,7 @@ impl<'m> Ledger<'m> {
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, capacity: usize) -> Result<Self, MemoryError> {
-        let records = c.take(capacity)?;
+        let records = c.take_unset(capacity)?;
         Ok(Self { records, free: FreeList::carve(c, capacity)? })
     }
 

@@ -1,5 +1,6 @@
 //! Where in the statistics the samples of arrived vertices belong.
 
+use super::root::Target8;
 use super::roulette::Arrival8;
 use super::surface::TRANSMISSIVE;
 use crate::accel::Intersector;
@@ -30,7 +31,7 @@ pub(super) struct Place8 {
 /// Kinds without a preferred direction but the normal.
 const MATTE: u32 = 1 << MaterialKind::Diffuse as u32;
 
-fn lanes_of(kinds: u32, a: &Arrival8) -> Mask8 {
+fn lanes_of(kinds: u32, a: &Arrival8<'_>) -> Mask8 {
     Mask8::from_bits((0..8).fold(0, |m, i| m | (kinds >> (a.kind[i] & 31) & 1) << i))
 }
 
@@ -45,11 +46,11 @@ fn inverse(x: Vec3x8, floor: f32) -> Vec3x8 {
 /// texture or a black and a white thing in one cell do not pass for noise.
 pub(super) fn place<P: Profile, I: Intersector, L: LightSelector>(
     session: &Session<'_, '_, P, I, L>,
-    a: &Arrival8,
+    a: &Arrival8<'_>,
     space: Space,
-    mut root_film: impl FnMut(usize) -> u32,
+    target: &Target8,
 ) -> Place8 {
-    let v = &a.vertex;
+    let v = &*a.vertex;
     let knowledge = session.knowledge();
     match space {
         Space::Scene => {
@@ -63,21 +64,19 @@ pub(super) fn place<P: Profile, I: Intersector, L: LightSelector>(
             let kind = kind + U32x8::select(seen, first, U32x8::splat(0));
             let known = if knowledge.weighs_pixels() { a.active } else { a.active.and_not(seen) };
             let bin = knowledge.scene_bins(kind, v.p, dir, [u0, u1, u2], known);
-            // in one cell bright pixels see bright samples: only their ratio is alike, however many samples a pixel has
-            let own: [_; 8] = core::array::from_fn(|i| match seen.lane(i) && a.active.lane(i) {
-                true => knowledge.pixel_importance(root_film(i)),
-                false => [1.0; 3],
-            });
-            let pixel = inverse(Vec3x8::from_fn(|i| own[i]), f32::MIN_POSITIVE);
-            let pixel = Vec3x8::new(pixel.x.sqrt(), pixel.y.sqrt(), pixel.z.sqrt());
-            let unscale = Vec3x8::select(seen, pixel, a.albedo);
+            let mut unscale = a.albedo;
+            if (seen & a.active).any() {
+                // in one cell bright pixels see bright samples: only their ratio is alike, however many samples a pixel has
+                let own = inverse(target.importance * target.share.sqr(), f32::MIN_POSITIVE);
+                unscale = Vec3x8::select(seen, own.map(F32x8::sqrt), unscale);
+            }
             Place8 { bin, scale: inverse(unscale, DARKEST), unscale }
         }
         Space::Image => {
-            let depth = v.depth.to_array();
+            let (film, depth) = (target.film.to_array(), v.depth.to_array());
             let mut bin = [0; 8];
             for i in a.active.lanes() {
-                bin[i] = knowledge.image_bin(root_film(i), depth[i]);
+                bin[i] = knowledge.image_bin(film[i], depth[i]);
             }
             Place8 { bin: U32x8::new(bin), scale: v.beta, unscale: inverse(v.beta, f32::MIN_POSITIVE) }
         }

@@ -3,6 +3,7 @@
 
 use super::flight::Flight8;
 use super::ledger::NO_RECORD;
+use super::root::Target;
 use super::shard::Shard;
 use crate::accel::{Intersector, Ray8};
 use crate::camera;
@@ -86,7 +87,8 @@ impl Shard<'_> {
                 break;
             };
             let film = tiles.film_index(p) as u32;
-            let Some(r) = self.roots.open(slot, film, session.knowledge().importance(film)) else { break };
+            let (importance, share) = session.knowledge().importance(film);
+            let Some(r) = self.roots.open(Target { importance, share, film, pixel: slot }) else { break };
             [x[lanes], y[lanes]] = p;
             pixel[lanes] = film;
             sample[lanes] = first_sample.wrapping_add(s);

@@ -3,6 +3,7 @@
 use super::free_list::FreeList;
 use crate::memory::{Carver, Measure, MemoryError};
 use bytemuck::{Pod, Zeroable};
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// A camera sample whose paths are not all finished.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -10,19 +11,44 @@ use bytemuck::{Pod, Zeroable};
 pub(crate) struct Root {
     /// Radiance gathered so far; f64 because a split sample sums thousands of terms.
     pub radiance: [f64; 3],
-    /// Pixel slot of the shard.
-    pub pixel: u32,
     /// Waiting vertices and lanes in flight that belong to it.
     pub open: u32,
     /// Rays traced for it.
     pub rays: u32,
+    /// Its pixel.
+    pub target: Target,
     /// Samples that its splits have added.
     pub splits: u32,
-    /// Film index of the pixel.
-    pub film: u32,
-    /// What a squared error of this pixel's rgb counts in the error of the picture.
-    pub importance: [f32; 3],
+    reserved: u32,
 }
+
+/// The pixel of a camera sample.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Target {
+    /// What a squared error of a sample's rgb counts in the error of the picture.
+    pub importance: [f32; 3],
+    /// Samples of the pixel over those of the mean pixel; `importance` times its square is that of the pixel.
+    pub share: f32,
+    /// Film index.
+    pub film: u32,
+    /// Pixel slot of the shard.
+    pub pixel: u32,
+}
+
+/// The pixels of eight camera samples.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Target8 {
+    /// See [`Target::importance`].
+    pub importance: Vec3x8,
+    /// See [`Target::share`].
+    pub share: F32x8,
+    /// Film indices.
+    pub film: U32x8,
+}
+
+/// One record per lane read as a row: `target` and the words behind it.
+const ROW: usize = core::mem::offset_of!(Root, target) / 4;
 
 /// A fixed slab of roots.
 #[derive(Debug)]
@@ -37,7 +63,7 @@ impl<'m> Roots<'m> {
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, capacity: usize) -> Result<Self, MemoryError> {
-        let slots = c.take(capacity)?;
+        let slots = c.take_unset(capacity)?;
         Ok(Self { slots, free: FreeList::carve(c, capacity)? })
     }
 
@@ -47,10 +73,26 @@ impl<'m> Roots<'m> {
     }
 
     /// A new root with one open lane. `None` cannot happen while roots outnumber vertices by two packets.
-    pub(crate) fn open(&mut self, pixel: u32, film: u32, importance: [f32; 3]) -> Option<u32> {
+    pub(crate) fn open(&mut self, target: Target) -> Option<u32> {
         let slot = self.free.take()?;
-        self.slots[slot as usize] = Root { pixel, film, importance, open: 1, ..Zeroable::zeroed() };
+        self.slots[slot as usize] = Root { target, open: 1, ..Zeroable::zeroed() };
         Some(slot)
+    }
+
+    /// The pixels of the roots in `mask`; 0 in other lanes.
+    #[inline(always)]
+    pub(crate) fn targets(&self, slots: U32x8, mask: Mask8) -> Target8 {
+        let row = |slot: u32| match self.slots.get(slot as usize) {
+            Some(root) => {
+                let words: &[f32; size_of::<Root>() / 4] = bytemuck::cast_ref(root);
+                F32x8::new(core::array::from_fn(|k| words[ROW + k]))
+            }
+            None => F32x8::ZERO,
+        };
+        let [a, b, c, d, e, f, g, h] = U32x8::select(mask, slots, U32x8::splat(u32::MAX)).to_array();
+        let rows = [row(a), row(b), row(c), row(d), row(e), row(f), row(g), row(h)];
+        let [x, y, z, share, film, ..] = F32x8::transpose(rows);
+        Target8 { importance: Vec3x8::new(x, y, z), share, film: film.to_bits() }
     }
 
     pub(crate) fn get(&mut self, slot: u32) -> &mut Root {

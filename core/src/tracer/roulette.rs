@@ -19,8 +19,8 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 const MIRROR_SHININESS: f32 = 1e4;
 
 /// Eight vertices that paths have arrived at.
-pub(super) struct Arrival8 {
-    pub vertex: Vertex8,
+pub(super) struct Arrival8<'a> {
+    pub vertex: &'a mut Vertex8,
     /// Weight of the bounce that led here.
     pub weight: Vec3x8,
     /// [`MaterialKind`] per lane.
@@ -31,7 +31,7 @@ pub(super) struct Arrival8 {
 }
 
 /// Phong exponents that correspond to the materials' GGX widths: 2 / alpha^2 - 2.
-fn shininess(scene: &Scene<'_>, a: &Arrival8) -> F32x8 {
+fn shininess(scene: &Scene<'_>, a: &Arrival8<'_>) -> F32x8 {
     let material = a.vertex.material.to_array();
     F32x8::from_fn(|i| {
         let m = scene.materials.get(material[i] as usize);
@@ -50,23 +50,23 @@ impl Shard<'_> {
     pub(super) fn roulette<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
         session: &Session<'_, '_, P, I, L>,
-        a: Arrival8,
+        a: Arrival8<'_>,
     ) {
         let settings = *self.plan.settings();
         let strategy = settings.strategy;
         let knowledge = session.knowledge();
-        let mut v = a.vertex;
+        let v = &*a.vertex;
         let mut logged = None;
         let mut learned = Learned8::NONE;
         if strategy.needs_image() {
-            learned = knowledge.image8(self.importance(v.root, a.active));
-        }
-        if let Some(space) = strategy.space() {
-            let root = v.root.to_array();
-            let found = place(session, &a, space, |i| self.roots.get(root[i]).film);
-            knowledge.local8(&mut learned, found.bin, found.unscale, a.active);
-            self.counters.look_ups.count(a.active.count());
-            logged = Some(found);
+            let target = self.roots.targets(v.root, a.active);
+            learned = knowledge.image8(target.importance);
+            if let Some(space) = strategy.space() {
+                let found = place(session, &a, space, &target);
+                knowledge.local8(&mut learned, found.bin, found.unscale, a.active);
+                self.counters.look_ups.count(a.active.count());
+                logged = Some(found);
+            }
         }
         let (s, finite) = strategy.checked_factor(&Vertices8 {
             beta: v.beta,
@@ -82,7 +82,7 @@ impl Shard<'_> {
         let s = if logged.is_some() { s.clamp(least, most) } else { s };
         let s = self.bound(s, v.root, a.active);
         let n = rrs::comb(a.active.zero_unless(s), self.comb_bits());
-        self.record_factors(a.active, s, &v);
+        self.record_factors(a.active, s, v);
         if let Some(c) = settings.constant.of(&learned) {
             // what the samples rounded away, or added, is expected to have given (Szecsi et al. 2003)
             let rounded = F32x8::ONE - F32x8::from_fn(|i| n[i] as f32) / s;
@@ -90,13 +90,13 @@ impl Shard<'_> {
             self.gather(a.active, v.root, v.ledger, &found);
         }
         if let Some(p) = logged {
-            self.record_places(a.active, &v, &p, a.weight / s);
+            self.record_places(a.active, v, &p, a.weight / s);
         }
-        v.beta = v.beta / s;
-        v.albedo_product *= a.albedo.mean();
-        v.count = U32x8::new(n);
         let (root, ledger, depth) = (v.root.to_array(), v.ledger.to_array(), v.depth.to_array());
-        let records = v.to_records();
+        a.vertex.beta = v.beta / s;
+        a.vertex.albedo_product *= a.albedo.mean();
+        a.vertex.count = U32x8::new(n);
+        let records = a.vertex.records();
         for i in a.active.lanes() {
             let Some(class) = MaterialKind::from_u32(a.kind[i]).filter(|_| n[i] > 0) else {
                 self.counters.roulette_kills += 1;
@@ -110,16 +110,6 @@ impl Shard<'_> {
             // the lane's share of `open` passes to the waiting vertex
             self.pool.push(class as usize, records[i]);
         }
-    }
-
-    /// What squared errors count in the pixels of eight roots.
-    pub(super) fn importance(&mut self, root: U32x8, mask: Mask8) -> Vec3x8 {
-        let root = root.to_array();
-        let mut out = [[0.0; 3]; 8];
-        for i in mask.lanes() {
-            out[i] = self.roots.get(root[i]).importance;
-        }
-        Vec3x8::from_fn(|i| out[i])
     }
 
     /// Tells the samples that led here where the vertex's samples are logged and what they count.
@@ -159,7 +149,7 @@ impl Shard<'_> {
         }
         let (s, root, depth) = (s.to_array(), v.root.to_array(), v.depth.to_array());
         for i in active.lanes() {
-            let pixel = self.roots.get(root[i]).pixel as usize;
+            let pixel = self.roots.get(root[i]).target.pixel as usize;
             if let Some(aov) = self.aovs.get_mut(pixel) {
                 let d = (depth[i].clamp(1, 4) - 1) as usize;
                 aov.factor[d] += f64::from(s[i]);

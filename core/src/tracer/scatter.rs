@@ -213,7 +213,7 @@ impl Shard<'_> {
             return mask;
         }
         let norm = self.plan.settings().learning.norm;
-        let error = norm.of(found.pixel * found.pixel * self.importance(s.vertex.root, mask));
+        let error = norm.of(found.pixel * found.pixel * self.roots.targets(s.vertex.root, mask).importance);
         let p = (error * F32x8::splat(ratio / COST_SHADOW)).sqrt();
         let p = p.is_finite().select(p, F32x8::ONE).clamp(MIN_FACTOR, 1.0);
         let [u, ..] = s.key.uniforms(SHADOW_BLOCK);

@@ -59,7 +59,7 @@ impl Shard<'_> {
         if (mask & most.gt(limit)).none() {
             return F32x8::ONE;
         }
-        let error = self.plan.settings().learning.norm.of(square * self.importance(root, mask));
+        let error = self.plan.settings().learning.norm.of(square * self.roots.targets(root, mask).importance);
         error.gt(limit).select((limit / error).sqrt(), F32x8::ONE)
     }
 
@@ -67,7 +67,7 @@ impl Shard<'_> {
     pub(super) fn count_non_finite(&mut self, root: u32) {
         self.counters.non_finite += 1;
         if self.counters.first_non_finite == 0 {
-            self.counters.first_non_finite = u64::from(self.roots.get(root).film) + 1;
+            self.counters.first_non_finite = u64::from(self.roots.get(root).target.film) + 1;
         }
     }
 
@@ -118,10 +118,10 @@ impl Shard<'_> {
         self.settle_record(ledger);
         if let Some(done) = self.roots.close(root) {
             self.counters.camera_samples += 1;
-            if let Some(p) = self.pixels.get_mut(done.pixel as usize) {
+            if let Some(p) = self.pixels.get_mut(done.target.pixel as usize) {
                 p.add(done.radiance, done.rays);
             }
-            if let Some(a) = self.aovs.get_mut(done.pixel as usize) {
+            if let Some(a) = self.aovs.get_mut(done.target.pixel as usize) {
                 a.paths += 1.0 + f64::from(done.splits);
             }
         }

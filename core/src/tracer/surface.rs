@@ -68,7 +68,7 @@ impl Shard<'_> {
             return self.close_lanes(mask, f.root, f.ledger, f.depth);
         }
         let s = shade::<P>(scene, hit, wo, point.ng);
-        let vertex = Vertex8 {
+        let mut vertex = Vertex8 {
             p: point.p,
             error: point.error,
             ng: point.ng,
@@ -98,7 +98,7 @@ impl Shard<'_> {
             return;
         }
         let albedo = if needs_albedo { albedo } else { Vec3x8::ZERO };
-        self.roulette(session, Arrival8 { vertex, weight: f.weight, kind: s.kind, albedo, active: going });
+        self.roulette(session, Arrival8 { vertex: &mut vertex, weight: f.weight, kind: s.kind, albedo, active: going });
     }
 
     /// Emission of hit area lights, weighted against the light sample that could have found them.
@@ -141,7 +141,7 @@ impl Shard<'_> {
             self.count_non_finite(root[i]);
         }
         for i in good.lanes() {
-            let pixel = self.roots.get(root[i]).pixel as usize;
+            let pixel = self.roots.get(root[i]).target.pixel as usize;
             let Some(aov) = self.aovs.get_mut(pixel) else { continue };
             let (albedo, normal) = (albedo.lane(i), normal.lane(i));
             for c in 0..3 {

@@ -81,7 +81,7 @@ impl Vertex {
 }
 
 impl Vertex8 {
-    fn to_columns(self) -> [[F32x8; 8]; 4] {
+    fn columns(&self) -> [[F32x8; 8]; 4] {
         let f = F32x8::from_bits;
         let z = F32x8::ZERO;
         [
@@ -123,9 +123,9 @@ impl Vertex8 {
     }
 
     /// The eight lanes as records.
-    pub(crate) fn to_records(self) -> [Vertex; 8] {
+    pub(crate) fn records(&self) -> [Vertex; 8] {
         let mut out: [Vertex; 8] = Zeroable::zeroed();
-        for (r, columns) in self.to_columns().into_iter().enumerate() {
+        for (r, columns) in self.columns().into_iter().enumerate() {
             for (v, row) in out.iter_mut().zip(F32x8::transpose(columns)) {
                 v.rows[r] = row.to_array();
             }
@@ -204,7 +204,7 @@ impl<'m> Pool<'m> {
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, capacity: usize) -> Result<Self, MemoryError> {
-        let records = c.take(capacity)?;
+        let records = c.take_unset(capacity)?;
         let free = FreeList::carve(c, capacity)?;
         let mut rings = core::array::from_fn(|_| Ring { slots: &mut [], head: 0, len: 0 });
         for r in &mut rings {
@@ -378,7 +378,7 @@ mod tests {
             next: u(27),
             ledger: u(28),
         };
-        let records = v.to_records();
+        let records = v.records();
         for (i, r) in records.iter().enumerate() {
             assert_eq!((r.count(), r.root(), r.ledger()), (26_000 + i as u32, 21_000 + i as u32, 28_000 + i as u32));
         }
