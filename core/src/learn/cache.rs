@@ -48,7 +48,7 @@ impl CacheSize {
     pub const SMALLEST: Self = Self { splits: 0 };
 
     /// The largest cache whose shared side and `shards` training sides fit in `bytes` together; `None` if none does.
-    /// The smallest, four leaves that never split, takes 9.1 KiB and 3 KiB more for each shard.
+    /// The smallest, four leaves that never split, takes 8.1 KiB and 3 KiB more for each shard.
     pub fn within(bytes: usize, shards: u32) -> Option<Self> {
         let fits = |splits: u32| Self { splits }.bytes(shards).is_some_and(|b| b <= bytes);
         if !fits(0) {

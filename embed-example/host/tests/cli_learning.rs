@@ -132,7 +132,8 @@ fn usage_errors_are_status_2() {
 fn flags_that_do_not_fit_together_are_status_1() {
     let dir = tempfile::tempdir().unwrap();
     for (arguments, said) in [
-        (&["--cache-bytes", "57KiB"][..], "cache of 58368 bytes: with so many shards it needs"),
+        (&["--cache-bytes", "56KiB", "--shards", "16"][..], "cache of 57344 bytes: with so many shards it needs"),
+        (&["--cache-bytes", "11KiB"], "cache of 11264 bytes: with so many shards it needs"),
         (&["--shards", "65536"], "cache of 25165824 bytes: with so many shards it needs"),
         (&["--constant", "0.5", "--rrs", "threshold"], "cannot serve threshold"),
         (&["--constant", "cached", "--rrs", "classic"], "cached mean needs"),
@@ -144,8 +145,10 @@ fn flags_that_do_not_fit_together_are_status_1() {
             assert!(error.contains(said) && error.lines().count() == 1, "{arguments:?}: {error}");
         }
     }
-    let fit = croupier(dir.path(), &["info", "missing.crp", "--cache-bytes", "57KiB", "--shards", "15"]);
-    assert!(text(&fit.stderr).contains("cannot read missing.crp"), "{}", text(&fit.stderr));
+    for fit in [&["--cache-bytes", "56KiB", "--shards", "15"][..], &["--cache-bytes", "32KiB"]] {
+        let out = croupier(dir.path(), &[&["info", "missing.crp"], fit].concat());
+        assert!(text(&out.stderr).contains("cannot read missing.crp"), "{fit:?}: {}", text(&out.stderr));
+    }
 }
 
 /// Killed by: an error after rendering instead of before, without the file's name, or none.
@@ -249,7 +252,8 @@ fn everything_at_once() {
     for part in ["paths per sample", "factor at first hit", "efficiency"].iter().chain(&learned) {
         assert!(words.contains(part), "{words}");
     }
-    let crowded = ["--rrs", "ears", "--spp", "200", "--stats", "--cache-bytes", "16KiB", "-o", "w.exr"];
+    let crowded =
+        ["--rrs", "ears", "--spp", "200", "--learn-samples", "64", "--stats", "--cache-bytes", "16KiB", "-o", "w.exr"];
     let words = text(&render(dir, &crowded).stdout);
     assert!(words.contains(" splits refused so far for lack of room"), "{words}");
 }
@@ -281,7 +285,9 @@ fn every_flag_changes_the_picture() {
     let mut found = Vec::new();
     let pictures = flags.map(|flags| {
         let more = ["--rrs", "ears", "--spp", "200", "-o", "f.exr", "--stats", "--json"];
-        found.push(json(&render(dir.path(), &[&more, flags].concat())));
+        // so few pixels teach too little otherwise
+        let samples: &[&str] = if flags.contains(&"--learn-samples") { &[] } else { &["--learn-samples", "16"] };
+        found.push(json(&render(dir.path(), &[&more, samples, flags].concat())));
         Picture::read_exr(&dir.path().join("f.exr")).unwrap().rgb("").unwrap()
     });
     let of = |flag: &str| &found[flags.iter().position(|f| f.first() == Some(&flag)).unwrap()];

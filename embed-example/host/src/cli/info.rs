@@ -80,8 +80,8 @@ impl Facts {
 pub fn run(args: &Args) -> Outcome {
     let path = args.scene.as_deref();
     let mut options = RenderOptions::default();
-    args.settings.apply(&mut options);
     args.learning.apply(&mut options);
+    args.settings.apply(&mut options);
     // Said before the scene is loaded.
     check(&options)?;
     let (bytes, notes) = scene::open(path)?;

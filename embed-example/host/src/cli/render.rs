@@ -98,8 +98,8 @@ impl Flags {
             calibrate: self.stats,
             ..RenderOptions::default()
         };
-        self.settings.apply(&mut options);
         self.learning.apply(&mut options);
+        self.settings.apply(&mut options);
         // Said before the scene is loaded.
         check(&options)?;
         self.cache.apply(&mut options)?;

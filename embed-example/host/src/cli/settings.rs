@@ -1,5 +1,6 @@
 //! What every strategy is told, and what a render's memory depends on.
 
+use croupier::learn::cache::CacheSize;
 use croupier::rrs::ParseError;
 use croupier::{HARD_STOP, MIN_RING, Strategy};
 use croupier_host::render::RenderOptions;
@@ -16,9 +17,10 @@ pub struct SettingsFlags {
     /// Size in pixels; the scene's own if absent
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
-    /// Units of parallel work; the image depends on their number
-    #[arg(long, value_name = "N", default_value_t = RenderOptions::default().shards, value_parser = clap::value_parser!(u32).range(1..=65536))]
-    shards: u32,
+    /// Units of parallel work; the image depends on their number. 16 if absent, as many as --cache-bytes has room for if that
+    /// is fewer
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    shards: Option<u32>,
     /// Path vertices that may wait in a shard, 16 to 2^24; 512 if absent. With fewer, factors above 1 become 1 more often
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(i64::from(MIN_RING)..=1 << 24))]
     ring: Option<u32>,
@@ -28,15 +30,23 @@ pub struct SettingsFlags {
 }
 
 impl SettingsFlags {
-    /// Puts them into `options`.
+    /// Puts them into `options`, which say already how much memory learning has.
     pub fn apply(&self, options: &mut RenderOptions) {
         options.strategy = self.rrs.clone();
         options.max_depth = self.max_depth;
         options.size = self.size;
-        options.shards = self.shards;
+        options.shards = self.shards.unwrap_or_else(|| shards(options));
         options.ring = self.ring;
         options.split_budget = self.split_budget;
     }
+}
+
+/// The usual number of shards, less where their statistics do not fit. If not even those of one do, the core says so.
+fn shards(options: &RenderOptions) -> u32 {
+    let learns = Strategy::parse(&options.strategy).is_ok_and(|s| s.space().is_some());
+    let fits = |shards: &u32| !learns || CacheSize::within(options.learning.cache_bytes, *shards).is_some();
+    let usual = RenderOptions::default().shards;
+    (1..=usual).rev().find(fits).unwrap_or(usual)
 }
 
 /// Help of `--rrs`.
