@@ -37,7 +37,7 @@ pub struct Settings {
     /// better with them.
     pub aovs: bool,
     /// Give pixels with much error more samples, others fewer, from the second iteration on. Every pixel gets one at
-    /// least, and iterations are weighted as a whole, so that no pixel's mean hangs on its own noise.
+    /// least, and every iteration counts as much in all of them, so that no pixel's mean hangs on its own noise.
     pub adaptive: bool,
     /// Play roulette for shadow rays too, with the most efficient factor.
     pub shadow_roulette: bool,

@@ -22,7 +22,7 @@ impl Blocks {
     /// For a number of leaves or a little more.
     pub fn leaves(leaves: usize, shards: usize) -> Self {
         let size =
-            CacheSize::within((leaves + 4) * (2310 + 768 * shards) + 4096, shards as u32).expect("room for a cache");
+            CacheSize::within((leaves + 4) * (2054 + 768 * shards) + 4096, shards as u32).expect("room for a cache");
         Self::new(size, shards)
     }
 

@@ -368,6 +368,42 @@ fn what_is_looked_up() {
     }
 }
 
+/// What is looked up is what was gathered, up to the stated rounding, and bins that are not in use are empty. Killed by:
+/// fewer bits, rounding the other way, channels or moments that change places, whatever memory held.
+#[test]
+fn look_ups_round_as_stated() {
+    let ulp = 2f64.powi(-7);
+    for exponent in -12..=12 {
+        let mut blocks = Blocks::leaves(2, 1);
+        let (mut cache, mut shards) = blocks.carve(LO, HI);
+        let mut rng = SplitMix((90 + exponent) as u64);
+        let x = [(); 3].map(|()| (rng.range(1.0, 10.0) * 10f64.powi(exponent)) as f32);
+        let pair = x.map(|x| x * x * 0.3);
+        let t = &mut shards[0];
+        t.clear(cache.bins());
+        // so many that the surroundings, which are the same, and the spread, which is 0, do not count
+        for _ in 0..60_000 {
+            t.log(5, x, 3.0);
+            t.log_pair(5, pair);
+        }
+        cache.absorb(t);
+        cache.freeze(f64::INFINITY);
+        let l = cache.local(U32x8::splat(5), Mask8::all_lanes());
+        for c in 0..3 {
+            let (x, pair) = (f64::from(x[c]), f64::from(pair[c]));
+            let [mean, moment, variance] = [l.mean, l.moment, l.variance].map(|v| f64::from(v.lane(3)[c]));
+            // sums of 60,000 floats
+            let sums = 1e-3;
+            let within = |found: f64, low: f64, high: f64| found >= low * (1.0 - sums) && found <= high * (1.0 + sums);
+            assert!(within(mean, x * (1.0 - ulp), x), "{exponent}: mean {mean} of {x}");
+            assert!(within(moment, x * x, x * x * (1.0 + ulp)), "{exponent}: moment {moment} of {}", x * x);
+            assert!(within(variance, pair * (1.0 - ulp), pair), "{exponent}: variance {variance} of {pair}");
+        }
+        let beyond = cache.local(U32x8::splat(cache.bins()), Mask8::all_lanes());
+        assert_eq!((beyond.mean.lane(0), beyond.cost.lane(0), beyond.count.lane(0)), ([0.0; 3], 0.0, 0.0));
+    }
+}
+
 /// Absorbed in shard order, the bits do not depend on which shard worked first; in another order they may. Killed by:
 /// sums shared between shards, state that survives `clear`.
 #[test]

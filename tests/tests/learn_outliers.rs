@@ -1,9 +1,9 @@
 //! What the statistics leave out, and in which units first vertices are kept: one sample of enormous weight must not decide
 //! all factors.
 
+use croupier::Settings;
 use croupier::film::PixelStats;
 use croupier::learn::{Learning, PictureStatistics};
-use croupier::{Settings, Strategy};
 use croupier_host::description::*;
 use croupier_tests::cache::Oracle;
 use croupier_tests::runner::{Learned, Schedule, learning, settings};
@@ -13,8 +13,7 @@ const IN_ORDER: Schedule = Schedule::InOrder(1 << 20);
 /// Index of the octree of matte vertices that the camera sees.
 const FIRST_MATTE: u32 = 2;
 
-/// A picture of a sky of radiance 1 with lamps of 1e4 that cover a quarter of a pixel each, one in every `step`th pixel of some
-/// rows.
+/// A picture of a sky of radiance 1 with lamps of 1e4 that cover a quarter of a pixel each.
 fn starry(stars: usize) -> SceneDescription {
     let mut s = under_white_sky(camera([0.0; 3], [0.0, 0.0, -1.0], 90.0, [64, 64]));
     let lamp = s.add_material("lamp", grey(0.0));
@@ -76,10 +75,10 @@ fn moments_leave_fireflies_out() {
     // lights are chosen by power, and a scene of this size makes the sun's enormous
     add_quad(&mut s, "far", floor, facing_y(1e-3, 0.0, 1.0).map(|[x, y, z]| [x + 565.0, y, z]));
     add_quad(&mut s, "far", floor, facing_y(1e-3, 0.0, 1.0).map(|[x, y, z]| [x - 565.0, y, z]));
-    s.emitters.push(Emitter::Directional { direction: [0.0, -1.0, 0.0], irradiance: [1.0; 3] });
-    s.emitters.push(Emitter::Point { position: [0.0, 2.0, 0.0], intensity: [4.0; 3] });
+    s.emitters.push(Emitter::Directional { direction: [0.0, -1.0, 0.0], irradiance: [100.0; 3] });
+    s.emitters.push(Emitter::Point { position: [0.0, 2.0, 0.0], intensity: [400.0; 3] });
     // the other noise, without which every error would be an outlier
-    s.environment = Some(Environment::Constant { radiance: [0.3; 3] });
+    s.environment = Some(Environment::Constant { radiance: [30.0; 3] });
     let scene = blob(&s);
     let s = settings(&scene, "ears");
     let s =
@@ -92,26 +91,25 @@ fn moments_leave_fireflies_out() {
             sums = [0.0; 12];
             oracle.leaves[leaf].iter().flat_map(|bin| bin.iter().enumerate()).for_each(|(i, x)| sums[i] += x);
         });
-    // both moments over the squared radiance that the sun alone gives
-    let sun = (0.8 / std::f64::consts::PI).powi(2);
+    let sun = (80.0 / std::f64::consts::PI).powi(2);
     let moment = |p: &PixelStats| p.sum_sqr[0] / p.samples as f64;
     let seen = image.pixels.iter().map(moment).sum::<f64>() / image.pixels.len() as f64 / sun;
     let logged = sums[6] / sums[0];
     assert!(seen > 1000.0, "{seen}: no firefly was met, so nothing is tested");
-    assert!(sums[0] > 1e5 && logged < 20.0, "{logged} in units of the pixel's square, {seen} seen");
+    assert!(sums[0] > 1e5 && (0.3..3.0).contains(&logged), "{logged} in units of the pixel's square, {seen} seen");
 }
 
 /// Values at vertices that the camera sees are in units of their pixel: a bright and a dim picture of the same thing teach the
 /// same. Killed by: radiance, or radiance over albedo, in their place; a unit that is not that of the error.
 #[test]
 fn first_vertices_count_in_pixels() {
-    for radiance in [1.0f32, 100.0] {
+    for radiance in [0.1f32, 100.0] {
         let mut s = under_white_sky(camera([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], 40.0, [16, 16]));
         s.environment = Some(Environment::Constant { radiance: [radiance; 3] });
         let floor = s.add_material("floor", grey(0.5));
         add_quad(&mut s, "floor", floor, facing_y(1.0, 0.0, 1.0));
         let scene = blob(&s);
-        let s = Settings { max_depth: 2, strategy: Strategy::parse("ears").unwrap(), ..settings(&scene, "ears") };
+        let s = Settings { max_depth: 2, ..settings(&scene, "ears") };
         let mut mean = 0.0;
         learning(&scene, &s, &[256, 64, 64, 0], IN_ORDER, &mut |_, l: &mut dyn Learned| {
             let oracle = Oracle::new(&l.saved().unwrap());

@@ -85,6 +85,7 @@ fn strategies() -> Vec<String> {
         ("albedo", &["", ":product"]),
         ("classic", &["", ":1", ":5:relative", ":1:relative"]),
         ("winners", &["", ":0.3:1"]),
+        ("bolin-meyer", &["", ":plain"]),
         ("ear", &["", ":plain"]),
         ("ears", &["", ":plain"]),
         ("fixed", &[":0.7", ":1.5"]),
@@ -106,7 +107,7 @@ fn closed_boxes_have_their_radiance() {
             // the factors of its paths fall faster than their light: the variance grows with every segment
             "albedo:product" => 4,
             // splits more and more while that makes the pixel's own spread, which is 0, the only error
-            "bolin-meyer" => 3,
+            "bolin-meyer" | "bolin-meyer:plain" => 3,
             _ => 24,
         };
         let s = Settings { adaptive: strategy == "ears", ..learns(&scene, &strategy, depth) };

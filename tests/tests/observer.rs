@@ -29,6 +29,37 @@ impl Observer for Slow {
     }
 }
 
+/// A clock of its own: ten seconds for each iteration.
+#[derive(Default)]
+struct OwnClock(Mutex<f64>);
+
+impl Observer for OwnClock {
+    fn progress(&self, _: &Progress) {}
+
+    fn stop(&self) -> bool {
+        false
+    }
+
+    fn iteration(&self, _: &Film<'_>, _: f64) {
+        *self.0.lock().unwrap() += 10.0;
+    }
+
+    fn seconds(&self) -> Option<f64> {
+        Some(*self.0.lock().unwrap())
+    }
+}
+
+/// Targets in seconds are those of the observer's clock. Killed by: a clock that is not asked.
+#[test]
+fn observers_may_have_their_own_clock() {
+    let scene = bake(&builtin::cornell_box(), &BakeOptions::default(), |_, _| ()).unwrap();
+    let settings =
+        Settings { size: [8, 8], shards: 3, ..Settings::for_scene(&Scene::from_bytes(&scene.bytes).unwrap()) };
+    let options = Options { threads: 1, ..Options::new(settings, Target::Seconds(35.0)) };
+    let rendered = drive(&scene.bytes, &options, &OwnClock::default()).unwrap();
+    assert_eq!((rendered.iterations.len(), rendered.spp), (3, 3), "a fourth sample at 10 seconds each would pass it");
+}
+
 /// Killed by: showing the film before its shards are merged, counting the observer's time, leaving out the last iteration.
 #[test]
 fn iterations_are_shown_outside_the_clock() {

@@ -232,7 +232,7 @@ fn factors_are_the_most_efficient_ones() {
 /// picture taken for a picture without variance, confidence that shrinks with the samples.
 #[test]
 fn ignorance_is_classic() {
-    for strategy in ["ear", "ears", "ear:plain", "ears:plain", "bolin-meyer"] {
+    for strategy in ["ear", "ears", "ear:plain", "ears:plain", "bolin-meyer", "bolin-meyer:plain"] {
         for depth in [1, 5, 9] {
             let classic = factor("classic", 0.25, 0.5, depth);
             let with = |f: &dyn Fn(&mut Learned8)| {
@@ -264,7 +264,7 @@ fn ignorance_is_classic() {
 /// Killed by: a limit that is left out, that forgets the albedo, that raises factors above 1.
 #[test]
 fn roulette_does_not_raise_throughput_above_ten() {
-    for strategy in ["ear", "ears"] {
+    for strategy in ["ear", "ears", "bolin-meyer"] {
         for (beta, albedo, expected) in [(0.5, 0.5, MIN_FACTOR), (4.0, 0.5, 0.2), (16.0, 0.5, 0.8), (400.0, 0.5, 1.0)] {
             let v = learned(0.0, 1e-20, 1e-20, 1.0);
             let grey = |x: f32| Vec3x8::splat(x, x, x);

@@ -1,6 +1,7 @@
 //! Memory, settings and the order of calls: what is wrong is an error with its number, and what was rendered stays.
 
 use croupier::accel::WideBvh;
+use croupier::learn::Learning;
 use croupier::profile::{Full, Matte, Profile};
 use croupier::{
     BLOCK_ALIGN, Budget, Effects, MemoryError, Plan, Progress, Scene, Session, SessionError, Settings, SettingsError,
@@ -62,25 +63,47 @@ fn blocks_must_fit_to_the_byte() {
     }
 }
 
-/// Memory that held something else gives the same picture. Killed by: a block that is not zeroed.
+/// Memory that held something else gives the same picture, and the same is learned. Killed by: a slab that is read before it
+/// is written.
 #[test]
 fn blocks_may_hold_garbage() {
-    let bytes = blob(&cornell([10, 10]));
+    let bytes = blob(&cornell([20, 12]));
     let scene = Scene::from_bytes(&bytes).unwrap();
-    let settings = Settings { aovs: true, ..settings(&bytes, "fixed:1.5") };
-    let plan = Plan::new(&settings).unwrap();
-    let [mut shared, mut block] = [plan.session(), plan.shard()].map(|l| AlignedBytes::zeroed(l.size));
-    shared.as_mut().fill(0xff);
-    block.as_mut().fill(0xa5);
-    let mut session = start(&scene, &plan, shared.as_mut()).unwrap();
-    let mut shard = Shard::new(&plan, 0, block.as_mut()).unwrap();
-    session.begin_iteration(2);
-    finish(&session, &mut shard, 1000);
-    session.end_iteration([&shard]).unwrap();
-    let clean = render(&bytes, &settings, 2);
-    let film = session.film();
-    assert_eq!(bytemuck::cast_slice::<_, u8>(film.pixels()), bytemuck::cast_slice::<_, u8>(&clean.pixels));
-    assert_eq!(bytemuck::cast_slice::<_, u8>(film.aovs()), bytemuck::cast_slice::<_, u8>(&clean.aovs));
+    for strategy in ["fixed:1.5", "ears", "bolin-meyer"] {
+        let s = settings(&bytes, strategy);
+        let learning = Learning { cache_bytes: 1 << 20, split_count: 300.0, ..s.learning };
+        let plan = Plan::new(&Settings { aovs: true, adaptive: strategy == "ears", learning, ..s }).unwrap();
+        let run = |garbage: &dyn Fn(usize) -> u8| {
+            let [mut shared, mut block] = [plan.session(), plan.shard()].map(|l| AlignedBytes::zeroed(l.size));
+            for memory in [&mut shared, &mut block] {
+                memory.as_mut().iter_mut().enumerate().for_each(|(i, b)| *b = garbage(i));
+            }
+            let mut session = start(&scene, &plan, shared.as_mut()).unwrap();
+            let mut shard = Shard::new(&plan, 0, block.as_mut()).unwrap();
+            for samples in [8, 8, 16, 1] {
+                session.begin_iteration(samples);
+                finish(&session, &mut shard, 1000);
+                session.end_iteration([&shard]).unwrap();
+            }
+            let film = session.film();
+            let saved = session.cache().map(|c| {
+                let mut saved = vec![0; c.saved_len()];
+                c.save(&mut saved).unwrap();
+                saved
+            });
+            let leaves = session.cache().map_or(0, |c| c.leaves());
+            let bits = [bytemuck::cast_slice::<_, u8>(film.pixels()), bytemuck::cast_slice(film.aovs())].concat();
+            (bits, saved, *session.counters(), leaves)
+        };
+        let clean = run(&|_| 0);
+        assert!(strategy != "ears" || clean.3 > 10, "{} leaves", clean.3);
+        // NaNs and indices beyond everything; small floats; small integers
+        let garbage: [&dyn Fn(usize) -> u8; 3] =
+            [&|_| 0xff, &|_| 0xa5, &|i| if i % 4 == 0 { (i / 4 * 37 % 29) as u8 } else { 0 }];
+        for (i, g) in garbage.into_iter().enumerate() {
+            assert!(run(g) == clean, "{strategy}, garbage {i}");
+        }
+    }
 }
 
 /// Killed by: a limit off by one, pixels counted in 32 bits.

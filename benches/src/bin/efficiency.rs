@@ -236,7 +236,7 @@ impl Report<'_> {
 
     fn head(&self) -> String {
         let what = self.args.equal_samples.map_or_else(
-            || format!("{} s, one thread", digits(self.args.seconds())),
+            || format!("{} core-seconds, one thread", digits(self.args.seconds())),
             |n| format!("{n} samples per pixel"),
         );
         let n = self.args.seeds();

@@ -9,8 +9,8 @@
 //! difference:
 //!
 //! - Every render has a partner without roulette and with the same seed: their paths begin alike.
-//! - Where iterations have different weights, light that the camera sees directly differs all the same: the same render
-//!   with `max_depth` 1 is subtracted on both sides.
+//! - Where adaptive sampling gives pixels different numbers of samples, light that the camera sees directly differs all the
+//!   same: the same render with `max_depth` 1 is subtracted on both sides.
 //!
 //! How many seeds a row takes follows from a pilot with other seeds. A row that is not decided (or noisier than its pilot
 //! said) is rendered once more, longer, with new seeds, and they alone count. `threshold` is biased: its row is there to

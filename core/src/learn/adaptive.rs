@@ -2,8 +2,8 @@
 //!
 //! A pixel's error falls as variance over samples; the sum over the picture is least for a given work when the samples are
 //! as the square root of variance over cost. Numbers are the same for a tile of 8x8 pixels, because a pixel's own variance is
-//! mostly noise. Every pixel has one sample at least, and the weight of an iteration is that of the whole picture: were
-//! samples pooled, a pixel that happened to look dark and smooth would keep its error for ever.
+//! mostly noise. Every pixel has one sample at least, and an iteration counts as much in all of them: were samples
+//! pooled, a pixel that happened to look dark and smooth would keep its error for ever.
 
 use super::estimate::{Pixels, tile_of, tiles};
 use crate::film::{Film, SqrtNewton};

@@ -128,11 +128,10 @@ impl BinSums {
 pub(super) struct Frozen {
     count: f32,
     cost: f32,
-    mean: [u16; 3],
-    moment: [u16; 3],
-    variance: [u16; 3],
+    /// Mean, moment, variance, rgb each: two [`short`]s a word, the first below.
+    colors: [u32; 5],
     /// Makes rows of eight words.
-    reserved: [u16; 3],
+    reserved: u32,
 }
 
 /// `x`, between 0 and `max`; a NaN is 0.
@@ -140,23 +139,23 @@ fn saturate(x: f64, max: f32) -> f32 {
     if x > 0.0 { x.min(f64::from(max)) as f32 } else { 0.0 }
 }
 
-/// The upper half of a number that is finite and not negative: 8 significant bits. Rounded towards 0, so at most 0.8 % too small.
-fn short(x: f32) -> u16 {
-    (x.to_bits() >> 16) as u16
+/// The upper half of a number that is finite and not negative: 8 significant bits. Rounded towards 0: above 1e-38 by less than
+/// 2^-7 of it.
+fn short(x: f32) -> u32 {
+    x.to_bits() >> 16
 }
 
 /// Rounded up. [`MAX_SQUARE`] is a power of two, which stays what it is.
-fn short_above(x: f32) -> u16 {
+fn short_above(x: f32) -> u32 {
     short(f32::from_bits(x.to_bits() + 0xffff))
 }
 
-fn long(x: u16) -> f32 {
-    f32::from_bits(u32::from(x) << 16)
+fn long(x: u32) -> f32 {
+    f32::from_bits(x << 16)
 }
 
 impl Frozen {
-    pub(super) const ZERO: Self =
-        Self { count: 0.0, cost: 0.0, mean: [0; 3], moment: [0; 3], variance: [0; 3], reserved: [0; 3] };
+    pub(super) const ZERO: Self = Self { count: 0.0, cost: 0.0, colors: [0; 5], reserved: 0 };
 
     /// What is known of one sample with the sums `s`.
     fn of(s: &BinSums) -> Self {
@@ -164,8 +163,8 @@ impl Frozen {
         let n = s.count.max(1e-300);
         f.cost = saturate(s.cost / n, MAX_VALUE);
         f.count = saturate(s.count, MAX_VALUE);
-        let sums = s.sum.iter().zip(&s.sqr).zip(&s.pair);
-        let out = f.mean.iter_mut().zip(&mut f.moment).zip(&mut f.variance);
+        let ([mut mean, mut moment, mut variance], sums) = ([[0; 3]; 3], s.sum.iter().zip(&s.sqr).zip(&s.pair));
+        let out = mean.iter_mut().zip(&mut moment).zip(&mut variance);
         for (((mean, moment), variance), ((s1, s2), p)) in out.zip(sums) {
             let (m, m2) = (s1 / n, s2 / n);
             *mean = short(saturate(m, MAX_VALUE));
@@ -174,6 +173,8 @@ impl Frozen {
             let v = (p + SPREAD_PAIRS * spread) / (s.pairs + SPREAD_PAIRS);
             *variance = short(saturate(v, MAX_SQUARE)).min(*moment);
         }
+        let ([a, b, c], [d, e, g], [h, i, j]) = (mean, moment, variance);
+        f.colors = [a | b << 16, c | d << 16, e | g << 16, h | i << 16, j];
         f
     }
 }
@@ -193,8 +194,8 @@ pub(super) fn freeze_leaf(sums: &[BinSums], frozen: &mut [Frozen], prior: &BinSu
     }
 }
 
-/// What the cache knows of eight bins. All values are finite and none is negative; where `count` is 0 all are 0. Means and
-/// variances are up to 0.8 % too small, moments too large.
+/// What the cache knows of eight bins. All values are finite and none is negative; of a leaf without
+/// samples all are 0. Means and variances are up to 2^-7 (0.8 %) too small, moments too large.
 #[derive(Clone, Copy, Debug)]
 pub struct Local8 {
     /// Mean of the values.
@@ -217,7 +218,6 @@ impl Local8 {
         let [f0, f1, f2, f3, f4, f5, f6, f7] = rows;
         let rows = [row(f0), row(f1), row(f2), row(f3), row(f4), row(f5), row(f6), row(f7)];
         let [count, cost, a, b, c, d, e, _] = F32x8::transpose(rows);
-        // a word has two shorts, the first one below on every machine that blobs are for
         let below = |w: F32x8| F32x8::from_bits(w.to_bits() << 16);
         let above = |w: F32x8| F32x8::from_bits(w.to_bits() & U32x8::splat(0xffff_0000));
         Self {

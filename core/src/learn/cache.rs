@@ -150,10 +150,12 @@ impl<'m> Cache<'m> {
         U32x8::select(active, first + direction_bin(dir), U32x8::splat(u32::MAX))
     }
 
-    /// What is known of eight bins; 0 in inactive lanes.
+    /// What is known of eight bins; 0 in inactive lanes and for bins that are not in use.
     #[inline]
     pub fn local(&self, bin: U32x8, active: Mask8) -> Local8 {
-        let row = |b: u32| self.frozen.get(b as usize).unwrap_or(&Frozen::ZERO);
+        // beyond the bins in use lies whatever the caller's memory held
+        let used = self.frozen.get(..self.bins() as usize).unwrap_or(&[]);
+        let row = |b: u32| used.get(b as usize).unwrap_or(&Frozen::ZERO);
         let [a, b, c, d, e, f, g, h] = U32x8::select(active, bin, U32x8::splat(u32::MAX)).to_array();
         Local8::gather([row(a), row(b), row(c), row(d), row(e), row(f), row(g), row(h)])
     }

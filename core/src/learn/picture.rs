@@ -68,13 +68,16 @@ impl Picture {
         // errors are read six times; where there is room they are computed once
         let kept = pixels.lend();
         let error = |film: usize, sums: &PixelSums| {
+            // sums of finite samples may make errors that f32 does not hold
             error_of(film as u32, sums, learning.norm, pixels, allotment).min(f64::from(f32::MAX)) as f32
         };
         let mut n = 0u64;
         visit(&mut |film, sums| {
             if sums.samples > 0 {
                 n += 1;
-                kept.get_mut(film).into_iter().for_each(|e| *e = error(film, sums));
+                if let Some(e) = kept.get_mut(film) {
+                    *e = error(film, sums);
+                }
             }
         });
         let outliers = (n as f64 * OUTLIERS) as u64 + 1;

@@ -19,6 +19,7 @@ pub(crate) struct Root {
     pub target: Target,
     /// Samples that its splits have added.
     pub splits: u32,
+    /// Makes eight words of what [`Roots::targets`] reads.
     reserved: u32,
 }
 
@@ -49,6 +50,7 @@ pub(crate) struct Target8 {
 
 /// One record per lane read as a row: `target` and the words behind it.
 const ROW: usize = core::mem::offset_of!(Root, target) / 4;
+const _: () = assert!(ROW + 8 <= size_of::<Root>() / 4);
 
 /// A fixed slab of roots.
 #[derive(Debug)]

@@ -18,17 +18,14 @@ pub struct AlignedBytes {
 }
 
 impl AlignedBytes {
-    /// That many zeros.
+    /// That many zeros. The system provides large ones page by page when they are first touched.
     pub fn zeroed(length: usize) -> Self {
-        Self { lines: vec![Line::zeroed(); length.div_ceil(ALIGN)], length }
+        Self { lines: bytemuck::zeroed_vec(length.div_ceil(ALIGN)), length }
     }
 
     /// The same, or `None` where that much memory is not to be had.
     pub fn try_zeroed(length: usize) -> Option<Self> {
-        let mut lines = Vec::new();
-        lines.try_reserve_exact(length.div_ceil(ALIGN)).ok()?;
-        lines.resize(length.div_ceil(ALIGN), Line::zeroed());
-        Some(Self { lines, length })
+        Some(Self { lines: bytemuck::try_zeroed_vec(length.div_ceil(ALIGN)).ok()?, length })
     }
 }
 

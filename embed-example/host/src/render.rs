@@ -17,7 +17,7 @@ use std::fmt;
 pub enum Target {
     /// Samples per pixel, >= 1.
     Spp(u32),
-    /// Wall-clock seconds of rendering, > 0. No iteration begins that would pass them at the speed so far; one that has
+    /// Seconds of rendering, > 0, on the wall or by [`Observer::seconds`]. No iteration begins that would pass them at the speed so far; one that has
     /// begun is finished, and the first one, a sample per pixel, is rendered in any case. The image then depends on the
     /// machine.
     Seconds(f64),

@@ -48,7 +48,7 @@ pub struct Iteration {
     pub splits_refused: Option<u64>,
     /// Estimated relMSE of the picture afterwards; absent after a single sample.
     pub relmse_estimate: Option<f64>,
-    /// Wall-clock seconds.
+    /// Seconds, on the wall or by [`Observer::seconds`](crate::render::Observer::seconds).
     pub seconds: f64,
 }
 

@@ -41,12 +41,13 @@ impl SettingsFlags {
     }
 }
 
-/// The usual number of shards, less where their statistics do not fit. If not even those of one do, the core says so.
+/// The usual number of shards, less where their statistics do not fit. If not even those of one do, the core says what one
+/// needs.
 fn shards(options: &RenderOptions) -> u32 {
     let learns = Strategy::parse(&options.strategy).is_ok_and(|s| s.space().is_some());
     let fits = |shards: &u32| !learns || CacheSize::within(options.learning.cache_bytes, *shards).is_some();
     let usual = RenderOptions::default().shards;
-    (1..=usual).rev().find(fits).unwrap_or(usual)
+    (1..=usual).rev().find(fits).unwrap_or(1)
 }
 
 /// Help of `--rrs`.

@@ -20,7 +20,7 @@ pub struct Work {
     pub samples: u32,
     /// Rays of all kinds.
     pub rays: u64,
-    /// Wall-clock seconds.
+    /// Seconds, on the wall or by [`Observer::seconds`](crate::render::Observer::seconds).
     pub seconds: f64,
 }
 
