@@ -122,7 +122,8 @@ const PLANS: &[Plan] = &[
     Plan { quick: true, ..Plan::unbiased("classic") },
     Plan::unbiased("classic:5:relative"),
     Plan::unbiased("winners"),
-    Plan::unbiased("bolin-meyer"),
+    // its noise is skewed most: with a quarter of this it misses the mean score in water_caustic
+    Plan { effort: 4.0, ..Plan::unbiased("bolin-meyer") },
     Plan::unbiased("adrr"),
     Plan::unbiased("adrrs"),
     Plan::unbiased("ear"),
