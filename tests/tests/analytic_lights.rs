@@ -380,7 +380,7 @@ fn needles_shine_like_other_triangles() {
 }
 
 /// A point light within 1e-10 of what it lights is taken for one at that distance, and every such sample is counted. Killed by:
-/// a silent clamp, a count of other lanes or lights.
+/// a silent clamp, a count of other lights.
 #[test]
 fn lights_that_are_too_near_are_counted() {
     for (exponent, clamped) in [(0, false), (-32, false), (-40, true)] {

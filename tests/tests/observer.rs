@@ -2,6 +2,7 @@
 
 use croupier::{Film, Scene, Settings};
 use croupier_host::bake::{BakeOptions, bake};
+use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin;
 use croupier_host::drive::{Options, Unobserved, drive};
 use croupier_host::render::{Observer, Progress, Target};
@@ -29,6 +30,13 @@ impl Observer for Slow {
     }
 }
 
+/// The built-in scene in 8 x 8 pixels and three shards.
+fn small() -> (AlignedBytes, Settings) {
+    let scene = bake(&builtin::cornell_box(), &BakeOptions::default(), |_, _| ()).unwrap().bytes;
+    let settings = Settings { size: [8, 8], shards: 3, ..Settings::for_scene(&Scene::from_bytes(&scene).unwrap()) };
+    (scene, settings)
+}
+
 /// A clock of its own: ten seconds for each iteration.
 #[derive(Default)]
 struct OwnClock(Mutex<f64>);
@@ -52,24 +60,20 @@ impl Observer for OwnClock {
 /// Targets in seconds are those of the observer's clock. Killed by: a clock that is not asked.
 #[test]
 fn observers_may_have_their_own_clock() {
-    let scene = bake(&builtin::cornell_box(), &BakeOptions::default(), |_, _| ()).unwrap();
-    let settings =
-        Settings { size: [8, 8], shards: 3, ..Settings::for_scene(&Scene::from_bytes(&scene.bytes).unwrap()) };
+    let (scene, settings) = small();
     let options = Options { threads: 1, ..Options::new(settings, Target::Seconds(35.0)) };
-    let rendered = drive(&scene.bytes, &options, &OwnClock::default()).unwrap();
+    let rendered = drive(&scene, &options, &OwnClock::default()).unwrap();
     assert_eq!((rendered.iterations.len(), rendered.spp), (3, 3), "a fourth sample at 10 seconds each would pass it");
 }
 
 /// Killed by: showing the film before its shards are merged, counting the observer's time, leaving out the last iteration.
 #[test]
 fn iterations_are_shown_outside_the_clock() {
-    let scene = bake(&builtin::cornell_box(), &BakeOptions::default(), |_, _| ()).unwrap();
-    let settings =
-        Settings { size: [8, 8], shards: 3, ..Settings::for_scene(&Scene::from_bytes(&scene.bytes).unwrap()) };
+    let (scene, settings) = small();
     let options = Options { threads: 1, ..Options::new(settings, Target::Spp(9)) };
     let observer = Slow { pause: Duration::from_millis(300), ..Slow::default() };
     let start = Instant::now();
-    let rendered = drive(&scene.bytes, &options, &observer).unwrap();
+    let rendered = drive(&scene, &options, &observer).unwrap();
     let elapsed = start.elapsed();
 
     let seen = observer.seen.into_inner().unwrap();
@@ -77,5 +81,5 @@ fn iterations_are_shown_outside_the_clock() {
     assert_eq!(seen[4].1, rendered.pixels.iter().map(|p| p.mean()[0]).sum::<f64>());
     assert!(seen.windows(2).all(|w| w[0].2 <= w[1].2) && seen[4].2 <= rendered.seconds, "{seen:?}");
     assert!(rendered.seconds + 5.0 * observer.pause.as_secs_f64() <= elapsed.as_secs_f64(), "{}", rendered.seconds);
-    assert_eq!(rendered.hash(), drive(&scene.bytes, &options, &Unobserved).unwrap().hash());
+    assert_eq!(rendered.hash(), drive(&scene, &options, &Unobserved).unwrap().hash());
 }

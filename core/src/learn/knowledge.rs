@@ -190,8 +190,8 @@ impl<'m> Knowledge<'m> {
     /// All iterations weigh the same per sample, because other weights make pictures wrong. EARS merges iterations by inverse
     /// variance, but bright iterations are the noisy ones: pictures of 16 pixels with caustics came out 0.9 % too dark, and
     /// with weights by the variance or the work of earlier iterations up to 2 % too bright. As lengths double, little is lost
-    /// with the first ones, which have learned least. A quarter of the weight for the very first made the next pictures up to a
-    /// third worse and no later one better.
+    /// with the first ones, which have learned least. A quarter of the weight for the very first made the next pictures
+    /// worse and no later one better.
     pub(crate) fn weight_of(&self, film: usize) -> f64 {
         1.0 / self.allotment.share(film as u32)
     }

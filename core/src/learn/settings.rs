@@ -66,7 +66,7 @@ pub struct Learning {
     /// Samples in flight per shard that can be learned from.
     pub ledger: u32,
     /// Camera samples of a pixel that are learned from in every iteration, the first ones. More make statistics better
-    /// where pictures are small, and all iterations slower.
+    /// and iterations slower.
     pub samples: u32,
     /// Samples in a leaf of the octree at which it is divided (EARS: 40,000).
     pub split_count: f32,
