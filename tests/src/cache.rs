@@ -22,7 +22,7 @@ impl Blocks {
     /// For a number of leaves or a little more.
     pub fn leaves(leaves: usize, shards: usize) -> Self {
         let size =
-            CacheSize::within((leaves + 4) * (2054 + 768 * shards) + 4096, shards as u32).expect("room for a cache");
+            CacheSize::within((leaves + 4) * (2326 + 832 * shards) + 4096, shards as u32).expect("room for a cache");
         Self::new(size, shards)
     }
 
@@ -123,14 +123,17 @@ enum Node {
     Leaf(usize),
 }
 
+/// Of a bin: count, pairs, cost, sum (3), squared sum (3), pair sum (3), shadow rays, those that met nothing.
+pub type Sums = [f64; 14];
+
 /// What saved bytes mean, in f64.
 pub struct Oracle {
     nodes: Vec<Node>,
     roots: [usize; 4],
     lo: [f64; 3],
     edge: f64,
-    /// Per leaf and bin: count, pairs, cost, sum (3), squared sum (3), pair sum (3).
-    pub leaves: Vec<[[f64; 12]; 16]>,
+    /// Per leaf and bin.
+    pub leaves: Vec<[Sums; 16]>,
 }
 
 /// A leaf of the oracle.
@@ -162,7 +165,7 @@ impl Oracle {
             Node::Inner((0..8).map(|_| self.read(shape, sums)).collect())
         } else {
             let mut number = || f64::from_le_bytes(sums.next().unwrap().try_into().unwrap());
-            self.leaves.push([(); 16].map(|()| [(); 12].map(|()| number())));
+            self.leaves.push([(); 16].map(|()| [(); 14].map(|()| number())));
             Node::Leaf(self.leaves.len() - 1)
         };
         self.nodes.push(node);
@@ -214,10 +217,10 @@ pub fn height_and_azimuth(d: [f64; 3]) -> [f64; 2] {
     [height, y.atan2(x).rem_euclid(std::f64::consts::TAU)]
 }
 
-/// Puts other sums into saved bytes: `sums` gives count, pairs, cost, sum (3), squared sum (3) and pair sum (3) of a bin.
-pub fn overwrite(bytes: &mut [u8], mut sums: impl FnMut() -> [f64; 12]) {
+/// Puts other sums into saved bytes: `sums` gives those of a bin.
+pub fn overwrite(bytes: &mut [u8], mut sums: impl FnMut() -> Sums) {
     let at = sums_at(bytes);
-    for bin in bytes[at..].chunks_exact_mut(96) {
+    for bin in bytes[at..].chunks_exact_mut(112) {
         for (b, x) in bin.chunks_exact_mut(8).zip(sums()) {
             b.copy_from_slice(&x.to_le_bytes());
         }
@@ -226,17 +229,19 @@ pub fn overwrite(bytes: &mut [u8], mut sums: impl FnMut() -> [f64; 12]) {
 }
 
 /// Sums of a bin that have nothing to do with any scene, each number over many orders of magnitude; some bins are empty.
-pub fn random_sums(rng: &mut SplitMix) -> [f64; 12] {
+pub fn random_sums(rng: &mut SplitMix) -> Sums {
     let mut log = |lo: f64, hi: f64| (rng.range(lo.ln(), hi.ln())).exp();
     let (count, pairs) = (log(1.0, 1e5), log(1.0, 1e5));
     let mean = [(); 3].map(|()| log(1e-2, 10.0));
     let spread = [(); 3].map(|()| log(1e-3, 30.0));
     let cost = log(1.0, 30.0) * count;
     let pair = [(); 3].map(|()| log(1e-4, 100.0) * pairs);
+    let rays = log(1.0, 1e4);
+    let visible = rays * log(1e-6, 2.0);
     if log(1.0, 10.0) < 1.3 {
-        return [0.0; 12];
+        return [0.0; 14];
     }
     let of = |c: usize| mean[c] * count;
     let sqr = |c: usize| mean[c] * mean[c] * (1.0 + spread[c]) * count;
-    [count, pairs, cost, of(0), of(1), of(2), sqr(0), sqr(1), sqr(2), pair[0], pair[1], pair[2]]
+    [count, pairs, cost, of(0), of(1), of(2), sqr(0), sqr(1), sqr(2), pair[0], pair[1], pair[2], rays, visible]
 }

@@ -4,18 +4,16 @@
 //!
 //! For flat-shaded scenes of area lights without textures, lens and environment, and the absolute objective.
 
+use crate::cache::Sums;
 use croupier::accel::{Intersector, Ray8, WideBvh, offset, shadow_ray, surface_point};
 use croupier::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
+use croupier::learn::COST_SHADOW;
 use croupier::learn::cache::{Cache, Kind};
 use croupier::light::{LightSample8, PowerSelector, area_pdf, area_radiance, power_heuristic, sample};
 use croupier::rng::Key8;
 use croupier::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind};
 use croupier::simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
 use croupier::{Scene, camera};
-
-/// Count, pairs, cost, sum (3), squared sum (3), pair sum (3), as in a saved cache. Pair sums are those that pairs in random
-/// order have on average.
-pub type Sums = [f64; 12];
 
 /// What a replay needs to know.
 pub struct Replay<'a, 's> {
@@ -216,7 +214,7 @@ impl Replay<'_, '_> {
         let direct = f.f * light.radiance * (power_heuristic(light.pdf, f.pdf) / light.pdf);
         if light.valid.lane(0) && direct.any_positive().lane(0) {
             self.counted[0] += 1;
-            cost += 1.0;
+            cost += f64::from(COST_SHADOW);
             let ray = shadow_ray(v.p, v.ng, v.error, light.point, light.normal, light.point_error);
             if self.bvh.occluded(&ray, one()).none() {
                 x = rgb(direct);

@@ -7,8 +7,8 @@ use croupier::learn::{Estimate, Learning, Objective};
 use croupier::{Scene, Settings};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::description::{Model, Reflectance, SceneDescription};
-use croupier_tests::cache::{Oracle, overwrite};
-use croupier_tests::replay::{Replay, Sums};
+use croupier_tests::cache::{Oracle, Sums, overwrite};
+use croupier_tests::replay::Replay;
 use croupier_tests::runner::{Learned, Schedule, learning, scheduled, settings};
 use croupier_tests::scenes::*;
 
@@ -46,7 +46,7 @@ struct Both {
 }
 
 /// Statistics so large that every factor is the largest, 20.
-const GREEDY: Sums = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1e12, 1e12, 1e12, 0.0, 0.0, 0.0];
+const GREEDY: Sums = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1e12, 1e12, 1e12, 0.0, 0.0, 0.0, 0.0, 0.0];
 
 /// Renders `first` samples, then `second` ones with all factors 20; looks at the last of these iterations.
 fn both(description: &SceneDescription, max_depth: u32, iterations: &[u32]) -> Both {
@@ -82,7 +82,7 @@ fn both(description: &SceneDescription, max_depth: u32, iterations: &[u32]) -> B
         max_depth,
         size: s.size,
         factor: if greedy { 20 } else { 1 },
-        sums: vec![[0.0; 12]; 64],
+        sums: vec![[0.0; 14]; 64],
         counted: [0; 2],
     };
     let (before, spp) = if greedy { (iterations[0], iterations[1]) } else { (0, iterations[0]) };
@@ -239,7 +239,7 @@ fn only_complete_samples_are_logged() {
     let means = |ledger: u32, max_depth: u32| {
         let mut s = Settings { size: [16, 16], ..whole_leaves(&scene, max_depth) };
         s.learning.ledger = ledger;
-        let mut sums = [0.0; 12];
+        let mut sums = [0.0; 14];
         learning(&scene, &s, &[64, 0], IN_ORDER, &mut |i, l: &mut dyn Learned| {
             if i == 1 {
                 bins(l).iter().for_each(|b| (0..12).for_each(|k| sums[k] += b[k]));

@@ -328,6 +328,34 @@ fn random_statistics_do_not_bias() {
     }
 }
 
+/// As above, of visibilities alone: the other factors stay 1. Killed by: a shadow ray that is divided by another chance than
+/// it had, or that visibility cuts off.
+#[test]
+fn random_visibilities_do_not_bias() {
+    let scene = blob(&cornell([16, 16]));
+    let none = Known::of(&render(&scene, &Settings { seed: 8, ..learns(&scene, "none", 3) }, 14_000));
+    let (mut rays, mut kills) = (0, 0);
+    let one = |seed: u64| {
+        let mut s = Settings { seed, shadow_roulette: true, ..learns(&scene, "ears", 3) };
+        (s.learning.cache_bytes, s.learning.factors) = (32 << 10, [1.0, 1.0]);
+        let mut rng = SplitMix(seed);
+        let image = learning(&scene, &s, &[1, 3, 4], IN_ORDER, &mut |i, l: &mut dyn Learned| {
+            if i > 0 {
+                let mut bytes = l.saved().unwrap();
+                overwrite(&mut bytes, || random_sums(&mut rng));
+                l.load(&bytes).unwrap();
+            }
+        });
+        rays += image.counters.shadow_rays;
+        kills += image.counters.shadow_kills;
+        image.mean()
+    };
+    let known = Known::over((0..7000).map(one));
+    println!("{rays} shadow rays, {kills} spared");
+    assert!(kills > rays / 4);
+    assert_equivalent("random visibilities", known, none);
+}
+
 /// A random estimate of the pixels from the host. Killed by: an estimate that finds its way into the film.
 #[test]
 fn random_estimates_do_not_bias() {
@@ -352,7 +380,7 @@ fn random_estimates_do_not_bias() {
 fn loaded_statistics_do_not_bias() {
     let scene = blob(&cornell([16, 16]));
     let none = Known::of(&render(&scene, &Settings { seed: 12, ..learns(&scene, "none", 6) }, 30_000));
-    let s = Settings { seed: 13, ..learns(&scene, "ears", 6) };
+    let s = Settings { seed: 13, shadow_roulette: true, ..learns(&scene, "ears", 6) };
     let mut bytes = None;
     learning(&scene, &s, &[32, 32, 1], IN_ORDER, &mut |_, l: &mut dyn Learned| bytes = l.saved());
     let bytes = bytes.unwrap();

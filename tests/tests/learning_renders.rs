@@ -2,7 +2,7 @@
 
 use croupier::denoise::{Planes, scratch_len};
 use croupier::learn::cache::CacheSize;
-use croupier::learn::{Constant, Learning, Objective};
+use croupier::learn::{COST_SHADOW, Constant, Learning, Objective};
 use croupier::rrs::Norm;
 use croupier::{Scene, Settings};
 use croupier_host::bake::{BakeOptions, bake};
@@ -129,7 +129,7 @@ fn every_option_changes_the_picture() {
     let variants = [
         base.clone(),
         RenderOptions { adaptive: true, ..base.clone() },
-        RenderOptions { shadow_roulette: true, ..base.clone() },
+        RenderOptions { shadow_roulette: Some(false), ..base.clone() },
         RenderOptions { constant: Constant::Cached, ..base.clone() },
         RenderOptions { constant: Constant::Number(0.25), ..base.clone() },
         RenderOptions { learning: Learning { objective: Objective::Absolute, ..l }, ..base.clone() },
@@ -203,8 +203,9 @@ fn figures_fit_together() {
         }
         assert_eq!(strategy == "none", (s.paths.paths_per_sample - 1.0).abs() < 1e-9, "{s}");
         assert_eq!(s.iterations.iter().map(|i| i.samples).sum::<u32>(), 10);
-        let rays: f64 = s.iterations.iter().map(|i| i.cost * f64::from(i.samples)).sum();
-        near(rays * 48.0 * 40.0, stats.rays as f64);
+        let cost: f64 = s.iterations.iter().map(|i| i.cost * f64::from(i.samples)).sum();
+        let shadow_rays = stats.counters["shadow_rays"] as f64;
+        near(cost * 48.0 * 40.0, stats.rays as f64 - (1.0 - f64::from(COST_SHADOW)) * shadow_rays);
         let learns = factor.is_none();
         for i in &s.iterations {
             assert_eq!(i.variance.is_some(), learns);

@@ -59,6 +59,24 @@ impl Record {
     }
 }
 
+/// Shadow rays that a shard has traced in an iteration from a leaf towards a bin's directions.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct ShadowRecord {
+    rays: u16,
+    visible: u16,
+}
+
+impl ShadowRecord {
+    /// Adds a ray; a full record keeps the first ones.
+    pub(super) fn add(&mut self, visible: bool) {
+        if self.rays < u16::MAX {
+            self.rays += 1;
+            self.visible += u16::from(visible);
+        }
+    }
+}
+
 /// Sums over all iterations; f64, so that 1e9 samples lose nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -69,14 +87,26 @@ pub(super) struct BinSums {
     sum: [f64; 3],
     sqr: [f64; 3],
     pair: [f64; 3],
+    /// Shadow rays from the leaf towards the bin's directions, whatever the bins of their vertices.
+    rays: f64,
+    /// Those that met nothing.
+    visible: f64,
 }
 
 /// Numbers of a [`BinSums`].
 const FIELDS: usize = size_of::<BinSums>() / 8;
 
 impl BinSums {
-    pub(super) const ZERO: Self =
-        Self { count: 0.0, pairs: 0.0, cost: 0.0, sum: [0.0; 3], sqr: [0.0; 3], pair: [0.0; 3] };
+    pub(super) const ZERO: Self = Self {
+        count: 0.0,
+        pairs: 0.0,
+        cost: 0.0,
+        sum: [0.0; 3],
+        sqr: [0.0; 3],
+        pair: [0.0; 3],
+        rays: 0.0,
+        visible: 0.0,
+    };
 
     pub(super) fn fields(&self) -> &[f64; FIELDS] {
         bytemuck::cast_ref(self)
@@ -97,18 +127,40 @@ impl BinSums {
         }
     }
 
-    /// Adds `samples` samples, and as many pairs, that are what `prior` has on average.
+    /// Adds `samples` samples, and as many pairs and shadow rays, that are what `prior` has on average.
     pub(super) fn shrink(&mut self, prior: &Self, samples: f64) {
         if prior.count > 0.0 {
-            let (pairs, pair) = (self.pairs, self.pair);
+            let own = *self;
             self.add(prior, samples / prior.count);
-            (self.pairs, self.pair) = (pairs, pair);
+            (self.pairs, self.pair) = (own.pairs, own.pair);
+            (self.rays, self.visible) = (own.rays, own.visible);
         }
         if prior.pairs > 0.0 {
             let share = samples / prior.pairs;
             self.pairs += samples;
             self.pair.iter_mut().zip(prior.pair).for_each(|(a, b)| *a += share * b);
         }
+        if prior.rays > 0.0 {
+            self.rays += samples;
+            self.visible += samples * prior.visible / prior.rays;
+        }
+    }
+
+    /// Square root of the share of shadow rays that met nothing, in 255ths, rounded up; 255 where none is known.
+    fn visibility(&self) -> u8 {
+        let share = self.visible / self.rays;
+        if share < 1.0 {
+            let root = F32x8::splat(share as f32).sqrt().lane(0) * 255.0;
+            let floor = root as u8;
+            floor + u8::from(root > f32::from(floor))
+        } else {
+            u8::MAX
+        }
+    }
+
+    pub(super) fn absorb_shadows(&mut self, s: &ShadowRecord) {
+        self.rays += f64::from(s.rays);
+        self.visible += f64::from(s.visible);
     }
 
     pub(super) fn absorb(&mut self, r: &Record) {
@@ -180,15 +232,22 @@ impl Frozen {
 }
 
 /// What look-ups read of one leaf, whose surroundings have the sums `prior`. One without samples says so with `count` 0.
-pub(super) fn freeze_leaf(sums: &[BinSums], frozen: &mut [Frozen], prior: &BinSums, samples: f64) {
+pub(super) fn freeze_leaf(
+    sums: &[BinSums],
+    frozen: &mut [Frozen],
+    visibility: &mut [u8],
+    prior: &BinSums,
+    samples: f64,
+) {
     let mut leaf = BinSums::ZERO;
     sums.iter().for_each(|b| leaf.add(b, 1.0));
     let known = leaf.count > 0.0;
     leaf.shrink(prior, samples);
-    for (f, b) in frozen.iter_mut().zip(sums) {
+    for ((f, visibility), b) in frozen.iter_mut().zip(visibility).zip(sums) {
         let mut b = *b;
         let own = b.count;
         b.shrink(&leaf, samples);
+        *visibility = b.visibility();
         *f = if known { Frozen::of(&b) } else { Frozen::ZERO };
         f.count = saturate(own, MAX_VALUE);
     }

@@ -3,7 +3,8 @@
 //! An octree over the scene has 4x4 direction bins in every leaf. A bin keeps count, sums and squared sums of the
 //! *values* of samples (reflected radiance over albedo, linear rgb) that were drawn at vertices in it, and of their cost
 //! (rays). Sums also exist of half the squared difference of two samples of the same vertex: their mean is the variance
-//! at a point, whereas `moment - mean^2` has the spread of the mean over the cell in it as well.
+//! at a point, whereas `moment - mean^2` has the spread of the mean over the cell in it as well. And it keeps how many
+//! shadow rays from the leaf towards its directions met nothing.
 //!
 //! There are several octrees, for kinds of vertices that should not be mixed, and the direction is the caller's choice: see
 //! [`Kind`]. Shards look up in what [`Cache::freeze`] computed and log into their own [`Training`]; between iterations
@@ -48,7 +49,7 @@ impl CacheSize {
     pub const SMALLEST: Self = Self { splits: 0 };
 
     /// The largest cache whose shared side and `shards` training sides fit in `bytes` together; `None` if none does.
-    /// The smallest, four leaves that never split, takes 8.1 KiB and 3 KiB more for each shard.
+    /// The smallest, four leaves that never split, takes 9.2 KiB and 3.25 KiB more for each shard.
     pub fn within(bytes: usize, shards: u32) -> Option<Self> {
         let fits = |splits: u32| Self { splits }.bytes(shards).is_some_and(|b| b <= bytes);
         if !fits(0) {
@@ -85,6 +86,8 @@ pub struct Cache<'m> {
     pub(super) tree: Tree<'m>,
     pub(super) sums: &'m mut [BinSums],
     frozen: &'m mut [Frozen],
+    /// Roots of visibilities in 255ths, dense: they are read for other bins than `frozen` is.
+    visibility: &'m mut [u8],
     pub(super) size: CacheSize,
     /// What the units of first vertices hang on.
     pub(super) objective: Objective,
@@ -116,6 +119,7 @@ impl<'m> Cache<'m> {
         Tree::measure(m, Tree::nodes_for(size.splits), size.leaves())
             .add::<BinSums>(size.bins())
             .add::<Frozen>(size.bins())
+            .add::<u8>(size.bins())
     }
 
     pub(crate) fn carve(
@@ -126,7 +130,8 @@ impl<'m> Cache<'m> {
     ) -> Result<Self, MemoryError> {
         let tree = Tree::carve(c, Tree::nodes_for(size.splits), size.leaves(), lo, hi)?;
         let (sums, frozen) = (c.take_unset(size.bins())?, c.take_unset(size.bins())?);
-        let mut cache = Self { tree, sums, frozen, size, objective, splits_refused: 0, flat: None };
+        let visibility = c.take_unset(size.bins())?;
+        let mut cache = Self { tree, sums, frozen, visibility, size, objective, splits_refused: 0, flat: None };
         cache.reset();
         Ok(cache)
     }
@@ -150,6 +155,23 @@ impl<'m> Cache<'m> {
         U32x8::select(active, first + direction_bin(dir), U32x8::splat(u32::MAX))
     }
 
+    /// The bins of the same leaves as `bin` for other directions: unit vectors `dir`, world space. `u32::MAX` in inactive
+    /// lanes and where `bin` is no bin.
+    #[inline]
+    pub fn bins_towards(&self, bin: U32x8, dir: Vec3x8, active: Mask8) -> U32x8 {
+        let known = active & bin.lt(U32x8::splat(self.bins()));
+        self.bins_of(bin & U32x8::splat(!(BINS as u32 - 1)), dir, known)
+    }
+
+    /// Square root of the chance that a shadow ray from the leaf of a bin towards its directions meets nothing, rounded up
+    /// to 255ths; 1 where nothing is known and for bins that are not in use.
+    #[inline]
+    pub fn visibility_root(&self, bin: U32x8) -> F32x8 {
+        let used = self.visibility.get(..self.bins() as usize).unwrap_or(&[]);
+        let one = |b: u32| f32::from(used.get(b as usize).copied().unwrap_or(u8::MAX));
+        F32x8::new(bin.to_array().map(one)) / F32x8::splat(255.0)
+    }
+
     /// What is known of eight bins; 0 in inactive lanes and for bins that are not in use.
     #[inline]
     pub fn local(&self, bin: U32x8, active: Mask8) -> Local8 {
@@ -169,6 +191,7 @@ impl<'m> Cache<'m> {
     /// Adds what a shard gathered. Shards in order, so that the sums have the same bits whoever worked when.
     pub fn absorb(&mut self, t: &Training<'_>) {
         self.used_mut().iter_mut().zip(t.records()).for_each(|(b, r)| b.absorb(r));
+        self.used_mut().iter_mut().zip(t.shadows()).for_each(|(b, s)| b.absorb_shadows(s));
     }
 
     /// Ends the end of an iteration: splits leaves of more than `split_count` samples (taken as at least 1), then
@@ -266,8 +289,9 @@ impl<'m> Cache<'m> {
 
     fn freeze_one(&mut self, number: u32, prior: &BinSums, samples: f64) {
         let bins = number as usize * BINS..(number as usize + 1) * BINS;
-        if let (Some(s), Some(f)) = (self.sums.get(bins.clone()), self.frozen.get_mut(bins)) {
-            freeze_leaf(s, f, prior, samples);
+        let (sums, frozen) = (self.sums.get(bins.clone()), self.frozen.get_mut(bins.clone()));
+        if let (Some(s), Some(f), Some(v)) = (sums, frozen, self.visibility.get_mut(bins)) {
+            freeze_leaf(s, f, v, prior, samples);
         }
     }
 

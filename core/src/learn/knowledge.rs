@@ -121,6 +121,21 @@ impl<'m> Knowledge<'m> {
         (self.pixels.importance(film).map(|x| x / (share * share)), share)
     }
 
+    /// See [`Cache::bins_towards`].
+    #[inline]
+    pub(crate) fn bins_towards(&self, bin: U32x8, dir: Vec3x8, active: Mask8) -> U32x8 {
+        match &self.cache {
+            Some(c) => c.bins_towards(bin, dir, active),
+            None => U32x8::splat(u32::MAX),
+        }
+    }
+
+    /// See [`Cache::visibility_root`].
+    #[inline]
+    pub(crate) fn visibility_root(&self, bin: U32x8) -> F32x8 {
+        self.cache.as_ref().map_or(F32x8::ONE, |c| c.visibility_root(bin))
+    }
+
     /// Mean cost of a camera sample over its mean error; 0 while unknown.
     pub(crate) fn cost_over_variance(&self) -> f32 {
         self.picture.cost_over_variance()

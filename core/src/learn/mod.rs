@@ -23,8 +23,8 @@ pub use picture::PictureStatistics;
 pub use settings::{Constant, Learning, Objective};
 
 /// Relative cost of a camera ray. Costs are counted, never measured: the picture must not depend on a clock.
-pub(crate) const COST_CAMERA: f32 = 1.0;
+pub const COST_CAMERA: f32 = 1.0;
 /// Relative cost of a scattered ray and the shading around it.
-pub(crate) const COST_BOUNCE: f32 = 1.0;
-/// Relative cost of a shadow ray.
-pub(crate) const COST_SHADOW: f32 = 1.0;
+pub const COST_BOUNCE: f32 = 1.0;
+/// Relative cost of a shadow ray: it is over at the first hit, and no vertex waits at its end.
+pub const COST_SHADOW: f32 = 0.5;

@@ -3,7 +3,6 @@
 use super::adaptive::Allotment;
 use super::estimate::Pixels;
 use super::settings::Learning;
-use super::{COST_BOUNCE, COST_CAMERA, COST_SHADOW};
 use crate::film::{PixelSums, trimmed};
 use crate::rrs::Norm;
 use crate::tracer::Counters;
@@ -90,14 +89,13 @@ impl Picture {
         });
         pixels.take_back(kept);
         let n = n.max(1) as f64;
-        let mut s = PictureStatistics {
+        let work = counters.cost();
+        let s = PictureStatistics {
             variance: t.sum / t.count.max(1) as f64,
             outliers: t.rest / n,
-            cost: 0.0,
+            cost: work / counters.camera_samples.max(1) as f64,
             limit: f64::from(t.limit) * counters.camera_samples as f64 / n,
         };
-        let (work, cost) = cost_of(counters);
-        s.cost = cost;
 
         let old = self.weight * f64::from(learning.carry);
         self.weight = old + work;
@@ -112,13 +110,6 @@ impl Picture {
         self.last = s;
         self.first.get_or_insert(s);
     }
-}
-
-/// Counted work in all and per camera sample.
-fn cost_of(c: &Counters) -> (f64, f64) {
-    let cost = [(c.camera_rays, COST_CAMERA), (c.scatter_rays, COST_BOUNCE), (c.shadow_rays, COST_SHADOW)];
-    let work: f64 = cost.iter().map(|&(rays, cost)| rays as f64 * f64::from(cost)).sum();
-    (work, work / c.camera_samples.max(1) as f64)
 }
 
 /// Mean error of a pixel's samples against its estimate, weighted by its importance, normed over the channels; over the

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | 64 | [`Header`] |
 //! | nodes, padded to a multiple of 8 | shape: a byte per node, 1 inner, 0 leaf; parents first, children in order |
-//! | 1536 per leaf | sums of the leaves in the order of the shape |
+//! | 1792 per leaf | sums of the leaves in the order of the shape |
 //!
 //! All numbers are little-endian. The header says what the sums hang on: the bounds, which place the cells, and the
 //! objective, because values of [first vertices](super::cache::Kind::FirstMatte) are in units of their pixel under the
@@ -26,7 +26,7 @@ use core::fmt;
 /// First bytes of a saved cache.
 const MAGIC: u64 = u64::from_le_bytes(*b"CRPCACHE");
 /// Version of the format.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Largest sum: adding up such files, or squaring their means, stays finite.
 const MAX_SUM: f64 = 1e100;
 

@@ -1,7 +1,7 @@
 //! A shard's side of the cache: what it has gathered in the current iteration.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
-use super::bins::Record;
+use super::bins::{Record, ShadowRecord};
 use super::cache::CacheSize;
 use crate::memory::{Carver, Layout, Measure, MemoryError};
 
@@ -9,6 +9,7 @@ use crate::memory::{Carver, Layout, Measure, MemoryError};
 #[derive(Debug)]
 pub struct Training<'m> {
     records: &'m mut [Record],
+    shadows: &'m mut [ShadowRecord],
     used: usize,
 }
 
@@ -26,17 +27,18 @@ impl<'m> Training<'m> {
     }
 
     pub(crate) fn measure(m: Measure, size: CacheSize) -> Measure {
-        m.add::<Record>(size.bins())
+        m.add::<Record>(size.bins()).add::<ShadowRecord>(size.bins())
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, size: CacheSize) -> Result<Self, MemoryError> {
-        Ok(Self { records: c.take_unset(size.bins())?, used: 0 })
+        Ok(Self { records: c.take_unset(size.bins())?, shadows: c.take_unset(size.bins())?, used: 0 })
     }
 
     /// Forgets everything and takes samples of bins below `used_bins` ([`super::cache::Cache::bins`]).
     pub fn clear(&mut self, used_bins: u32) {
         self.used = (used_bins as usize).min(self.records.len());
         self.used_mut().fill(bytemuck::Zeroable::zeroed());
+        self.shadows_mut().fill(bytemuck::Zeroable::zeroed());
     }
 
     /// Adds a sample. Negative values count as 0, values above [`super::cache::MAX_VALUE`] as that.
@@ -59,8 +61,26 @@ impl<'m> Training<'m> {
         finite && self.used_mut().get_mut(bin as usize).is_some_and(|r| r.add_pair(half_squared_difference))
     }
 
+    /// Adds a shadow ray from a vertex in the leaf of `bin` towards its directions
+    /// ([`super::cache::Cache::bins_towards`]), and whether it met nothing. Bins that do not exist take none, nor
+    /// does one that has 65,535 of this iteration.
+    #[inline]
+    pub fn log_shadow(&mut self, bin: u32, visible: bool) {
+        if let Some(s) = self.shadows_mut().get_mut(bin as usize) {
+            s.add(visible);
+        }
+    }
+
     pub(super) fn records(&self) -> &[Record] {
         self.records.get(..self.used).unwrap_or(&[])
+    }
+
+    pub(super) fn shadows(&self) -> &[ShadowRecord] {
+        self.shadows.get(..self.used).unwrap_or(&[])
+    }
+
+    fn shadows_mut(&mut self) -> &mut [ShadowRecord] {
+        self.shadows.get_mut(..self.used).unwrap_or(&mut [])
     }
 
     fn used_mut(&mut self) -> &mut [Record] {

@@ -1,5 +1,7 @@
 //! What happened: work, lane utilisation and every event in which a bound was met.
 
+use crate::learn::{COST_BOUNCE, COST_CAMERA, COST_SHADOW};
+
 /// Lanes used of lanes offered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Utilisation {
@@ -87,6 +89,13 @@ impl Counters {
     /// Rays of all kinds.
     pub fn rays(&self) -> u64 {
         self.camera_rays + self.scatter_rays + self.shadow_rays
+    }
+
+    /// What efficiency is reckoned with: rays, each times its relative cost ([`crate::learn::COST_SHADOW`] and its like).
+    pub fn cost(&self) -> f64 {
+        let parts =
+            [(self.camera_rays, COST_CAMERA), (self.scatter_rays, COST_BOUNCE), (self.shadow_rays, COST_SHADOW)];
+        parts.iter().map(|&(rays, cost)| rays as f64 * f64::from(cost)).sum()
     }
 
     /// Paths: camera samples and what splitting added.

@@ -1,7 +1,7 @@
 //! Stage `roulette`: how many samples each arrived vertex gets. The masks n = 0 (the path ends) and n >= 1 (it waits with
 //! n samples) are the packet's roulette masks; one comb rounds the whole packet.
 
-use super::ledger::NO_RECORD;
+use super::ledger::{NO_BIN, NO_RECORD};
 use super::place::{Place8, place};
 use super::settle::Found8;
 use super::shard::Shard;
@@ -58,7 +58,7 @@ impl Shard<'_> {
         let v = &*a.vertex;
         let mut logged = None;
         let mut learned = Learned8::NONE;
-        if strategy.needs_image() {
+        if strategy.needs_image() || settings.shadow_roulette {
             let target = self.roots.targets(v.root, a.active);
             learned = knowledge.image8(target.importance);
             if let Some(space) = strategy.space() {
@@ -89,13 +89,15 @@ impl Shard<'_> {
             let found = Found8 { pixel: v.beta * c * rounded, local: a.weight * c * rounded };
             self.gather(a.active, v.root, v.ledger, &found);
         }
-        if let Some(p) = logged {
-            self.record_places(a.active, v, &p, a.weight / s);
+        if let Some(p) = &logged {
+            self.record_places(a.active, v, p, a.weight / s);
         }
         let (root, ledger, depth) = (v.root.to_array(), v.ledger.to_array(), v.depth.to_array());
         a.vertex.beta = v.beta / s;
         a.vertex.albedo_product *= a.albedo.mean();
         a.vertex.count = U32x8::new(n);
+        a.vertex.bin = logged.map_or(U32x8::splat(NO_BIN), |p| p.bin);
+        a.vertex.importance = learned.importance;
         let records = a.vertex.records();
         for i in a.active.lanes() {
             let Some(class) = MaterialKind::from_u32(a.kind[i]).filter(|_| n[i] > 0) else {

@@ -188,23 +188,33 @@ impl Shard<'_> {
         let radiance = v.beta * f.f * l.radiance * weight;
         let mut found = Found8 { pixel: radiance, local: f.f * l.radiance * weight };
         let mut mask = mask & (radiance.any_positive() | !radiance.is_finite());
+        let mut bin = None;
         if mask.any() && self.plan.settings().shadow_roulette {
-            mask = self.shadow_roulette(session, s, &mut found, mask);
+            let towards = session.knowledge().bins_towards(v.bin, l.wi, mask);
+            mask = self.shadow_roulette(session, s, towards, &mut found, mask);
+            bin = Some(towards);
         }
         if mask.none() {
             return;
         }
         let clear = self.occlude(session, s, l, mask);
+        if let (Some(training), Some(bin)) = (&mut self.training, bin) {
+            for i in mask.and_not(s.ledger.eq(U32x8::splat(NO_RECORD))).lanes() {
+                training.log_shadow(bin.lane(i), clear.lane(i));
+            }
+        }
         self.gather(clear, v.root, s.ledger, &found);
     }
 
-    /// Plays roulette for shadow rays: a light sample is a sample of known value and the cost of one ray, so the factor that
-    /// is best for it is that of EARS (eq. 32) with the square of its contribution as second moment (Veach 1997, section
-    /// 10.4.1, "efficiency-optimised Russian roulette", with the same idea of a threshold). The lanes that go on.
+    /// Plays roulette for shadow rays: a light sample has a known value if nothing hides it and costs one ray, so the factor
+    /// that is best for it is that of EARS (eq. 32) with the square of its value, times the learned chance that it is visible
+    /// (of `bin`), as second moment (Veach 1997, section 10.4.1, "efficiency-optimised Russian roulette", with the same idea of
+    /// a threshold). The lanes that go on.
     fn shadow_roulette<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
         session: &Session<'_, '_, P, I, L>,
         s: &LitSamples<'_>,
+        bin: U32x8,
         found: &mut Found8,
         mask: Mask8,
     ) -> Mask8 {
@@ -213,8 +223,8 @@ impl Shard<'_> {
             return mask;
         }
         let norm = self.plan.settings().learning.norm;
-        let error = norm.of(found.pixel * found.pixel * self.roots.targets(s.vertex.root, mask).importance);
-        let p = (error * F32x8::splat(ratio / COST_SHADOW)).sqrt();
+        let error = norm.of(found.pixel * found.pixel * s.vertex.importance);
+        let p = (error * F32x8::splat(ratio / COST_SHADOW)).sqrt() * session.knowledge().visibility_root(bin);
         let p = p.is_finite().select(p, F32x8::ONE).clamp(MIN_FACTOR, 1.0);
         let [u, ..] = s.key.uniforms(SHADOW_BLOCK);
         let on = mask & (u.lt(p) | p.ge(F32x8::ONE));

@@ -1,6 +1,7 @@
 //! Stage `surface`: what was hit, what it emits, and the vertex that it becomes.
 
 use super::flight::Flight8;
+use super::ledger::NO_BIN;
 use super::roulette::Arrival8;
 use super::settle::Found8;
 use super::shard::Shard;
@@ -84,6 +85,8 @@ impl Shard<'_> {
             ledger: f.ledger,
             count: U32x8::splat(0),
             next: U32x8::splat(0),
+            bin: U32x8::splat(NO_BIN),
+            importance: Vec3x8::ONE,
         };
         going &= s.scatters;
         let lanes_if = |wanted: bool, lanes: Mask8| if wanted { lanes } else { Mask8::NONE };

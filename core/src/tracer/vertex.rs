@@ -50,6 +50,10 @@ pub(crate) struct Vertex8 {
     pub count: U32x8,
     /// Number of the next sample.
     pub next: U32x8,
+    /// Its bin of the statistics, [`NO_BIN`](super::ledger::NO_BIN) if there is none.
+    pub bin: U32x8,
+    /// What a squared error of its rgb counts in the error of the picture, as far as settings ask for it; else 1.
+    pub importance: Vec3x8,
 }
 
 /// Row and column of the words that are read or changed while a vertex waits.
@@ -83,7 +87,6 @@ impl Vertex {
 impl Vertex8 {
     fn columns(&self) -> [[F32x8; 8]; 4] {
         let f = F32x8::from_bits;
-        let z = F32x8::ZERO;
         [
             [self.p.x, self.p.y, self.p.z, self.error, self.ng.x, self.ng.y, self.ng.z, f(self.material)],
             [self.ns.x, self.ns.y, self.ns.z, self.wo.x, self.wo.y, self.wo.z, f(self.root), f(self.depth)],
@@ -97,7 +100,16 @@ impl Vertex8 {
                 f(self.key.lo),
                 f(self.key.hi),
             ],
-            [self.albedo_product, f(self.ledger), f(self.count), f(self.next), z, z, z, z],
+            [
+                self.albedo_product,
+                f(self.ledger),
+                f(self.count),
+                f(self.next),
+                f(self.bin),
+                self.importance.x,
+                self.importance.y,
+                self.importance.z,
+            ],
         ]
     }
 
@@ -119,6 +131,8 @@ impl Vertex8 {
             ledger: e[1].to_bits(),
             count: e[2].to_bits(),
             next: e[3].to_bits(),
+            bin: e[4].to_bits(),
+            importance: Vec3x8::new(e[5], e[6], e[7]),
         }
     }
 
@@ -376,6 +390,8 @@ mod tests {
             albedo_product: f(25),
             count: u(26),
             next: u(27),
+            bin: u(29),
+            importance: v3(30),
             ledger: u(28),
         };
         let records = v.records();
@@ -389,7 +405,8 @@ mod tests {
             assert_eq!((back.key.lo.lane(i), back.key.hi.lane(i)), (v.key.lo.lane(7 - i), v.key.hi.lane(7 - i)));
             assert_eq!(back.albedo_product.lane(i), v.albedo_product.lane(7 - i));
             assert_eq!((back.count.lane(i), back.next.lane(i)), (v.count.lane(7 - i), v.next.lane(7 - i)));
-            assert_eq!(back.ledger.lane(i), v.ledger.lane(7 - i));
+            assert_eq!((back.ledger.lane(i), back.bin.lane(i)), (v.ledger.lane(7 - i), v.bin.lane(7 - i)));
+            assert_eq!(back.importance.lane(i), v.importance.lane(7 - i));
         }
     }
 }

@@ -65,8 +65,8 @@ pub struct RenderOptions {
     pub split_budget: Option<u32>,
     /// See [`Settings::adaptive`].
     pub adaptive: bool,
-    /// See [`Settings::shadow_roulette`].
-    pub shadow_roulette: bool,
+    /// See [`Settings::shadow_roulette`]. Absent: with `ear` and `ears`, whose rule it is.
+    pub shadow_roulette: Option<bool>,
     /// See [`Settings::constant`].
     pub constant: Constant,
     /// Choices of the strategies that learn.
@@ -94,7 +94,7 @@ impl Default for RenderOptions {
             ring: None,
             split_budget: None,
             adaptive: false,
-            shadow_roulette: false,
+            shadow_roulette: None,
             constant: Constant::default(),
             learning: Learning::default(),
             cache: None,
@@ -238,17 +238,19 @@ fn settings(scene: &Scene<'_>, options: &RenderOptions) -> Result<Settings, Rend
 
 /// `base` with the options that are given.
 fn choose(base: Settings, options: &RenderOptions) -> Result<Settings, RenderError> {
+    let strategy = Strategy::parse(&options.strategy).map_err(RenderError::Strategy)?;
+    let efficient = matches!(strategy, Strategy::Ear(_) | Strategy::Ears(_));
     Ok(Settings {
         size: options.size.unwrap_or(base.size),
         seed: options.seed,
         shards: options.shards,
         max_depth: options.max_depth.unwrap_or(base.max_depth),
-        strategy: Strategy::parse(&options.strategy).map_err(RenderError::Strategy)?,
+        strategy,
         ring: options.ring.unwrap_or(base.ring),
         split_budget: options.split_budget.unwrap_or(base.split_budget),
         aovs: true,
         adaptive: options.adaptive,
-        shadow_roulette: options.shadow_roulette,
+        shadow_roulette: options.shadow_roulette.unwrap_or(efficient),
         constant: options.constant,
         learning: options.learning,
     })

@@ -38,7 +38,7 @@ pub struct Iteration {
     pub variance: Option<f64>,
     /// Part of it in the worst pixels, which `variance` leaves out.
     pub outliers: Option<f64>,
-    /// Mean cost of a camera sample.
+    /// Mean counted cost of a camera sample ([`croupier::Counters::cost`]).
     pub cost: f64,
     /// 1 / (variance x cost).
     pub efficiency: Option<f64>,
@@ -97,7 +97,7 @@ impl Iteration {
     fn of(i: &IterationRecord, judged: bool) -> Self {
         // an iteration that was stopped may have measured nothing
         let picture = i.picture.filter(|p| p.cost > 0.0);
-        let cost = picture.map_or(i.work.rays as f64 / i.counters.camera_samples.max(1) as f64, |p| p.cost);
+        let cost = i.counters.cost() / i.counters.camera_samples.max(1) as f64;
         let variance = picture.map(|p| p.variance);
         Self {
             samples: i.work.samples,

@@ -266,7 +266,7 @@ fn every_flag_changes_the_picture() {
     let flags: [&[&str]; 17] = [
         &[],
         &["--adaptive"],
-        &["--shadow-roulette"],
+        &["--shadow-roulette=false"],
         &["--constant", "cached"],
         &["--constant", "0.25"],
         &["--objective", "absolute"],

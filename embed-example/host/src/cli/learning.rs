@@ -16,9 +16,9 @@ pub struct LearningFlags {
     /// More samples for pixels with much error, fewer for others
     #[arg(long)]
     adaptive: bool,
-    /// Roulette for shadow rays too
-    #[arg(long)]
-    shadow_roulette: bool,
+    /// Roulette for shadow rays too [default: true with ear and ears]
+    #[arg(long, value_name = "true|false", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    shadow_roulette: Option<bool>,
     /// What stands in for samples that roulette skips: off, cached (the learned mean) or a radiance
     #[arg(long, value_name = "off|cached|NUMBER", default_value = "off", value_parser = constant, allow_negative_numbers = true)]
     constant: Constant,
