@@ -132,7 +132,7 @@ fn usage_errors_are_status_2() {
 fn flags_that_do_not_fit_together_are_status_1() {
     let dir = tempfile::tempdir().unwrap();
     for (arguments, said) in [
-        (&["--cache-bytes", "56KiB", "--shards", "16"][..], "cache of 57344 bytes: with so many shards it needs"),
+        (&["--cache-bytes", "60KiB", "--shards", "16"][..], "cache of 61440 bytes: with so many shards it needs"),
         (&["--cache-bytes", "11KiB"], "cache of 11264 bytes: with so many shards it needs"),
         (&["--shards", "65536"], "cache of 25165824 bytes: with so many shards it needs"),
         (&["--constant", "0.5", "--rrs", "threshold"], "cannot serve threshold"),
@@ -145,7 +145,7 @@ fn flags_that_do_not_fit_together_are_status_1() {
             assert!(error.contains(said) && error.lines().count() == 1, "{arguments:?}: {error}");
         }
     }
-    for fit in [&["--cache-bytes", "56KiB", "--shards", "15"][..], &["--cache-bytes", "32KiB"]] {
+    for fit in [&["--cache-bytes", "60KiB", "--shards", "15"][..], &["--cache-bytes", "32KiB"]] {
         let out = croupier(dir.path(), &[&["info", "missing.crp"], fit].concat());
         assert!(text(&out.stderr).contains("cannot read missing.crp"), "{fit:?}: {}", text(&out.stderr));
     }
