@@ -228,14 +228,15 @@ pub(super) fn sample(scene: &Scene<'_>, words: [U32x8; 3], mask: Mask8) -> Light
 /// choice of row and cell in 2^-24 of the cases only.
 #[inline(always)]
 fn sample_map(scene: &Scene<'_>, e: &Environment, words: [U32x8; 3], mask: Mask8) -> Vec3x8 {
-    let (r_row, r_column) = (words[0].to_array(), words[1].to_array());
-    let (mut row, mut column) = ([0; 8], [0; 8]);
-    for i in mask.lanes() {
-        // Without tables (a black map) the first cell, whose density is 0.
-        let or_first = |k: u32| if k == NONE { 0 } else { k };
-        row[i] = or_first(pick(table(scene, e, None), r_row[i]));
-        column[i] = or_first(pick(table(scene, e, Some(row[i])), r_column[i]));
-    }
+    // lanes outside the mask read the first entries, which are near
+    let [r_row, r_column] = [words[0], words[1]].map(|w| U32x8::select(mask, w, U32x8::splat(0)));
+    // without tables (a black map) the first cell, whose density is 0
+    let or_first = |k: U32x8| U32x8::select(k.eq(U32x8::splat(NONE)), U32x8::splat(0), k);
+    let rows = e.height.max(2) - 1;
+    let row = or_first(pick(scene.env_alias, U32x8::splat(0), rows, r_row));
+    let start = U32x8::splat(rows) + row * U32x8::splat(e.width);
+    let column = or_first(pick(scene.env_alias, start, e.width, r_column));
+    let (row, column) = (row.to_array(), column.to_array());
     let low = |w: U32x8| (w & U32x8::splat(0xff)) << 8;
     let u0 = ((words[2] & U32x8::splat(0xffff_0000)) | low(words[0])).to_unit();
     let u1 = ((words[2] << 16) | low(words[1])).to_unit();
