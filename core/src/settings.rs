@@ -39,8 +39,8 @@ pub struct Settings {
     /// Give pixels with much error more samples, others fewer, from the second iteration on. Every pixel gets one at
     /// least, and every iteration counts as much in all of them, so that no pixel's mean hangs on its own noise.
     pub adaptive: bool,
-    /// Play roulette for shadow rays too, with the most efficient factor. Strategies that learn over the scene also learn
-    /// where light samples are hidden. Worth it with [`crate::rrs::Ears`], whose rule it is.
+    /// Play roulette for shadow rays too, with the most efficient factor. Strategies that learn also
+    /// learn where light samples are hidden. Worth it with [`crate::rrs::Ears`], whose rule it is.
     pub shadow_roulette: bool,
     /// What stands in for samples that roulette skips.
     pub constant: Constant,

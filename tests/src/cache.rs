@@ -91,6 +91,7 @@ pub fn iterate(cache: &mut Cache<'_>, shards: &mut [Training<'_>], n: usize, spl
             let x = [(); 3].map(|()| (rng.bits() >> 58) as f32 / 1024.0);
             assert!(t.log(bin, x, (rng.bits() >> 61) as f32));
             assert!(t.log_pair(bin, x));
+            assert!(t.log_shadow(bin, x[0] < 0.02));
         }
     }
     cache.begin_merge(1.0);

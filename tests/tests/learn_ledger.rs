@@ -118,7 +118,7 @@ fn check(what: &str, b: &Both) {
     assert!((samples - b.counted[0][1] as f64).abs() < 1e-6, "{what}: {samples} of {} samples logged", b.counted[0][1]);
     for (bin, (m, o)) in b.machine.iter().zip(&b.oracle).enumerate() {
         for field in 0..9 {
-            // counts, pairs and costs are whole numbers
+            // counts and pairs are whole numbers, costs whole halves
             let tolerance = if field < 3 { 1e-6 } else { 1e-3 + 2e-5 * o[field] };
             let off = (m[field] - o[field]).abs();
             assert!(off <= tolerance, "{what}: bin {bin}, field {field}: {} for {}", m[field], o[field]);
@@ -228,6 +228,28 @@ fn a_full_ledger_changes_no_picture() {
             }
         }
     }
+}
+
+/// Shadow rays that play roulette leave the means of what is logged alone, within 1 %. Killed by: contributions that are divided
+/// by their chance in the picture only.
+#[test]
+fn shadow_roulette_does_not_change_what_is_logged() {
+    let scene = blob(&cornell([16, 16]));
+    let mean = |shadow_roulette: bool| {
+        let mut s = Settings { size: [16, 16], shadow_roulette, ..whole_leaves(&scene, 6) };
+        (s.learning.carry, s.learning.factors) = (0.0, [1.0, 1.0]);
+        let mut sums = [0.0; 14];
+        let image = learning(&scene, &s, &[16, 512, 0], IN_ORDER, &mut |i, l: &mut dyn Learned| {
+            if i == 2 {
+                bins(l).iter().for_each(|b| (0..14).for_each(|k| sums[k] += b[k]));
+            }
+        });
+        (sums[3] / sums[0], image.counters.shadow_kills, image.counters.shadow_rays)
+    };
+    let ((without, none, _), (with, kills, rays)) = (mean(false), mean(true));
+    println!("{with} for {without}, {kills} of {rays} shadow rays spared");
+    assert!(none == 0 && kills > rays / 10);
+    assert!((with / without - 1.0).abs() < 0.01, "{with} for {without}");
 }
 
 /// Complete samples only: with a small ledger a bin's samples cost at least what any sample costs, and where paths have one

@@ -224,6 +224,7 @@ fn choices_do_not_bias() {
     let c = check("shadow roulette", "ears", &|s| s.shadow_roulette = true);
     assert!(c.shadow_kills > c.shadow_rays / 50, "{c:?}");
     check("shadow roulette", "classic", &|s| s.shadow_roulette = true);
+    check("shadow roulette", "bolin-meyer", &|s| s.shadow_roulette = true);
     check("cached constant", "ears", &|s| s.constant = Constant::Cached);
     check("cached constant", "ear:plain", &|s| s.constant = Constant::Cached);
     check("constant of 0.3", "fixed:0.7", &|s| s.constant = Constant::Number(0.3));

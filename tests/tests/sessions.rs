@@ -72,7 +72,9 @@ fn blocks_may_hold_garbage() {
     for strategy in ["fixed:1.5", "ears", "bolin-meyer"] {
         let s = settings(&bytes, strategy);
         let learning = Learning { cache_bytes: 1 << 20, split_count: 300.0, ..s.learning };
-        let plan = Plan::new(&Settings { aovs: true, adaptive: strategy == "ears", learning, ..s }).unwrap();
+        let learns = strategy != "fixed:1.5";
+        let s = Settings { aovs: true, adaptive: strategy == "ears", shadow_roulette: learns, learning, ..s };
+        let plan = Plan::new(&s).unwrap();
         let run = |garbage: &dyn Fn(usize) -> u8| {
             let [mut shared, mut block] = [plan.session(), plan.shard()].map(|l| AlignedBytes::zeroed(l.size));
             for memory in [&mut shared, &mut block] {

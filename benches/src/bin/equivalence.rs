@@ -95,6 +95,8 @@ enum Trial {
     Cache,
     /// All of that, with blocks for the denoiser, roulette for shadow rays and a cached constant.
     Small,
+    /// Roulette for shadow rays.
+    Shadow,
     /// Samples where the error is.
     Adaptive,
     /// Every second iteration begins with a cache that another session saved half-way.
@@ -113,6 +115,7 @@ impl Trial {
             Self::Ledger => ", ledger of 4",
             Self::Cache => ", cache of 16 KiB",
             Self::Small => ", everything small",
+            Self::Shadow => ", shadow roulette",
             Self::Adaptive => ", adaptive",
             Self::Reloaded => ", reloaded cache",
             Self::Poisoned => ", poisoned cache",
@@ -126,6 +129,7 @@ impl Trial {
             Self::Ring => s.ring = MIN_RING,
             Self::Ledger => s.learning.ledger = 4,
             Self::Cache => s.learning.cache_bytes = 16 << 10,
+            Self::Shadow => s.shadow_roulette = true,
             Self::Adaptive => s.adaptive = true,
             Self::Poisoned => s.learning.cache_bytes = 32 << 10,
             Self::Budget => s.split_budget = 4,
@@ -141,6 +145,7 @@ impl Trial {
         match self {
             Self::None | Self::Cache | Self::Adaptive | Self::Reloaded => true,
             Self::Ring => c.ring_capped > 0,
+            Self::Shadow => c.shadow_kills > c.shadow_rays / 50,
             Self::Ledger | Self::Small => c.ledger_full > c.samples_logged,
             Self::Poisoned => c.roulette_kills > c.camera_samples / 20 && c.splits > c.camera_samples / 20,
             Self::Budget => c.budget_capped > 0,
@@ -205,7 +210,8 @@ const CBOX: &[Row] = &[
     plain("adrrs"),
     plain("ear"),
     plain("ear:plain"),
-    quick(plain("ears")),
+    plain("ears"),
+    quick(tried("ears", Trial::Shadow)),
     plain("ears:plain"),
     quick(plain("fixed:0.7")),
     short("fixed:3.3", Trial::None, 4, &[8]),
@@ -239,7 +245,8 @@ const VEACH_MIS: &[Row] = &[
     plain("adrr"),
     plain("adrrs"),
     plain("ear"),
-    quick(plain("ears")),
+    plain("ears"),
+    quick(tried("ears", Trial::Shadow)),
     plain("ears:plain"),
     calm(plain("fixed:0.7")),
     tried("adrrs", Trial::Ledger),
@@ -266,7 +273,8 @@ const MATERIAL_SPHERES: &[Row] = &[
     plain("adrr"),
     calm(plain("adrrs")),
     calm(plain("ear")),
-    calm(quick(plain("ears"))),
+    calm(plain("ears")),
+    calm(quick(tried("ears", Trial::Shadow))),
     calm(short("fixed:0.7", Trial::None, 4, USUAL)),
     calm(short("fixed:3.3", Trial::None, 3, &[8])),
     calm(short("fixed:20", Trial::None, 2, &[4])),

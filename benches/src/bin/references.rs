@@ -19,8 +19,9 @@
 //! expected, or the scenes are not there; 1 otherwise.
 
 use clap::Parser;
-use croupier::{Scene, Settings, Strategy};
+use croupier::{Scene, Settings};
 use croupier_benches::subject::Subject;
+use croupier_benches::variant::Variant;
 use croupier_host::compare::{Bias, BiasOptions, BlockZ, Estimate, Ratio, block_scores, ratio};
 use croupier_host::drive::{Options, Unobserved, drive_scene};
 use croupier_host::image::{Picture, Rgb};
@@ -47,7 +48,8 @@ struct Args {
     /// Only these scenes.
     #[arg(long = "scene", value_name = "NAME")]
     only: Vec<String>,
-    /// Instead of the table's strategies these (any that `croupier render --rrs` knows), expected to be unbiased.
+    /// Instead of the table's strategies these (any that `croupier render --rrs` knows, and choices as in `efficiency`),
+    /// expected to be unbiased.
     #[arg(long = "strategy", value_name = "NAME")]
     strategies: Vec<String>,
     /// Independent seeds per row, at least 2.
@@ -127,7 +129,9 @@ const PLANS: &[Plan] = &[
     Plan::unbiased("adrr"),
     Plan::unbiased("adrrs"),
     Plan::unbiased("ear"),
-    Plan { quick: true, effort: 0.5, ..Plan::unbiased("ears") },
+    Plan { effort: 0.5, ..Plan::unbiased("ears") },
+    // what the program does by default
+    Plan { quick: true, effort: 0.5, ..Plan::unbiased("ears+shadow") },
     Plan { effort: 0.5, ..Plan::unbiased("ears:plain") },
     Plan { effort: 1.5, ..Plan::unbiased("fixed:0.7") },
     Plan { quick: true, split_budget: FEW_SPLITS, effort: 0.125, ..Plan::unbiased("fixed:2") },
@@ -254,10 +258,14 @@ fn test(subject: &Subject, spp: u32, args: &Args, plan: &Plan, strategy: &str) -
     let settings = Settings {
         shards: 16,
         max_depth: plan.depth.unwrap_or(base.max_depth),
-        strategy: Strategy::parse(strategy)?,
         split_budget: plan.split_budget,
         ..base
     };
+    let variant = Variant::parse(strategy)?;
+    if variant.truth() {
+        return Err(format!("{strategy}: nothing is told the truth here").into());
+    }
+    let settings = variant.apply(settings);
     let (mut images, mut mrays) = (Vec::new(), 0.0);
     for seed in 0..u64::from(args.seeds) {
         let settings = Settings { seed: args.first_seed.wrapping_add(seed), ..settings };

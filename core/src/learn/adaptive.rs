@@ -98,7 +98,7 @@ impl<'m> Allotment<'m> {
         f64::from((to[0] - from[0]) * (to[1] - from[1]))
     }
 
-    /// sqrt(variance / cost) of a tile's samples.
+    /// sqrt(variance / cost) of a tile's samples. Pixels count their rays, of whatever kind, so the cost is their number.
     fn wish(&self, tile: u32, film: &Film<'_>, pixels: &Pixels<'_>) -> f64 {
         let [from, to] = self.corners(tile);
         let (mut error, mut rays) = (0.0, 0.0);

@@ -68,12 +68,14 @@ pub(super) struct ShadowRecord {
 }
 
 impl ShadowRecord {
-    /// Adds a ray; a full record keeps the first ones.
-    pub(super) fn add(&mut self, visible: bool) {
-        if self.rays < u16::MAX {
-            self.rays += 1;
-            self.visible += u16::from(visible);
+    /// Adds a ray; `false` if the record is full.
+    pub(super) fn add(&mut self, visible: bool) -> bool {
+        if self.rays == u16::MAX {
+            return false;
         }
+        self.rays += 1;
+        self.visible += u16::from(visible);
+        true
     }
 }
 
@@ -263,7 +265,7 @@ pub struct Local8 {
     pub moment: Vec3x8,
     /// Their variance at a point, without the spread of the mean over the cell as far as pairs tell; at most `moment`.
     pub variance: Vec3x8,
-    /// Mean cost of a sample, rays.
+    /// Mean counted cost of a sample ([`crate::learn::COST_BOUNCE`] and its like).
     pub cost: F32x8,
     /// Confidence: samples of the bin itself, older ones discounted. Its surroundings, which the other numbers lean on, do
     /// not count.

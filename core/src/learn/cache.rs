@@ -1,8 +1,8 @@
 //! The cache of statistics by place and direction (EARS, SIGGRAPH 2022, section 5; Müller et al. 2017 for the tree).
 //!
 //! An octree over the scene has 4x4 direction bins in every leaf. A bin keeps count, sums and squared sums of the
-//! *values* of samples (reflected radiance over albedo, linear rgb) that were drawn at vertices in it, and of their cost
-//! (rays). Sums also exist of half the squared difference of two samples of the same vertex: their mean is the variance
+//! *values* of samples (reflected radiance over albedo, linear rgb) that were drawn at vertices in it, and of their
+//! counted cost. Sums also exist of half the squared difference of two samples of the same vertex: their mean is the variance
 //! at a point, whereas `moment - mean^2` has the spread of the mean over the cell in it as well. And it keeps how many
 //! shadow rays from the leaf towards its directions met nothing.
 //!

@@ -37,7 +37,7 @@ pub(super) struct Picture {
     pub last: PictureStatistics,
     /// Of all, older ones discounted.
     pub blended: PictureStatistics,
-    /// What `blended` weighs: rays.
+    /// What `blended` weighs: counted cost.
     weight: f64,
     /// Of the first iteration.
     first: Option<PictureStatistics>,

@@ -18,6 +18,7 @@ impl Ear {
 
 impl RrsStrategy for Ear {
     const NEEDS_ALBEDO: bool = true;
+    const EFFICIENCY_AWARE: bool = true;
     const SPACE: Option<Space> = Some(Space::Scene);
 
     #[inline(always)]

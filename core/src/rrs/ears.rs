@@ -88,6 +88,7 @@ pub(super) fn grown(v: &Vertices8, s: F32x8, plain: bool) -> F32x8 {
 
 impl RrsStrategy for Ears {
     const NEEDS_ALBEDO: bool = true;
+    const EFFICIENCY_AWARE: bool = true;
     const SPACE: Option<Space> = Some(Space::Scene);
 
     #[inline(always)]

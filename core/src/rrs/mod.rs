@@ -73,6 +73,9 @@ pub trait RrsStrategy {
     /// Does it read `shininess`?
     const NEEDS_SHININESS: bool = false;
 
+    /// Is its factor the most efficient one (EARS, eq. 32), the rule of shadow roulette ([`crate::Settings::shadow_roulette`])?
+    const EFFICIENCY_AWARE: bool = false;
+
     /// Does it read the picture's part of `learned`?
     const NEEDS_IMAGE: bool = false;
 
@@ -127,6 +130,11 @@ macro_rules! strategies {
                 self.space().is_some() || match self {
                     $(Self::$name(x) => <$name as RrsStrategy>::NEEDS_IMAGE && x.plays_relative()),*
                 }
+            }
+
+            /// See [`RrsStrategy::EFFICIENCY_AWARE`].
+            pub fn is_efficiency_aware(&self) -> bool {
+                match self { $(Self::$name(_) => <$name as RrsStrategy>::EFFICIENCY_AWARE),* }
             }
 
             /// See [`RrsStrategy::SPACE`].

@@ -59,6 +59,8 @@ pub struct Counters {
     /// Samples that were not learned from because their bin had enough of this iteration ([`crate::learn::cache::BIN_LIMIT`]),
     /// or because a number overflowed. Many of them: the statistics lean to the first tiles of each shard.
     pub samples_refused: u64,
+    /// Shadow rays whose visibility was not learned from because their bin had 65,535 of this iteration.
+    pub shadows_refused: u64,
     /// Samples without a ledger record because the slab was full: they, and those they are part of, were not learned from.
     pub ledger_full: u64,
     /// Vertices whose factor was not a finite number and became 1.
@@ -118,6 +120,7 @@ impl Counters {
         self.path_segments += o.path_segments;
         self.samples_logged += o.samples_logged;
         self.samples_refused += o.samples_refused;
+        self.shadows_refused += o.shadows_refused;
         self.ledger_full += o.ledger_full;
         self.factors_not_finite += o.factors_not_finite;
         self.hard_stopped += o.hard_stopped;

@@ -1,7 +1,7 @@
 //! What each sample gave: a fixed slab with one record per unfinished sample, nested like the samples themselves.
 //!
 //! A record belongs to one sample of a vertex (one light sample and one bounce) or to a camera sample. It gathers the
-//! sample's own estimate of reflected radiance, without any weight of the path before it, and its rays. The bounce ends at
+//! sample's own estimate of reflected radiance, without any weight of the path before it, and its cost. The bounce ends at
 //! one vertex at most; what the samples of that vertex give comes back times `inner` (bounce weight over the vertex's
 //! factor). When the last of them is closed the sample is finished: it is logged to the bin of *its* vertex, which its
 //! parent record holds, and folded into the parent (EARS, SIGGRAPH 2022, algorithm 2, without the recursion).
@@ -32,7 +32,7 @@ const OPEN: u32 = HAS_LAST - 1;
 struct Record {
     /// Estimate so far, rgb.
     radiance: [f32; 3],
-    /// Rays so far.
+    /// Counted cost so far.
     cost: f32,
     /// What the vertex at the end of the bounce gives counts this much: bounce weight over factor.
     inner: [f32; 3],
@@ -55,7 +55,7 @@ pub(crate) struct Finished {
     pub bin: u32,
     /// Scaled estimate, rgb.
     pub value: [f32; 3],
-    /// Rays.
+    /// Counted cost.
     pub cost: f32,
     /// Half the squared difference from the sample of the same vertex that finished before it.
     pub pair: Option<[f32; 3]>,

@@ -2,7 +2,7 @@
 //! (EARS' atomic sample), combined by multiple importance sampling.
 
 use super::flight::Flight8;
-use super::ledger::NO_RECORD;
+use super::ledger::{NO_BIN, NO_RECORD};
 use super::settle::Found8;
 use super::shard::Shard;
 use super::vertex::{Batch, CLASSES, Vertex8};
@@ -199,15 +199,17 @@ impl Shard<'_> {
         }
         let clear = self.occlude(session, s, l, mask);
         if let (Some(training), Some(bin)) = (&mut self.training, bin) {
-            for i in mask.and_not(s.ledger.eq(U32x8::splat(NO_RECORD))).lanes() {
-                training.log_shadow(bin.lane(i), clear.lane(i));
+            let known = bin.lt(U32x8::splat(NO_BIN)).and_not(s.ledger.eq(U32x8::splat(NO_RECORD)));
+            for i in (mask & known).lanes() {
+                let taken = training.log_shadow(bin.lane(i), clear.lane(i));
+                self.counters.shadows_refused += u64::from(!taken);
             }
         }
         self.gather(clear, v.root, s.ledger, &found);
     }
 
-    /// Plays roulette for shadow rays: a light sample has a known value if nothing hides it and costs one ray, so the factor
-    /// that is best for it is that of EARS (eq. 32) with the square of its value, times the learned chance that it is visible
+    /// Plays roulette for shadow rays: a light sample has a known value if nothing hides it and the cost of a ray, so the
+    /// factor that is best for it is that of EARS (eq. 32) with the square of its value, times the learned chance that it is visible
     /// (of `bin`), as second moment (Veach 1997, section 10.4.1, "efficiency-optimised Russian roulette", with the same idea of
     /// a threshold). The lanes that go on.
     fn shadow_roulette<P: Profile, I: Intersector, L: LightSelector>(

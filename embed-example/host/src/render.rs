@@ -65,7 +65,7 @@ pub struct RenderOptions {
     pub split_budget: Option<u32>,
     /// See [`Settings::adaptive`].
     pub adaptive: bool,
-    /// See [`Settings::shadow_roulette`]. Absent: with `ear` and `ears`, whose rule it is.
+    /// See [`Settings::shadow_roulette`]. Absent: with [`Strategy::is_efficiency_aware`] ones, whose rule it is.
     pub shadow_roulette: Option<bool>,
     /// See [`Settings::constant`].
     pub constant: Constant,
@@ -239,7 +239,6 @@ fn settings(scene: &Scene<'_>, options: &RenderOptions) -> Result<Settings, Rend
 /// `base` with the options that are given.
 fn choose(base: Settings, options: &RenderOptions) -> Result<Settings, RenderError> {
     let strategy = Strategy::parse(&options.strategy).map_err(RenderError::Strategy)?;
-    let efficient = matches!(strategy, Strategy::Ear(_) | Strategy::Ears(_));
     Ok(Settings {
         size: options.size.unwrap_or(base.size),
         seed: options.seed,
@@ -250,7 +249,7 @@ fn choose(base: Settings, options: &RenderOptions) -> Result<Settings, RenderErr
         split_budget: options.split_budget.unwrap_or(base.split_budget),
         aovs: true,
         adaptive: options.adaptive,
-        shadow_roulette: options.shadow_roulette.unwrap_or(efficient),
+        shadow_roulette: options.shadow_roulette.unwrap_or(strategy.is_efficiency_aware()),
         constant: options.constant,
         learning: options.learning,
     })
@@ -368,6 +367,7 @@ fn stats(r: &Rendered) -> RenderStats {
         ("look_ups", c.look_ups.lanes),
         ("samples_logged", c.samples_logged),
         ("samples_refused", c.samples_refused),
+        ("shadows_refused", c.shadows_refused),
         ("ledger_full", c.ledger_full),
         ("factors_not_finite", c.factors_not_finite),
         ("hard_stopped", c.hard_stopped),

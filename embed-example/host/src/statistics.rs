@@ -29,7 +29,7 @@ pub struct Paths {
     pub first_factor: Option<f64>,
 }
 
-/// A point of Fig. 9. Costs are rays, so that they do not depend on the machine.
+/// A point of Fig. 9. Costs are counted, so that they do not depend on the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Iteration {
     /// Camera samples per pixel that were asked for.
