@@ -2,9 +2,9 @@
 //!
 //! An octree over the scene has 4x4 direction bins in every leaf. A bin keeps count, sums and squared sums of the
 //! *values* of samples (reflected radiance over albedo, linear rgb) that were drawn at vertices in it, and of their
-//! counted cost. Sums also exist of half the squared difference of two samples of the same vertex: their mean is the variance
-//! at a point, whereas `moment - mean^2` has the spread of the mean over the cell in it as well. And it keeps how many
-//! shadow rays from the leaf towards its directions met nothing.
+//! counted cost. Sums also exist of half the squared difference of two samples of the same vertex: their mean is the
+//! variance at a point, whereas `moment - mean^2` has the spread of the mean over the cell in it as well. And it keeps
+//! how many shadow rays from the leaf towards its directions met nothing.
 //!
 //! There are several octrees, for kinds of vertices that should not be mixed, and the direction is the caller's choice: see
 //! [`Kind`]. Shards look up in what [`Cache::freeze`] computed and log into their own [`Training`]; between iterations
