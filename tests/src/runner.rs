@@ -10,6 +10,7 @@ use croupier::{
 };
 use croupier_host::blob::AlignedBytes;
 
+use crate::cache::{overwrite, random_sums};
 use crate::stats::SplitMix;
 
 /// How the steps of an iteration are dealt out.
@@ -129,6 +130,13 @@ pub trait Learned {
 
     /// Pixels of the finished iterations.
     fn pixels(&self) -> &[PixelStats];
+}
+
+/// Puts random sums in place of all statistics of the scene.
+pub fn poison(l: &mut dyn Learned, rng: &mut SplitMix) {
+    let mut bytes = l.saved().expect("a strategy with a cache");
+    overwrite(&mut bytes, || random_sums(rng));
+    l.load(&bytes).expect("statistics of this scene");
 }
 
 impl<P: Profile, I: Intersector> Learned for Session<'_, '_, P, I> {

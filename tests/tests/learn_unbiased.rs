@@ -12,8 +12,7 @@ use croupier::rrs::Norm;
 use croupier::{Settings, Strategy};
 use croupier_host::builtin;
 use croupier_host::description::*;
-use croupier_tests::cache::{overwrite, random_sums};
-use croupier_tests::runner::{Image, Learned, Schedule, learning, render, scheduled, settings};
+use croupier_tests::runner::{Image, Learned, Schedule, learning, poison, render, scheduled, settings};
 use croupier_tests::scenes::*;
 use croupier_tests::stats::{Mean, SplitMix, equivalent};
 
@@ -311,9 +310,7 @@ fn random_statistics_do_not_bias() {
             let mut rng = SplitMix(seed);
             let image = learning(&scene, &s, &[1, 1, 2], IN_ORDER, &mut |i, l: &mut dyn Learned| {
                 if i > 0 {
-                    let mut bytes = l.saved().unwrap();
-                    overwrite(&mut bytes, || random_sums(&mut rng));
-                    l.load(&bytes).unwrap();
+                    poison(l, &mut rng);
                 }
             });
             let c = image.counters;
@@ -342,9 +339,7 @@ fn random_visibilities_do_not_bias() {
         let mut rng = SplitMix(seed);
         let image = learning(&scene, &s, &[1, 3, 4], IN_ORDER, &mut |i, l: &mut dyn Learned| {
             if i > 0 {
-                let mut bytes = l.saved().unwrap();
-                overwrite(&mut bytes, || random_sums(&mut rng));
-                l.load(&bytes).unwrap();
+                poison(l, &mut rng);
             }
         });
         rays += image.counters.shadow_rays;

@@ -25,8 +25,7 @@ use croupier::{Counters, MIN_RING, Settings, Strategy};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::load::load;
-use croupier_tests::cache::{overwrite, random_sums};
-use croupier_tests::runner::{Image, Learned, Schedule, learning, settings};
+use croupier_tests::runner::{Image, Learned, Schedule, learning, poison, settings};
 use croupier_tests::stats::{Mean, SplitMix, equivalent};
 use std::collections::HashMap;
 use std::error::Error;
@@ -337,11 +336,7 @@ impl Place {
         let mut rng = SplitMix(seed);
         learning(&self.blob, &s, row.iterations, IN_ORDER, &mut |i, l: &mut dyn Learned| match (row.trial, &saved) {
             (Trial::Reloaded, Some(bytes)) if i % 2 == 0 => l.load(bytes).expect("statistics of this scene"),
-            (Trial::Poisoned, _) if i > 0 => {
-                let mut bytes = l.saved().expect("a strategy with a cache");
-                overwrite(&mut bytes, || random_sums(&mut rng));
-                l.load(&bytes).expect("statistics of this scene");
-            }
+            (Trial::Poisoned, _) if i > 0 => poison(l, &mut rng),
             _ => {}
         })
     }
