@@ -4,7 +4,7 @@
 use crate::quadrature::{jittered, midpoint};
 use croupier::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
 use croupier::scene::blob::{Camera, Material, MaterialKind, NONE, SceneInfo};
-use croupier::scene::{Effects, Scene};
+use croupier::scene::{Effects, Records, Scene};
 use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_host::microfacet;
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
@@ -382,7 +382,7 @@ impl Case {
         }
         // not the first material, so that a lost index shows
         let decoy: Material = bytemuck::Zeroable::zeroed();
-        let scene = Scene {
+        let scene = Scene::assume_valid(Records {
             info: leak::<SceneInfo>(bytemuck::Zeroable::zeroed()),
             nodes: &[],
             leaves: &[],
@@ -401,7 +401,7 @@ impl Case {
             names: &[],
             effects: Effects::default(),
             hash: 0,
-        };
+        });
         let garbage = |i: usize| if active.lane(i) { 1 } else { 0xdead_beef };
         let colour = |i: usize| if active.lane(i) { self.material.reflectance } else { [f32::NAN; 3] };
         let inputs = Inputs8 { material: U32x8::from_fn(garbage), reflectance: Vec3x8::from_fn(colour) };

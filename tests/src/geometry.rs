@@ -2,7 +2,7 @@
 
 use croupier::accel::Ray8;
 use croupier::scene::blob::{Camera, NONE, SceneInfo, Triangle, Vertex};
-use croupier::scene::{Effects, Scene};
+use croupier::scene::{Effects, Records, Scene};
 use croupier::simd::{F32x8, Vec3x8};
 use croupier_host::bvh::{Effort, Tree, build};
 
@@ -157,7 +157,7 @@ impl Mesh {
 
     /// As a scene of bare geometry.
     pub fn scene(&self) -> Scene<'_> {
-        Scene {
+        Scene::assume_valid(Records {
             info: &self.info,
             nodes: &self.tree.nodes,
             leaves: &self.tree.leaves,
@@ -176,7 +176,7 @@ impl Mesh {
             names: &[],
             effects: Effects::default(),
             hash: 0,
-        }
+        })
     }
 }
 

@@ -2,8 +2,8 @@
 
 use bytemuck::Zeroable;
 use croupier::Scene;
-use croupier::scene::Effects;
 use croupier::scene::blob::*;
+use croupier::scene::{Effects, Records};
 use croupier_host::{alias, environment};
 
 /// Owns what a [`Scene`] borrows.
@@ -119,7 +119,7 @@ impl LightScene {
 
     /// The scene. Nothing validates it: tests may hand over nonsense.
     pub fn scene(&self) -> Scene<'_> {
-        Scene {
+        Scene::assume_valid(Records {
             info: &self.info,
             nodes: &[],
             leaves: &[],
@@ -138,6 +138,6 @@ impl LightScene {
             names: &[],
             effects: Effects::default(),
             hash: 0,
-        }
+        })
     }
 }

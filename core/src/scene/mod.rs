@@ -14,4 +14,4 @@ mod view;
 
 pub use effects::Effects;
 pub use error::{ChildFault, Field, SceneError, SectionFault, SlotFault};
-pub use view::Scene;
+pub use view::{Records, Scene};

@@ -4,17 +4,21 @@ use super::blob::*;
 use super::error::{SceneError, SectionFault};
 use super::sections::Sections;
 use super::{Effects, validate};
+use core::ops::Deref;
 
-/// A validated scene. [`Scene::from_bytes`] is the only door; nothing re-checks after it. The fields are there to be read:
-/// one that was put together or changed by hand has none of the promises below, and may be walked for ever. In a scene
-/// from that door
+/// A validated scene: its [`Records`], to be read and not to be changed. [`Scene::from_bytes`] makes it, and nothing
+/// re-checks after that:
 ///
 /// * every index that a record holds is in range of its section or [`NONE`], and every section has fewer than 2^31
 ///   records,
 /// * the tree is a tree: at most [`MAX_TREE_DEPTH`] nodes on a path, every triangle in exactly one leaf,
 /// * every number that a formula reads is finite and in the range that [`super::Field`] states.
 #[derive(Clone, Copy, Debug)]
-pub struct Scene<'s> {
+pub struct Scene<'s>(Records<'s>);
+
+/// The sections of a scene blob.
+#[derive(Clone, Copy, Debug)]
+pub struct Records<'s> {
     /// Facts about the whole.
     pub info: &'s SceneInfo,
     /// Tree.
@@ -53,7 +57,22 @@ pub struct Scene<'s> {
     pub hash: u64,
 }
 
+impl<'s> Deref for Scene<'s> {
+    type Target = Records<'s>;
+
+    #[inline(always)]
+    fn deref(&self) -> &Records<'s> {
+        &self.0
+    }
+}
+
 impl<'s> Scene<'s> {
+    /// Takes records as they are: for tests and tools that need a part of a scene only. If they break a promise of
+    /// [`Scene`], pictures may be wrong and a walk of the tree may never end; memory stays safe.
+    pub fn assume_valid(records: Records<'s>) -> Self {
+        Self(records)
+    }
+
     /// Validates a blob in one pass without allocating; survives any bytes. Bytes beyond the blob's own length are
     /// ignored. The bytes must start at a multiple of 4 (of 64 for full speed).
     ///
@@ -69,7 +88,7 @@ impl<'s> Scene<'s> {
                 return Err(SceneError::Section { kind: SectionKind::Environment, fault });
             }
         };
-        let mut scene = Self {
+        let mut records = Records {
             info: sections.one(SectionKind::Info)?,
             nodes: sections.records(SectionKind::Nodes)?,
             leaves: sections.records(SectionKind::Leaves)?,
@@ -89,8 +108,8 @@ impl<'s> Scene<'s> {
             effects: Effects::default(),
             hash: sections.hash,
         };
-        scene.effects = validate::scene(&scene)?;
-        Ok(scene)
+        records.effects = validate::scene(&records)?;
+        Ok(Self(records))
     }
 
     /// Name of a material, empty if it has none.

@@ -3,10 +3,10 @@
 use super::{Record, alias, dot};
 use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError, SectionFault};
-use crate::scene::{Effects, Scene};
+use crate::scene::{Effects, Records};
 
 /// The environment, if any, and that its sections have the sizes it calls for.
-pub(super) fn environment(scene: &Scene<'_>) -> Result<Effects, SceneError> {
+pub(super) fn environment(scene: &Records<'_>) -> Result<Effects, SceneError> {
     let count = |kind, n: usize| SceneError::Section { kind, fault: SectionFault::Count(n as u64) };
     let (texels, tables) = (scene.env_texels.len(), scene.env_alias.len());
     let map = scene.environment.filter(|e| e.kind == EnvironmentKind::Map as u32);
@@ -58,7 +58,7 @@ fn rotation(at: Record, e: &Environment) -> Result<(), SceneError> {
 }
 
 /// Texels, and the brightest under the largest scale, are legal radiances. Are all of them 0?
-fn radiance(scene: &Scene<'_>, e: &Environment) -> Result<bool, SceneError> {
+fn radiance(scene: &Records<'_>, e: &Environment) -> Result<bool, SceneError> {
     let mut brightest = 0.0f32;
     for (at, texel) in super::records(SectionKind::EnvTexels, scene.env_texels) {
         at.all_within(Field::Emission, texel, 0.0, MAX_EMISSION)?;

@@ -3,10 +3,10 @@
 use super::{materials, records};
 use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError};
-use crate::scene::{Effects, Scene};
+use crate::scene::{Effects, Records};
 
 /// Positions and texture coordinates are finite and not huge; normals are finite.
-pub(super) fn vertices(scene: &Scene<'_>) -> Result<(), SceneError> {
+pub(super) fn vertices(scene: &Records<'_>) -> Result<(), SceneError> {
     for (at, v) in records(SectionKind::Vertices, scene.vertices) {
         at.position(&v.p)?;
         at.finite(Field::Direction, &v.n)?;
@@ -19,7 +19,7 @@ pub(super) fn vertices(scene: &Scene<'_>) -> Result<(), SceneError> {
 /// the materials they use. That a light refers back is for `lights` to check.
 ///
 /// A triangle of no area is allowed: no ray hits it, so nothing divides by its area.
-pub(super) fn triangles(scene: &Scene<'_>) -> Result<Effects, SceneError> {
+pub(super) fn triangles(scene: &Records<'_>) -> Result<Effects, SceneError> {
     let mut effects = Effects::default();
     for (at, t) in records(SectionKind::Triangles, scene.triangles) {
         at.zero(t.flags & !TRIANGLE_SMOOTH == 0)?;

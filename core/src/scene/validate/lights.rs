@@ -3,10 +3,10 @@
 use super::{Record, alias, cross, dot64, records};
 use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError, SectionFault};
-use crate::scene::{Effects, Scene};
+use crate::scene::{Effects, Records};
 
 /// Every light, then the alias table. Triangles have been checked.
-pub(super) fn lights(scene: &Scene<'_>) -> Result<Effects, SceneError> {
+pub(super) fn lights(scene: &Records<'_>) -> Result<Effects, SceneError> {
     let mut effects = Effects::default();
     let mut any = false;
     for (at, l) in records(SectionKind::Lights, scene.lights) {
@@ -60,7 +60,7 @@ pub(super) fn lights(scene: &Scene<'_>) -> Result<Effects, SceneError> {
 }
 
 /// An emitting triangle: both name each other, and area and emission are what a ray that hits it finds.
-fn area(scene: &Scene<'_>, at: Record, l: &Light) -> Result<(), SceneError> {
+fn area(scene: &Records<'_>, at: Record, l: &Light) -> Result<(), SceneError> {
     let t = at.follow(SectionKind::Triangles, l.triangle, scene.triangles)?;
     if t.light as usize != at.index {
         return Err(at.wrong_reference(SectionKind::Triangles, l.triangle, scene.triangles.len()));

@@ -3,10 +3,10 @@
 use super::{Record, records};
 use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError};
-use crate::scene::{Effects, Scene};
+use crate::scene::{Effects, Records};
 
 /// Every texture's texels are in the texels section.
-pub(super) fn textures(scene: &Scene<'_>) -> Result<(), SceneError> {
+pub(super) fn textures(scene: &Records<'_>) -> Result<(), SceneError> {
     for (at, t) in records(SectionKind::Textures, scene.textures) {
         at.side(Field::Width, t.width, 1)?;
         at.side(Field::Height, t.height, 1)?;
@@ -21,7 +21,7 @@ pub(super) fn textures(scene: &Scene<'_>) -> Result<(), SceneError> {
 }
 
 /// Every material's kind, references and the parameters that the kind uses; the others are finite.
-pub(super) fn materials(scene: &Scene<'_>) -> Result<(), SceneError> {
+pub(super) fn materials(scene: &Records<'_>) -> Result<(), SceneError> {
     for (at, m) in records(SectionKind::Materials, scene.materials) {
         let kind = MaterialKind::from_u32(m.kind);
         let kind = kind.ok_or(SceneError::Kind { of: at.of, index: at.index(), found: m.kind })?;
@@ -62,7 +62,7 @@ fn conductor(at: Record, m: &Material) -> Result<(), SceneError> {
 }
 
 /// Rough plastics have a table of transmittances, other kinds have none.
-fn table(scene: &Scene<'_>, at: Record, m: &Material, kind: MaterialKind) -> Result<(), SceneError> {
+fn table(scene: &Records<'_>, at: Record, m: &Material, kind: MaterialKind) -> Result<(), SceneError> {
     let wrong = at.wrong_reference(SectionKind::Tables, m.table, scene.tables.len());
     if kind != MaterialKind::RoughPlastic {
         return if m.table == NONE { Ok(()) } else { Err(wrong) };

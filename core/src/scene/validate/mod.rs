@@ -11,10 +11,10 @@ mod tree;
 
 use super::blob::*;
 use super::error::{Field, SceneError};
-use super::{Effects, Scene};
+use super::{Effects, Records};
 
 /// Validates all records of a scene whose sections are sound; returns what it calls for.
-pub(super) fn scene(scene: &Scene<'_>) -> Result<Effects, SceneError> {
+pub(super) fn scene(scene: &Records<'_>) -> Result<Effects, SceneError> {
     info(scene.info)?;
     let lens = camera(scene.camera)?;
     names(scene)?;
@@ -149,7 +149,7 @@ fn camera(c: &Camera) -> Result<Effects, SceneError> {
     Ok(if c.lens_radius > 0.0 { Effects::LENS } else { Effects::default() })
 }
 
-fn names(scene: &Scene<'_>) -> Result<(), SceneError> {
+fn names(scene: &Records<'_>) -> Result<(), SceneError> {
     let lines = scene.names.iter().filter(|b| **b == b'\n').count();
     let whole = scene.names.last().is_none_or(|b| *b == b'\n') && core::str::from_utf8(scene.names).is_ok();
     if whole && (scene.names.is_empty() || lines == scene.materials.len()) {

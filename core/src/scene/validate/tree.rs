@@ -6,7 +6,7 @@
 //! counters at the end say whether all were met. The stack is the path to the current node.
 
 use super::mark;
-use crate::scene::Scene;
+use crate::scene::Records;
 use crate::scene::blob::*;
 use crate::scene::error::{ChildFault, SceneError, SlotFault};
 
@@ -68,7 +68,7 @@ struct Met {
 }
 
 /// Walks the whole tree.
-pub(super) fn tree(scene: &Scene<'_>) -> Result<(), SceneError> {
+pub(super) fn tree(scene: &Records<'_>) -> Result<(), SceneError> {
     let mut met = Met::default();
     if !scene.nodes.is_empty() {
         walk(scene, &mut met)?;
@@ -90,7 +90,7 @@ pub(super) fn tree(scene: &Scene<'_>) -> Result<(), SceneError> {
     Ok(())
 }
 
-fn walk(scene: &Scene<'_>, met: &mut Met) -> Result<(), SceneError> {
+fn walk(scene: &Records<'_>, met: &mut Met) -> Result<(), SceneError> {
     let bounds = Bounds { min: scene.info.bounds_min, max: scene.info.bounds_max };
     let mut path = [Step { node: 0, slot: 0, bounds }; MAX_TREE_DEPTH as usize];
     let mut depth = 0usize;
@@ -144,7 +144,7 @@ fn walk(scene: &Scene<'_>, met: &mut Met) -> Result<(), SceneError> {
 }
 
 /// The leaf holds the corners of its triangles, inside its box; the rest of it is empty.
-fn leaf(scene: &Scene<'_>, index: u32, count: u32, bounds: &Bounds, met: &mut Met) -> Result<(), SceneError> {
+fn leaf(scene: &Records<'_>, index: u32, count: u32, bounds: &Bounds, met: &mut Met) -> Result<(), SceneError> {
     let Some(leaf) = scene.leaves.get(index as usize) else { return Ok(()) };
     for (slot, t) in (0u32..).zip(leaf.triangle) {
         let bad = |fault| SceneError::Slot { leaf: index, slot, fault };
