@@ -278,7 +278,15 @@ pub fn check(options: &RenderOptions) -> Result<(), RenderError> {
 
 /// Renders a scene blob.
 pub fn render(scene: &[u8], options: &RenderOptions, observer: &dyn Observer) -> Result<RenderResult, RenderError> {
-    let scene = Scene::from_bytes(scene)?;
+    render_scene(Scene::from_bytes(scene)?, options, observer)
+}
+
+/// Renders a validated scene.
+pub fn render_scene(
+    scene: Scene<'_>,
+    options: &RenderOptions,
+    observer: &dyn Observer,
+) -> Result<RenderResult, RenderError> {
     let settings = settings(&scene, options)?;
     let plan = PlanSummary::new(&scene, &settings)?;
     let o = Options {
@@ -303,10 +311,9 @@ pub fn render(scene: &[u8], options: &RenderOptions, observer: &dyn Observer) ->
     })
 }
 
-/// What [`render`] would take, without rendering.
-pub fn plan(scene: &[u8], options: &RenderOptions) -> Result<PlanSummary, RenderError> {
-    let scene = Scene::from_bytes(scene)?;
-    Ok(PlanSummary::new(&scene, &settings(&scene, options)?)?)
+/// What [`render_scene`] would take, without rendering.
+pub fn plan(scene: &Scene<'_>, options: &RenderOptions) -> Result<PlanSummary, RenderError> {
+    Ok(PlanSummary::new(scene, &settings(scene, options)?)?)
 }
 
 const RGB: [&str; 3] = ["R", "G", "B"];

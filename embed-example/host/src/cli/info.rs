@@ -70,7 +70,7 @@ impl Facts {
             max_depth: scene.info.max_depth,
             longest_path: scene.info.max_depth.min(HARD_STOP),
             effects: called_for.map(|(_, name)| *name).collect(),
-            plan: plan(bytes, options).ok(),
+            plan: plan(&scene, options).ok(),
             notes,
         })
     }

@@ -6,8 +6,8 @@ use super::output::Outputs;
 use super::progress::Rendering;
 use super::settings::SettingsFlags;
 use super::{Outcome, say, say_json, scene};
-use croupier::{HARD_STOP, Scene, SceneError};
-use croupier_host::render::{PlanSummary, RenderOptions, RenderResult, RenderStats, Target, check, render};
+use croupier::{HARD_STOP, Scene};
+use croupier_host::render::{PlanSummary, RenderOptions, RenderResult, RenderStats, Target, check, render_scene};
 use croupier_host::statistics::Statistics;
 use serde::Serialize;
 use std::error::Error;
@@ -138,11 +138,12 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     outputs.check()?;
     let options = flags.options()?;
     let (bytes, mut notes) = scene::open(path)?;
-    if let Some(text) = shortened(&bytes, options.max_depth).map_err(|e| scene::about(path)(&e))? {
+    let validated = Scene::from_bytes(&bytes).map_err(|e| scene::about(path)(&e))?;
+    if let Some(text) = shortened(&validated, options.max_depth) {
         notes.add(path, text);
     }
     let watch = Rendering::start(options.target);
-    let result = render(&bytes, &options, &watch)
+    let result = render_scene(validated, &options, &watch)
         .map_err(|e| flags.cache.about(&e).unwrap_or_else(|| scene::about(path)(&e)))?;
     drop(watch);
     let RenderResult { picture, stats, statistics, plan, cache, stopped_early } = &result;
@@ -180,10 +181,10 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
 }
 
 /// What to say if paths end before the scene wants them to, and nobody asked for it.
-fn shortened(bytes: &[u8], given: Option<u32>) -> Result<Option<String>, SceneError> {
-    let wanted = Scene::from_bytes(bytes)?.info.max_depth;
+fn shortened(scene: &Scene<'_>, given: Option<u32>) -> Option<String> {
+    let wanted = scene.info.max_depth;
     let text = || format!("paths end after {HARD_STOP} segments, the scene asks for {wanted}");
-    Ok((given.is_none() && wanted > HARD_STOP).then(text))
+    (given.is_none() && wanted > HARD_STOP).then(text)
 }
 
 fn print(r: &Report<'_>) -> Outcome {
