@@ -33,4 +33,6 @@ pub(crate) struct Flight8 {
     pub depth: U32x8,
     /// Product of the albedos of the vertices so far.
     pub albedo_product: F32x8,
+    /// See [`Target::importance`](super::root::Target::importance).
+    pub importance: Vec3x8,
 }

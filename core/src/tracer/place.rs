@@ -1,22 +1,19 @@
 //! Where in the statistics the samples of arrived vertices belong.
 
-use super::root::Target8;
+use super::root::Roots;
 use super::roulette::Arrival8;
-use super::surface::TRANSMISSIVE;
 use crate::accel::Intersector;
 use crate::learn::cache::Kind;
 use crate::light::LightSelector;
 use crate::profile::Profile;
+use crate::rng::Key8;
 use crate::rrs::Space;
 use crate::scene::blob::MaterialKind;
 use crate::session::Session;
-use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier_simd::{F32x8, U32x8, Vec3x8};
 
 /// Channels that reflect less than this are not learned from: the quotient would be noise.
 const DARKEST: f32 = 1e-3;
-
-/// Block of a vertex's random numbers, beyond those of its samples (`scatter`).
-const JITTER_BLOCK: u32 = 3;
 
 /// Where a vertex's samples are logged, and how its bin's values become its own.
 pub(super) struct Place8 {
@@ -28,11 +25,10 @@ pub(super) struct Place8 {
     pub unscale: Vec3x8,
 }
 
-/// Kinds without a preferred direction but the normal.
-const MATTE: u32 = 1 << MaterialKind::Diffuse as u32;
-
-fn lanes_of(kinds: u32, a: &Arrival8<'_>) -> Mask8 {
-    Mask8::from_bits((0..8).fold(0, |m, i| m | (kinds >> (a.kind[i] & 31) & 1) << i))
+/// Numbers in [0, 1) that are as good as independent of what the key draws: its own bits, which are hashed before use.
+fn jitter(key: Key8) -> [F32x8; 3] {
+    let rest = key.lo << 24 | (key.hi & U32x8::splat(0xff)) << 16;
+    [key.lo, key.hi, rest].map(U32x8::to_unit)
 }
 
 /// 1 / x where x is at least `floor`, 0 elsewhere.
@@ -48,32 +44,32 @@ pub(super) fn place<P: Profile, I: Intersector, L: LightSelector>(
     session: &Session<'_, '_, P, I, L>,
     a: &Arrival8<'_>,
     space: Space,
-    target: &Target8,
+    roots: &Roots<'_>,
 ) -> Place8 {
     let v = &*a.vertex;
     let knowledge = session.knowledge();
     match space {
         Space::Scene => {
-            let [u0, u1, u2, _] = v.key.uniforms(JITTER_BLOCK);
             let mirrored = v.ns * (v.ns.dot(v.wo) * F32x8::splat(2.0)) - v.wo;
-            let matte = lanes_of(MATTE, a);
-            let dir = Vec3x8::select(lanes_of(TRANSMISSIVE, a), v.wo, Vec3x8::select(matte, v.ns, mirrored));
+            let matte = U32x8::new(a.kind).eq(U32x8::splat(MaterialKind::Diffuse as u32));
+            let dir = Vec3x8::select(a.transmissive, v.wo, Vec3x8::select(matte, v.ns, mirrored));
             let seen = v.depth.eq(U32x8::splat(1));
             let kind = U32x8::select(matte, U32x8::splat(Kind::Matte as u32), U32x8::splat(Kind::Shiny as u32));
             let first = U32x8::splat(Kind::FirstMatte as u32 - Kind::Matte as u32);
             let kind = kind + U32x8::select(seen, first, U32x8::splat(0));
             let known = if knowledge.weighs_pixels() { a.active } else { a.active.and_not(seen) };
-            let bin = knowledge.scene_bins(kind, v.p, dir, [u0, u1, u2], known);
+            let bin = knowledge.scene_bins(kind, v.p, dir, jitter(v.key), known);
             let mut unscale = a.albedo;
             if (seen & a.active).any() {
                 // in one cell bright pixels see bright samples: only their ratio is alike, however many samples a pixel has
-                let own = inverse(target.importance * target.share.sqr(), f32::MIN_POSITIVE);
+                let share = roots.targets(v.root, a.active).share;
+                let own = inverse(v.importance * share.sqr(), f32::MIN_POSITIVE);
                 unscale = Vec3x8::select(seen, own.map(F32x8::sqrt), unscale);
             }
             Place8 { bin, scale: inverse(unscale, DARKEST), unscale }
         }
         Space::Image => {
-            let (film, depth) = (target.film.to_array(), v.depth.to_array());
+            let (film, depth) = (roots.targets(v.root, a.active).film.to_array(), v.depth.to_array());
             let mut bin = [0; 8];
             for i in a.active.lanes() {
                 bin[i] = knowledge.image_bin(film[i], depth[i]);

@@ -79,7 +79,7 @@ impl Shard<'_> {
         };
         let tiles = self.plan.tiles;
         let (mut x, mut y, mut pixel, mut sample, mut root) = ([0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8]);
-        let mut ledger = [NO_RECORD; 8];
+        let (mut ledger, mut weight) = ([NO_RECORD; 8], [[1.0; 3]; 8]);
         let mut lanes = 0;
         while lanes < 8 {
             let Some((p, slot, s)) = self.cursor.next(&tiles, self.index, |t| session.knowledge().samples_of_tile(t))
@@ -93,6 +93,7 @@ impl Shard<'_> {
             pixel[lanes] = film;
             sample[lanes] = first_sample.wrapping_add(s);
             root[lanes] = r;
+            weight[lanes] = importance;
             if self.ledger.is_on() && s < settings.learning.samples {
                 ledger[lanes] = self.ledger.open(NO_RECORD);
                 self.counters.ledger_full += u64::from(ledger[lanes] == NO_RECORD);
@@ -124,6 +125,7 @@ impl Shard<'_> {
             key: key.child(U32x8::splat(0)),
             depth: U32x8::splat(1),
             albedo_product: F32x8::ONE,
+            importance: Vec3x8::from_fn(|i| weight[i]),
         })
     }
 }

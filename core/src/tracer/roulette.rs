@@ -25,6 +25,8 @@ pub(super) struct Arrival8<'a> {
     pub weight: Vec3x8,
     /// [`MaterialKind`] per lane.
     pub kind: [u32; 8],
+    /// Lanes whose material lets light through.
+    pub transmissive: Mask8,
     /// 0 unless the strategy needs it.
     pub albedo: Vec3x8,
     pub active: Mask8,
@@ -59,10 +61,9 @@ impl Shard<'_> {
         let mut logged = None;
         let mut learned = Learned8::NONE;
         if strategy.needs_image() || settings.shadow_roulette {
-            let target = self.roots.targets(v.root, a.active);
-            learned = knowledge.image8(target.importance);
+            learned = knowledge.image8(v.importance);
             if let Some(space) = strategy.space() {
-                let found = place(session, &a, space, &target);
+                let found = place(session, &a, space, &self.roots);
                 knowledge.local8(&mut learned, found.bin, found.unscale, a.active);
                 self.counters.look_ups.count(a.active.count());
                 logged = Some(found);
@@ -97,7 +98,6 @@ impl Shard<'_> {
         a.vertex.albedo_product *= a.albedo.mean();
         a.vertex.count = U32x8::new(n);
         a.vertex.bin = logged.map_or(U32x8::splat(NO_BIN), |p| p.bin);
-        a.vertex.importance = learned.importance;
         let records = a.vertex.records();
         for i in a.active.lanes() {
             let Some(class) = MaterialKind::from_u32(a.kind[i]).filter(|_| n[i] > 0) else {

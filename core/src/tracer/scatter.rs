@@ -141,6 +141,7 @@ impl Shard<'_> {
             key: key.child(U32x8::splat(0)),
             depth: v.depth + U32x8::splat(1),
             albedo_product: v.albedo_product,
+            importance: v.importance,
         })
     }
 

@@ -18,7 +18,7 @@ use crate::texture;
 use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
 
 /// Kinds that scatter from behind as well.
-pub(super) const TRANSMISSIVE: u32 = 1 << MaterialKind::Dielectric as u32
+const TRANSMISSIVE: u32 = 1 << MaterialKind::Dielectric as u32
     | 1 << MaterialKind::RoughDielectric as u32
     | 1 << MaterialKind::ThinDielectric as u32
     | 1 << MaterialKind::Null as u32;
@@ -86,7 +86,7 @@ impl Shard<'_> {
             count: U32x8::splat(0),
             next: U32x8::splat(0),
             bin: U32x8::splat(NO_BIN),
-            importance: Vec3x8::ONE,
+            importance: f.importance,
         };
         going &= s.scatters;
         let lanes_if = |wanted: bool, lanes: Mask8| if wanted { lanes } else { Mask8::NONE };
@@ -101,7 +101,15 @@ impl Shard<'_> {
             return;
         }
         let albedo = if needs_albedo { albedo } else { Vec3x8::ZERO };
-        self.roulette(session, Arrival8 { vertex: &mut vertex, weight: f.weight, kind: s.kind, albedo, active: going });
+        let arrival = Arrival8 {
+            vertex: &mut vertex,
+            weight: f.weight,
+            kind: s.kind,
+            transmissive: s.transmissive,
+            albedo,
+            active: going,
+        };
+        self.roulette(session, arrival);
     }
 
     /// Emission of hit area lights, weighted against the light sample that could have found them.
@@ -195,6 +203,7 @@ fn albedo<P: Profile>(scene: &Scene<'_>, vertex: &Vertex8, kinds: &[u32; 8], act
 struct Shading8 {
     material: U32x8,
     kind: [u32; 8],
+    transmissive: Mask8,
     reflectance: Vec3x8,
     /// Shading normal, turned towards `wo` on two-sided materials.
     ns: Vec3x8,
@@ -245,8 +254,9 @@ fn shade<P: Profile>(scene: &Scene<'_>, hit: &Hit8, wo: Vec3x8, ng: Vec3x8) -> S
     }
     let cos = wo.dot(ns);
     let behind = cos.lt(F32x8::ZERO);
-    let turn = behind & Mask8::from_bits(two_sided).and_not(Mask8::from_bits(through));
+    let transmissive = Mask8::from_bits(through);
+    let turn = behind & Mask8::from_bits(two_sided).and_not(transmissive);
     let ns = Vec3x8::select(turn, -ns, ns);
-    let scatters = (cos.gt(F32x8::ZERO) | turn | (Mask8::from_bits(through) & behind)) & hit.hit;
-    Shading8 { material: U32x8::new(material), kind, reflectance, ns, scatters }
+    let scatters = (cos.gt(F32x8::ZERO) | turn | (transmissive & behind)) & hit.hit;
+    Shading8 { material: U32x8::new(material), kind, transmissive, reflectance, ns, scatters }
 }

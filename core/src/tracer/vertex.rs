@@ -52,7 +52,7 @@ pub(crate) struct Vertex8 {
     pub next: U32x8,
     /// Its bin of the statistics, [`NO_BIN`](super::ledger::NO_BIN) if there is none.
     pub bin: U32x8,
-    /// What a squared error of its rgb counts in the error of the picture, as far as settings ask for it; else 1.
+    /// See [`Target::importance`](super::root::Target::importance).
     pub importance: Vec3x8,
 }
 
