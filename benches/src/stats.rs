@@ -14,9 +14,9 @@ pub struct Median {
 }
 
 impl Median {
-    /// Of independent values, with the narrowest pair of order statistics, equally far from both ends, that holds the true
-    /// median with at least 95 %; of fewer than six values none does, and it is their range ([`coverage`]). This holds for
-    /// every distribution, and errors of renders have long tails. `None` of nothing, or if a value is NaN.
+    /// Of independent values, with the narrowest pair of order statistics, equally far from both ends, that holds the
+    /// true median with at least 95 %; of fewer than six values none does, and it is their range ([`coverage`]). This
+    /// holds for every distribution, and errors of renders have long tails. `None` of nothing, or if a value is NaN.
     pub fn of(values: &[f64]) -> Option<Self> {
         if values.iter().any(|x| x.is_nan()) {
             return None;
@@ -61,8 +61,8 @@ pub fn geometric_mean(values: &[f64]) -> f64 {
     (values.iter().map(|x| x.ln()).sum::<f64>() / values.len() as f64).exp()
 }
 
-/// When an error first comes down to `level`, from points (time, error) in the order of time: a line in logarithms between
-/// the two points around it. A curve that starts below gives its first time; one that ends above, `None`.
+/// When an error first comes down to `level`, from points (time, error) in the order of time: a line in logarithms
+/// between the two points around it. A curve that starts below gives its first time; one that ends above, `None`.
 pub fn time_to(curve: &[(f64, f64)], level: f64) -> Option<f64> {
     let i = curve.iter().position(|&(_, e)| e <= level)?;
     let (t, e) = curve[i];

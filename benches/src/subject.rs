@@ -31,8 +31,8 @@ impl Subject {
         Ok(Self { name: name.into(), baked, image, reference })
     }
 
-    /// relMSE of an image without the worst part `outliers` of the pixels, less the share of the reference's noise in the
-    /// others: what it would be against a reference without noise.
+    /// relMSE of an image without the worst part `outliers` of the pixels, less the share of the reference's noise in
+    /// the others: what it would be against a reference without noise.
     pub fn error_beyond_noise(&self, image: &Rgb, outliers: f64) -> Result<f64, CompareError> {
         let errors = relmse_per_pixel(image, &self.image)?;
         let noise = relmse_of_per_pixel(&self.reference);

@@ -2,8 +2,8 @@
 
 use croupier_benches::stats::*;
 
-/// Ranks of the 95 % interval from tables of the sign test. Killed by: an interval one rank wider or narrower, the upper
-/// middle value in place of the mean of both.
+/// Ranks of the 95 % interval from tables of the sign test. Killed by: an interval one rank wider or narrower, the
+/// upper middle value in place of the mean of both.
 #[test]
 fn intervals_of_the_median_are_those_of_the_sign_test() {
     for (n, low, high) in [(1, 1, 1), (3, 1, 3), (5, 1, 5), (6, 1, 6), (8, 1, 8), (9, 2, 8), (12, 3, 10), (30, 10, 21)]

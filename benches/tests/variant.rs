@@ -5,8 +5,8 @@ use croupier_benches::variant::Variant;
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::builtin;
 
-/// What `+small` takes beside scene and film for a picture of usual size, vertices and pixel estimates included. Killed by: a cache, ledger or ring that
-/// does not fit.
+/// What `+small` takes beside scene and film for a picture of usual size, vertices and pixel estimates included. Killed
+/// by: a cache, ledger or ring that does not fit.
 #[test]
 fn small_is_256_kib() {
     let baked = bake(&builtin::cornell_box(), &BakeOptions::default(), |_, _| {}).unwrap();

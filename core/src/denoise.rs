@@ -11,16 +11,16 @@
 //! finish    what the picture lost or gained in all goes back to its noisy pixels; color = e * albedo
 //! ```
 //!
-//! Two pixels belong together if their standard errors explain their difference (Sakai et al., A Statistical Approach to
-//! Monte Carlo Denoising, SIGGRAPH Asia 2024, test memberships in one window): so a bright rare sample, whose error is
-//! as large as itself, is shared out, and an edge that the errors do not explain stays. The scales are those of
+//! Two pixels belong together if their standard errors explain their difference (Sakai et al., A Statistical Approach
+//! to Monte Carlo Denoising, SIGGRAPH Asia 2024, test memberships in one window): so a bright rare sample, whose error
+//! is as large as itself, is shared out, and an edge that the errors do not explain stays. The scales are those of
 //! Dammertz et al., Edge-Avoiding À-Trous Wavelet Transform, HPG 2010, with the variance carried along as by Schied et
 //! al., Spatiotemporal Variance-Guided Filtering, HPG 2017. Dividing by the albedo keeps textures.
 //!
 //! A weighted mean darkens a little where bright pixels find few companions, hence the last step: the mean of the
-//! picture is that of its samples. It has one limit: a pixel of one sample has no variance but its square, which excuses
-//! every difference. From one sample per pixel the features alone draw the edges, and a lamp that looks like its wall
-//! bleeds.
+//! picture is that of its samples. It has one limit: a pixel of one sample has no variance but its square, which
+//! excuses every difference. From one sample per pixel the features alone draw the edges, and a lamp that looks like
+//! its wall bleeds.
 
 mod filter;
 mod finish;
@@ -31,8 +31,8 @@ use core::fmt;
 use croupier_simd::F32x8;
 pub use planes::Planes;
 
-/// The noisy picture: planes of `columns * rows` values, row by row; longer ones are cut. Pixels whose color or variance
-/// is not finite (or beyond [`COLOR_LIMIT`] or its square) count as absent.
+/// The noisy picture: planes of `columns * rows` values, row by row; longer ones are cut. Pixels whose color or
+/// variance is not finite (or beyond [`COLOR_LIMIT`] or its square) count as absent.
 #[derive(Clone, Copy, Debug)]
 pub struct Noisy<'a> {
     /// Columns and rows.
@@ -107,8 +107,8 @@ pub fn scratch_len(size: [u32; 2]) -> usize {
     grid.rows.saturating_mul(grid.stride).saturating_mul(2 * SIGNAL + FEATURES)
 }
 
-/// Denoises into `out`, three planes like those of [`Noisy::color`]. What `scratch` and `out` hold before does not matter.
-/// A picture without noise comes back as it is, but for rounding; what comes back is finite, always.
+/// Denoises into `out`, three planes like those of [`Noisy::color`]. What `scratch` and `out` hold before does not
+/// matter. A picture without noise comes back as it is, but for rounding; what comes back is finite, always.
 pub fn denoise(noisy: &Noisy<'_>, scratch: &mut [f32], out: [&mut [f32]; 3]) -> Result<(), DenoiseError> {
     let (size, grid) = (noisy.size, Grid::new(noisy.size));
     let check = |part, needed, given| {

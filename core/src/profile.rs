@@ -1,5 +1,5 @@
-//! Kernel profiles: which effects the compiled kernels contain. An effect outside the profile costs nothing, because the
-//! compiler removes it; a scene that calls for one outside is refused when the session starts.
+//! Kernel profiles: which effects the compiled kernels contain. An effect outside the profile costs nothing, because
+//! the compiler removes it; a scene that calls for one outside is refused when the session starts.
 
 use crate::scene::Effects;
 

@@ -223,14 +223,14 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
         &self.film
     }
 
-    /// Variance and cost per camera sample: of the last iteration, and blended over the iterations as factors use them. All
-    /// 0 unless the strategy learns.
+    /// Variance and cost per camera sample: of the last iteration, and blended over the iterations as factors use them.
+    /// All 0 unless the strategy learns.
     pub fn picture_statistics(&self) -> [PictureStatistics; 2] {
         self.knowledge.statistics()
     }
 
-    /// The statistics of the scene, if the strategy learns them (`bolin-meyer` learns of the picture): to be saved, or loaded
-    /// before the first iteration.
+    /// The statistics of the scene, if the strategy learns them (`bolin-meyer` learns of the picture): to be saved, or
+    /// loaded before the first iteration.
     pub fn cache(&self) -> Option<&Cache<'m>> {
         self.knowledge.cache()
     }
@@ -240,8 +240,8 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
         if self.running { None } else { self.knowledge.cache_mut() }
     }
 
-    /// The estimate of the pixels that the strategy works with, rgb planes; `None` if it needs none, or before the end of the
-    /// first iteration.
+    /// The estimate of the pixels that the strategy works with, rgb planes; `None` if it needs none, or before the end
+    /// of the first iteration.
     pub fn estimate(&self) -> Option<[&[f32]; 3]> {
         self.knowledge.estimate()
     }

@@ -29,7 +29,8 @@ pub struct Settings {
     pub max_depth: u32,
     /// Roulette and splitting.
     pub strategy: Strategy,
-    /// Vertices that may wait in a shard, at least [`MIN_RING`]; 512 keep packets full with every material in the scene.
+    /// Vertices that may wait in a shard, at least [`MIN_RING`]; 512 keep packets full with every material in the
+    /// scene.
     pub ring: u32,
     /// Samples that splitting may add to one camera sample; beyond it factors are at most 1 (unbiased, counted).
     pub split_budget: u32,
@@ -87,7 +88,8 @@ pub enum SettingsError {
         /// Bytes given.
         given: usize,
     },
-    /// The constant is not a finite number, is for `threshold`, or is to be the cached mean with a strategy that learns nothing of the scene.
+    /// The constant is not a finite number, is for `threshold`, or is to be the cached mean with a strategy that learns
+    /// nothing of the scene.
     Constant,
     /// A choice of [`Learning`] is out of range.
     Learning,

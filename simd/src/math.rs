@@ -190,8 +190,9 @@ impl F32x8 {
         y.eq(Self::ZERO).select(Self::ONE, r)
     }
 
-    /// (sin, cos) of 2 pi u, each within 1.65 ULP (also next to its zeros). The reduction is exact for every finite u (NUMERICS SMP-9): both are exactly 0 or
-    /// +-1 at multiples of 1/4 (the sign of such a zero means nothing). NaN at infinity.
+    /// (sin, cos) of 2 pi u, each within 1.65 ULP (also next to its zeros). The reduction is exact for every finite u
+    /// (NUMERICS SMP-9): both are exactly 0 or +-1 at multiples of 1/4 (the sign of such a zero means nothing). NaN at
+    /// infinity.
     #[inline(always)]
     pub fn sin_cos_2pi(self) -> (Self, Self) {
         let u = self - self.round();
@@ -233,8 +234,8 @@ impl F32x8 {
         big.select(FRAC_PI_2 - (v - FRAC_PI_2 * PI_LO), v).copysign(self)
     }
 
-    /// Angle of the point (x, self) in [-pi, pi] within 2 ULP, with the signs and limits of IEEE 754: a zero x takes its side
-    /// from its sign, and the origin is +-0 or +-pi.
+    /// Angle of the point (x, self) in [-pi, pi] within 2 ULP, with the signs and limits of IEEE 754: a zero x takes
+    /// its side from its sign, and the origin is +-0 or +-pi.
     #[inline(always)]
     pub fn atan2(self, x: Self) -> Self {
         let (ay, ax) = (self.abs(), x.abs());

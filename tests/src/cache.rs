@@ -229,7 +229,8 @@ pub fn overwrite(bytes: &mut [u8], mut sums: impl FnMut() -> Sums) {
     rehash(bytes);
 }
 
-/// Sums of a bin that have nothing to do with any scene, each number over many orders of magnitude; some bins are empty.
+/// Sums of a bin that have nothing to do with any scene, each number over many orders of magnitude; some bins are
+/// empty.
 pub fn random_sums(rng: &mut SplitMix) -> Sums {
     let mut log = |lo: f64, hi: f64| (rng.range(lo.ln(), hi.ln())).exp();
     let (count, pairs) = (log(1.0, 1e5), log(1.0, 1e5));

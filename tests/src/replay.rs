@@ -1,6 +1,7 @@
-//! Transport as the textbook has it: one sample at a time, by recursion, sums in f64. Random numbers come by key, so every
-//! sample of the packet machine can be told again; the ray, material and light functions are the core's own, tested elsewhere.
-//! What is independent here is the bookkeeping: which sample counts what, where, and how many rays it took.
+//! Transport as the textbook has it: one sample at a time, by recursion, sums in f64. Random numbers come by key, so
+//! every sample of the packet machine can be told again; the ray, material and light functions are the core's own,
+//! tested elsewhere. What is independent here is the bookkeeping: which sample counts what, where, and how many rays it
+//! took.
 //!
 //! For flat-shaded scenes of area lights without textures, lens and environment, and the absolute objective.
 

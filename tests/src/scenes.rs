@@ -138,9 +138,9 @@ pub fn place(scene: &mut SceneDescription, scale: f32, offset: f32) {
     (c.origin, c.target) = (c.origin.map(at64), c.target.map(at64));
 }
 
-/// The Cornell box with coloured walls and a lamp over most of the ceiling, 2 x 2 x 2 around the origin, seen through its
-/// open front. Every pixel sees floor or walls; the lamp itself is out of view, large, and the walls are dim, so that the
-/// noise of one sample stays below its mean.
+/// The Cornell box with coloured walls and a lamp over most of the ceiling, 2 x 2 x 2 around the origin, seen through
+/// its open front. Every pixel sees floor or walls; the lamp itself is out of view, large, and the walls are dim, so
+/// that the noise of one sample stays below its mean.
 pub fn cornell(size: [u32; 2]) -> SceneDescription {
     let mut s = SceneDescription {
         camera: camera([0.0, 0.0, 4.4], [0.0, -0.35, 0.0], 12.0, size),
@@ -220,7 +220,8 @@ pub fn glowing_box(rho: f32, radiance: f32, size: [u32; 2]) -> SceneDescription 
     s
 }
 
-/// A small diffuse floor spot at the origin, seen in all pixels from half a unit away at a slant (0, 0.6, 0.8), in the dark.
+/// A small diffuse floor spot at the origin, seen in all pixels from half a unit away at a slant (0, 0.6, 0.8), in the
+/// dark.
 pub fn spot(rho: f32, size: [u32; 2]) -> SceneDescription {
     let mut s =
         SceneDescription { camera: camera([0.0, 0.3, 0.4], [0.0; 3], 0.01, size), ..SceneDescription::default() };

@@ -144,8 +144,8 @@ pub struct ChiSquare {
     pub p: f64,
 }
 
-/// Compares counts with expected counts of the same total. Cells expected to hold fewer than `pool_below` are pooled into
-/// one. `p` is 0 if a cell expected to stay empty is not, or if the pooled cell alone is impossible.
+/// Compares counts with expected counts of the same total. Cells expected to hold fewer than `pool_below` are pooled
+/// into one. `p` is 0 if a cell expected to stay empty is not, or if the pooled cell alone is impossible.
 pub fn chi_square(observed: &[u64], expected: &[f64], pool_below: f64) -> ChiSquare {
     assert_eq!(observed.len(), expected.len());
     let (mut statistic, mut cells) = (0.0, 0usize);
@@ -179,8 +179,8 @@ pub fn chi_square(observed: &[u64], expected: &[f64], pool_below: f64) -> ChiSqu
     ChiSquare { statistic, dof, p }
 }
 
-/// P of counts this far from expected ones. Cells are pooled with those that follow until each expects at least 5: where
-/// most expect few and neighbours are alike, that tells more than [`chi_square`]'s one pool.
+/// P of counts this far from expected ones. Cells are pooled with those that follow until each expects at least 5:
+/// where most expect few and neighbours are alike, that tells more than [`chi_square`]'s one pool.
 ///
 /// # Panics
 /// If a cell that expects nothing has a count, or the sums differ by more than 1e-3 of the total.
@@ -233,8 +233,8 @@ impl Mean {
     }
 }
 
-/// Two one-sided tests: is the true difference within +-`delta`, with false-alarm probability `alpha`? A difference that
-/// is merely not significant does not pass.
+/// Two one-sided tests: is the true difference within +-`delta`, with false-alarm probability `alpha`? A difference
+/// that is merely not significant does not pass.
 pub fn equivalent(difference: f64, standard_error: f64, delta: f64, alpha: f64) -> bool {
     difference.abs() + normal_quantile_upper(alpha) * standard_error < delta
 }

@@ -106,9 +106,9 @@ fn one_bounce_shows_the_albedo() {
     }
 }
 
-/// The layer albedo of every model at that angle: 1 where light goes through; else the oracle's, exactly for smooth surfaces
-/// and at least that for rough ones, whose masked light counts as reflected. Killed by: the parameter `reflectance` in its
-/// place, which is 0 for glass and 1 for gold.
+/// The layer albedo of every model at that angle: 1 where light goes through; else the oracle's, exactly for smooth
+/// surfaces and at least that for rough ones, whose masked light counts as reflected. Killed by: the parameter
+/// `reflectance` in its place, which is 0 for glass and 1 for gold.
 #[test]
 fn first_hits_have_their_albedo() {
     for (model, case) in &pairs() {
@@ -160,8 +160,8 @@ fn backs_are_black_or_fronts() {
     }
 }
 
-/// A closed sphere that loses nothing is invisible, at every depth of paths and with roulette. Killed by: energy lost or
-/// gained in total internal reflection, 1/eta^2 on one side only, roulette that is not made up for.
+/// A closed sphere that loses nothing is invisible, at every depth of paths and with roulette. Killed by: energy lost
+/// or gained in total internal reflection, 1/eta^2 on one side only, roulette that is not made up for.
 #[test]
 fn lossless_spheres_are_invisible() {
     use MaterialKind::*;
@@ -215,9 +215,9 @@ fn glass_around_a_white_sphere_changes_nothing() {
     assert_radiance("sky from within glass", &image, [2.25; 3], limit(7));
 }
 
-/// In a closed box of albedo rho that emits L, radiance is L (1 + rho + rho^2 + ...), one term per path segment: L / (1 -
-/// rho) in the end. Killed by: a depth off by one, emission counted by both techniques in full, roulette that forgets its
-/// weight.
+/// In a closed box of albedo rho that emits L, radiance is L (1 + rho + rho^2 + ...), one term per path segment:
+/// L / (1 - rho) in the end. Killed by: a depth off by one, emission counted by both techniques in full, roulette that
+/// forgets its weight.
 #[test]
 fn closed_boxes_sum_the_geometric_series() {
     let depths = [1, 2, 3, 5, 12, 200];
@@ -261,8 +261,8 @@ fn a_closed_sphere_sums_the_geometric_series() {
     }
 }
 
-/// A closed white box without light ends: every path has exactly 200 segments. Killed by: no hard stop, one off by one, a
-/// setting that lifts it, a stop that is not counted.
+/// A closed white box without light ends: every path has exactly 200 segments. Killed by: no hard stop, one off by one,
+/// a setting that lifts it, a stop that is not counted.
 #[test]
 fn white_boxes_end_at_the_hard_stop() {
     let scene = blob(&glowing_box(1.0, 0.0, [4, 4]));

@@ -20,9 +20,9 @@ const LIMIT: f64 = 5.2;
 
 type V = [f64; 3];
 
-/// Irradiance at the origin of the plane y = 0 from a polygon of radiance 1 that emits to both sides (Lambert 1760): half
-/// the sum over edges of the angle they subtend times the cosine between the floor's normal and that of the plane through
-/// edge and origin, after clipping at the horizon.
+/// Irradiance at the origin of the plane y = 0 from a polygon of radiance 1 that emits to both sides (Lambert 1760):
+/// half the sum over edges of the angle they subtend times the cosine between the floor's normal and that of the plane
+/// through edge and origin, after clipping at the horizon.
 fn polygon_irradiance(corners: &[V]) -> f64 {
     let mut above: Vec<V> = Vec::new();
     for (i, p) in corners.iter().enumerate() {
@@ -170,8 +170,8 @@ fn reflected(case: &Case, corners: [[f32; 3]; 3]) -> f64 {
 }
 
 /// Highlights of an area light from sharp to broad: for sharp ones only scattered rays find the light, for broad ones
-/// only light samples do. Killed by: a weight of one technique with the other's density, a density per area, a lobe that
-/// `eval` knows and `sample` does not.
+/// only light samples do. Killed by: a weight of one technique with the other's density, a density per area, a lobe
+/// that `eval` knows and `sample` does not.
 #[test]
 fn highlights_match_quadrature() {
     let mirrored = [[-0.5, 0.7, -1.3], [0.5, 0.7, -1.3], [0.0, 1.4, -1.0]];
@@ -275,8 +275,8 @@ fn sky_irradiance(radiance: impl Fn(V) -> V) -> V {
     sum.map(|x| x * PI / f64::from(n * n))
 }
 
-/// An uneven, rotated map with one texel far brighter than the rest. Killed by: a rotation used the wrong way round, rows
-/// without their solid angle, the scale left out of radiance or of density.
+/// An uneven, rotated map with one texel far brighter than the rest. Killed by: a rotation used the wrong way round,
+/// rows without their solid angle, the scale left out of radiance or of density.
 #[test]
 fn environment_maps_light_by_their_integral() {
     let (width, height) = (9usize, 6usize);
@@ -350,9 +350,9 @@ fn lamps_do_not_stand_in_their_own_light() {
     }
 }
 
-/// Needles of every direction, thin rectangles' halves up to 1e6 : 1 and obtuse ones up to 1e3 : 1 (beyond, normals in f32
-/// tilt by a percent and more). Killed by: a lamp's triangle that a shadow ray hits before its end, because t is a mean of
-/// far away vertices with inexact weights; a normal from two nearly parallel edges.
+/// Needles of every direction, thin rectangles' halves up to 1e6 : 1 and obtuse ones up to 1e3 : 1 (beyond, normals in
+/// f32 tilt by a percent and more). Killed by: a lamp's triangle that a shadow ray hits before its end, because t is a
+/// mean of far away vertices with inexact weights; a normal from two nearly parallel edges.
 #[test]
 fn needles_shine_like_other_triangles() {
     let mut rng = SplitMix(21);
@@ -379,8 +379,8 @@ fn needles_shine_like_other_triangles() {
     }
 }
 
-/// A point light within 1e-10 of what it lights is taken for one at that distance, and every such sample is counted. Killed by:
-/// a silent clamp, a count of other lights.
+/// A point light within 1e-10 of what it lights is taken for one at that distance, and every such sample is counted.
+/// Killed by: a silent clamp, a count of other lights.
 #[test]
 fn lights_that_are_too_near_are_counted() {
     for (exponent, clamped) in [(0, false), (-32, false), (-40, true)] {

@@ -47,9 +47,9 @@ fn scores_are_standard_normal() {
     }
 }
 
-/// With roulette and splitting the stated errors are upper bounds: one comb rounds a packet, so that the roundings of its
-/// samples cancel, and the film takes the samples as independent. Killed by: a sum of squares per path instead of per
-/// camera sample (then splitting states too little).
+/// With roulette and splitting the stated errors are upper bounds: one comb rounds a packet, so that the roundings of
+/// its samples cancel, and the film takes the samples as independent. Killed by: a sum of squares per path instead of
+/// per camera sample (then splitting states too little).
 #[test]
 fn errors_with_roulette_are_upper_bounds() {
     let scene = grey_wall([8, 8]);
@@ -61,8 +61,8 @@ fn errors_with_roulette_are_upper_bounds() {
 }
 
 /// The estimated relMSE is the true one on average, and its 95 % interval holds it about that often; with few samples
-/// it errs on the high side (3 % at 16). Killed by: an epsilon that is not in the denominator, a mean over pixels of the
-/// wrong count, an interval of one standard error.
+/// it errs on the high side (3 % at 16). Killed by: an epsilon that is not in the denominator, a mean over pixels of
+/// the wrong count, an interval of one standard error.
 #[test]
 fn the_error_estimate_is_right_on_average() {
     let scene = grey_wall([16, 16]);
@@ -82,12 +82,13 @@ fn the_error_estimate_is_right_on_average() {
 }
 
 /// A diffuse box with strategies that end and split paths: `classic`, which starts late, states the true relMSE; where
-/// roulette or splitting meets every path, packets' combs make the true one smaller, up to 2.4 times: one iteration states
-/// an upper bound, several show it. Intervals miss on the low side, because few samples have met the rare bright paths: with
-/// 64 samples 84 of 100 intervals of `classic` hold the true error, with 16 those of `fixed:3.3` as many. The limits of the
-/// mean ratios after iterations were set beforehand; those of the intervals, and the 64 samples of `fixed:3.3`, were set
-/// after runs had shown this. Killed by: a sum of squares per path instead of per camera sample, weights of iterations that
-/// the sums of squares do not have, a ratio upside down, samples of one iteration compared instead of iterations.
+/// roulette or splitting meets every path, packets' combs make the true one smaller, up to 2.4 times: one iteration
+/// states an upper bound, several show it. Intervals miss on the low side, because few samples have met the rare bright
+/// paths: with 64 samples 84 of 100 intervals of `classic` hold the true error, with 16 those of `fixed:3.3` as many.
+/// The limits of the mean ratios after iterations were set beforehand; those of the intervals, and the 64 samples of
+/// `fixed:3.3`, were set after runs had shown this. Killed by: a sum of squares per path instead of per camera sample,
+/// weights of iterations that the sums of squares do not have, a ratio upside down, samples of one iteration compared
+/// instead of iterations.
 #[test]
 fn the_error_estimate_is_right_with_roulette_after_iterations() {
     let scene = blob(&cornell([16, 16]));
@@ -149,7 +150,8 @@ fn the_worst_pixels_are_left_out() {
     assert!(image.error.low < image.error.rel_mse && image.error.rel_mse < image.error.high);
 }
 
-/// One sample cannot know its error and does not claim to: its own square stands in. Killed by: a division by n - 1 = 0.
+/// One sample cannot know its error and does not claim to: its own square stands in. Killed by: a division by n - 1 =
+/// 0.
 #[test]
 fn one_sample_claims_nothing() {
     let scene = grey_wall([4, 4]);

@@ -31,9 +31,9 @@ fn add_wall_of_light(s: &mut SceneDescription, z: f32) {
     s.emitters.push(Emitter::Area { material: lamp, radiance: [1.0; 3] });
 }
 
-/// A glass pane seen at 0 to 70 degrees passes (1 - R) / (1 + R) and reflects 2 R / (1 + R), as a real slab with all its
-/// inner reflections and as a thin sheet. Killed by: a wrong Fresnel term from inside, 1/eta^2 left out on the way out,
-/// paths that end early.
+/// A glass pane seen at 0 to 70 degrees passes (1 - R) / (1 + R) and reflects 2 R / (1 + R), as a real slab with all
+/// its inner reflections and as a thin sheet. Killed by: a wrong Fresnel term from inside, 1/eta^2 left out on the way
+/// out, paths that end early.
 #[test]
 fn slabs_pass_and_reflect_by_fresnel() {
     let (int_ior, ext_ior) = (1.5, 1.0);
@@ -63,8 +63,8 @@ fn slabs_pass_and_reflect_by_fresnel() {
     }
 }
 
-/// Four reflections between parallel mirrors, then the sky: r^4, and nothing if paths end one segment earlier. Killed by:
-/// a reflection about the wrong normal, a depth off by one.
+/// Four reflections between parallel mirrors, then the sky: r^4, and nothing if paths end one segment earlier. Killed
+/// by: a reflection about the wrong normal, a depth off by one.
 #[test]
 fn mirror_corridors_multiply() {
     let mut s = under_white_sky(camera([0.0; 3], [1.0, 0.0, 1.0], 0.05, [4, 4]));
@@ -85,8 +85,8 @@ fn mirror_corridors_multiply() {
     assert_eq!(render_as(&s, "none", 4, 16).mean(), 0.0);
 }
 
-/// Depth 1 sees emitters and the sky, depth 2 adds direct light, depth 3 one reflection more. Killed by: an emitter that
-/// is not seen directly, light samples at the last vertex.
+/// Depth 1 sees emitters and the sky, depth 2 adds direct light, depth 3 one reflection more. Killed by: an emitter
+/// that is not seen directly, light samples at the last vertex.
 #[test]
 fn depth_counts_segments() {
     let mut s = under_white_sky(camera([0.0, 1.0, 6.0], [0.0, 1.0, 0.0], 40.0, [32, 32]));
@@ -200,7 +200,8 @@ fn backs_do_not_emit() {
     }
 }
 
-/// A lens leaves the furnace alone and blurs what is out of focus, with the same total. Killed by: weights of lens samples.
+/// A lens leaves the furnace alone and blurs what is out of focus, with the same total. Killed by: weights of lens
+/// samples.
 #[test]
 fn lenses_blur_but_keep_light() {
     let scene = |radius: f32, focus_distance: f32| {

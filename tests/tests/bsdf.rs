@@ -93,8 +93,8 @@ fn eval_is_the_oracles() {
     pdf.check("pdf");
 }
 
-/// Samples that are not delta: density and weight are the oracle's at the sampled direction.
-/// Killed by: weight without G1(wi); lobe probabilities in the weight but not in the density; a density of m, not of wi.
+/// Samples that are not delta: density and weight are the oracle's at the sampled direction. Killed by: weight without
+/// G1(wi); lobe probabilities in the weight but not in the density; a density of m, not of wi.
 #[test]
 fn samples_carry_the_oracles_weight_and_density() {
     let (mut weight, mut pdf) = (Worst::default(), Worst::default());
@@ -257,9 +257,9 @@ fn corners_stay_finite() {
     }
 }
 
-/// Lanes outside the mask hold indices of no material, NaN colours, NaN and infinite directions and numbers: the others'
-/// bits do not change, and NaN scatters nothing.
-/// Killed by: indexing without the mask; a reduction over lanes; `valid` from a negated comparison.
+/// Lanes outside the mask hold indices of no material, NaN colours, NaN and infinite directions and numbers: the
+/// others' bits do not change, and NaN scatters nothing. Killed by: indexing without the mask; a reduction over lanes;
+/// `valid` from a negated comparison.
 #[test]
 fn dead_lanes_do_not_disturb() {
     let mut rng = SplitMix(5);
@@ -288,9 +288,9 @@ fn dead_lanes_do_not_disturb() {
     }
 }
 
-/// Around the critical angle, +-64 neighbouring cosines: no sample passes where the interface says total reflection, and
-/// the last random number passes where it does not (NUMERICS FRE-2).
-/// Killed by: a second, textbook decision about total reflection in sampling.
+/// Around the critical angle, +-64 neighbouring cosines: no sample passes where the interface says total reflection,
+/// and the last random number passes where it does not (NUMERICS FRE-2). Killed by: a second, textbook decision about
+/// total reflection in sampling.
 #[test]
 fn total_reflection_is_one_decision() {
     let mut rng = SplitMix(6);

@@ -1,5 +1,5 @@
-//! Scattering models as a whole: samples follow their density, densities integrate to 1, energy is what quadrature of the
-//! oracle says.
+//! Scattering models as a whole: samples follow their density, densities integrate to 1, energy is what quadrature of
+//! the oracle says.
 
 use croupier::scene::blob::MaterialKind;
 use croupier::simd::{F32x8, Mask8};
@@ -94,10 +94,10 @@ fn configurations() -> Vec<(Case, V)> {
     all
 }
 
-/// 2^20 samples of each configuration against cell probabilities from quadrature of the oracle's density; lost and delta
-/// samples are a cell of their own, so that the total is tested as well. One false alarm in 1e6 runs of all.
-/// Killed by: the visible-normal map without the stretch back; a lobe probability off by 1 %; weights cut at the horizon
-/// in the density only.
+/// 2^20 samples of each configuration against cell probabilities from quadrature of the oracle's density; lost and
+/// delta samples are a cell of their own, so that the total is tested as well. One false alarm in 1e6 runs of all.
+/// Killed by: the visible-normal map without the stretch back; a lobe probability off by 1 %; weights cut at the
+/// horizon in the density only.
 #[test]
 fn samples_follow_the_density() {
     let configurations = configurations();
@@ -234,9 +234,8 @@ fn energy(case: &Case, wo: V, n: usize) -> f64 {
     sum
 }
 
-/// The energy does not jump where the transmitted lobe becomes a delta lobe (NUMERICS REF-2), nor where alpha reaches its
-/// floor (GGX-2).
-/// Killed by: weight 1 for G1 in the delta region; a smooth Fresnel there.
+/// The energy does not jump where the transmitted lobe becomes a delta lobe (NUMERICS REF-2), nor where alpha reaches
+/// its floor (GGX-2). Killed by: weight 1 for G1 in the delta region; a smooth Fresnel there.
 #[test]
 fn switches_do_not_show() {
     let rough = |eta: f32, alpha: f32| Case::new(MaterialKind::RoughDielectric, [0.0; 3], [eta; 3], [0.0; 3], alpha);

@@ -123,10 +123,10 @@ fn jitter_stays_within_half_a_leaf() {
     assert!(seen > 30_000 && (share - 37.0 / 64.0).abs() < 0.02, "{share} of {seen}");
 }
 
-/// From the middle of a dark cell to the middle of a bright one: what is looked up, averaged over the jitter, goes up in a
-/// straight line from cell to cell, also where one has half the edge of the other; without jitter it jumps by all of the
-/// difference at the border. So blocks of cells do not show. Killed by: no jitter or half of it, an edge that is not that of
-/// the place's own cell.
+/// From the middle of a dark cell to the middle of a bright one: what is looked up, averaged over the jitter, goes up
+/// in a straight line from cell to cell, also where one has half the edge of the other; without jitter it jumps by all
+/// of the difference at the border. So blocks of cells do not show. Killed by: no jitter or half of it, an edge that is
+/// not that of the place's own cell.
 #[test]
 fn borders_of_cells_do_not_show() {
     for (samples, edge) in [(1000, 2.0f32), (4000, 1.0)] {
@@ -313,8 +313,8 @@ fn a_full_arena_refuses_and_counts() {
     assert_eq!(cache.splits_refused(), refused);
 }
 
-/// A cell that has met nothing bright leans on its surroundings, which have; the more samples it has, the less. Killed by:
-/// shrinking towards the leaf only.
+/// A cell that has met nothing bright leans on its surroundings, which have; the more samples it has, the less. Killed
+/// by: shrinking towards the leaf only.
 #[test]
 fn cells_lean_on_their_surroundings() {
     let (mut blocks, mut rng) = (Blocks::leaves(60, 1), SplitMix(11));
@@ -339,10 +339,10 @@ fn cells_lean_on_their_surroundings() {
     assert!(moments[0] > 0.0 && moments[1] > 0.0 && moments[1] < 0.01 * moments[0], "{moments:?}");
 }
 
-/// Roots of visibilities against f64: directions that shadow rays were traced in, those that were not and lean on their leaf,
-/// a cell that leans on its surroundings, nothing known; shadow rays go to the leaf of their vertex and to the bin of their own
-/// direction. Killed by: rounding down, a share instead of its root, the vertex's bin, shrinking by all samples of a bin
-/// instead of its shadow rays, no memory of earlier iterations.
+/// Roots of visibilities against f64: directions that shadow rays were traced in, those that were not and lean on their
+/// leaf, a cell that leans on its surroundings, nothing known; shadow rays go to the leaf of their vertex and to the
+/// bin of their own direction. Killed by: rounding down, a share instead of its root, the vertex's bin, shrinking by
+/// all samples of a bin instead of its shadow rays, no memory of earlier iterations.
 #[test]
 fn visibilities_are_what_shadow_rays_met() {
     let (mut blocks, mut rng) = (Blocks::leaves(60, 1), SplitMix(13));
@@ -406,8 +406,8 @@ fn visibilities_are_what_shadow_rays_met() {
     is(roots(&cache, LO, up), bin(18.5, 600.0, leaf(18.5, 600.0)));
 }
 
-/// Bins are shrunk towards their leaf; those without samples say so; pairs take over the variance. Killed by: no shrinkage, a
-/// count with samples of other bins, pair sums ignored, a moment below the mean's square.
+/// Bins are shrunk towards their leaf; those without samples say so; pairs take over the variance. Killed by: no
+/// shrinkage, a count with samples of other bins, pair sums ignored, a moment below the mean's square.
 #[test]
 fn what_is_looked_up() {
     let mut blocks = Blocks::leaves(2, 1);
@@ -440,8 +440,8 @@ fn what_is_looked_up() {
     }
 }
 
-/// What is looked up is what was gathered, up to the stated rounding, and bins that are not in use are empty. Killed by:
-/// fewer bits, rounding the other way, channels or moments that change places, whatever memory held.
+/// What is looked up is what was gathered, up to the stated rounding, and bins that are not in use are empty. Killed
+/// by: fewer bits, rounding the other way, channels or moments that change places, whatever memory held.
 #[test]
 fn look_ups_round_as_stated() {
     let ulp = 2f64.powi(-7);

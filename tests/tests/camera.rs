@@ -60,8 +60,8 @@ fn pixels_map_to_the_image_plane() {
     }
 }
 
-/// All rays of an image point meet in the plane in focus, where the pinhole's ray meets it; the origins lie on the lens.
-/// Killed by: focus distance along the ray instead of the axis, lens offset not subtracted from the direction.
+/// All rays of an image point meet in the plane in focus, where the pinhole's ray meets it; the origins lie on the
+/// lens. Killed by: focus distance along the ray instead of the axis, lens offset not subtracted from the direction.
 #[test]
 fn lens_rays_meet_in_the_plane_in_focus() {
     let (pinhole, _) = camera(60.0, 0.0, 0.0);
@@ -115,7 +115,8 @@ fn lens_samples_are_uniform() {
     assert!(p > 1e-6, "p = {p}");
 }
 
-/// The map's Jacobian is pi, the area of the disk, everywhere inside the four triangles. Killed by: any distortion of radius or angle.
+/// The map's Jacobian is pi, the area of the disk, everywhere inside the four triangles. Killed by: any distortion of
+/// radius or angle.
 #[test]
 fn the_lens_map_preserves_area() {
     let (n, h) = (64, 1.0 / 512.0);

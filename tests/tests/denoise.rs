@@ -74,7 +74,8 @@ fn mse(a: &[Rgb], b: &[Rgb]) -> f64 {
     a.as_flattened().iter().zip(b.as_flattened()).map(square).sum::<f64>() / (3 * a.len()) as f64
 }
 
-/// Killed by: the variance not carried from level to level, the correction of the level left out, a margin that takes part.
+/// Killed by: the variance not carried from level to level, the correction of the level left out, a margin that takes
+/// part.
 #[test]
 fn noise_goes_and_the_mean_stays() {
     for (n, seed) in [(4, 1), (4, 2), (16, 3)] {
@@ -88,8 +89,8 @@ fn noise_goes_and_the_mean_stays() {
     }
 }
 
-/// Without an albedo or a normal to tell: the errors alone keep the edge. Killed by: the distance of the colors left out
-/// of the weight.
+/// Without an albedo or a normal to tell: the errors alone keep the edge. Killed by: the distance of the colors left
+/// out of the weight.
 #[test]
 fn an_edge_that_noise_does_not_explain_stays() {
     let truth = Picture::exact([64, 48], |x, _| if x < 31 { [0.1; 3] } else { [1.0; 3] });
@@ -146,8 +147,8 @@ fn a_picture_without_noise_comes_back() {
     }
 }
 
-/// An exact lamp in a noisy wall: it neither bleeds nor takes part in the correction of the level; only its rim knows of
-/// the wall's noise. Killed by: the weight `noisy` of the correction set to 1.
+/// An exact lamp in a noisy wall: it neither bleeds nor takes part in the correction of the level; only its rim knows
+/// of the wall's noise. Killed by: the weight `noisy` of the correction set to 1.
 #[test]
 fn a_lamp_keeps_its_value() {
     let lamp = |x: usize, y: usize| (30..40).contains(&x) && (10..20).contains(&y);

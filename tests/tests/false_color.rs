@@ -56,8 +56,8 @@ fn other_scales_end_at_round_numbers() {
     }
 }
 
-/// Killed by: a legend over the picture, a bar of other colours than the picture's, labels left out or drawn one over the
-/// other, a picture too narrow for its legend.
+/// Killed by: a legend over the picture, a bar of other colours than the picture's, labels left out or drawn one over
+/// the other, a picture too narrow for its legend.
 #[test]
 fn the_legend_is_below_and_complete() {
     for (width, height) in [(1, 1), (3, 500), (192, 108), (1280, 4)] {

@@ -17,8 +17,8 @@ fn bad_error() -> Option<ErrorEstimate> {
     Some(ErrorEstimate { rel_mse: 1.0, low: 0.9, high: 1.1, rel_mse_all: 1.0, independence: 1.0 })
 }
 
-/// Killed by: planning by the mean cost of all samples, by samples alone, growth beyond doubling, no iteration at all when
-/// a sample costs more than everything before.
+/// Killed by: planning by the mean cost of all samples, by samples alone, growth beyond doubling, no iteration at all
+/// when a sample costs more than everything before.
 #[test]
 fn growth_is_in_work_for_strategies_that_learn() {
     let all = work(16, 1600, 1.6);
@@ -44,8 +44,8 @@ fn growth_is_in_work_for_strategies_that_learn() {
     }
 }
 
-/// Killed by: iterations that pass what is left, by seconds or rays of the mean where the last counts, a target in samples
-/// that is passed or looks at the clock.
+/// Killed by: iterations that pass what is left, by seconds or rays of the mean where the last counts, a target in
+/// samples that is passed or looks at the clock.
 #[test]
 fn no_iteration_is_longer_than_what_is_left() {
     let (all, last) = (work(40, 4000, 10.0), work(10, 2000, 4.0));

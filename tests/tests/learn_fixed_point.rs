@@ -1,5 +1,5 @@
-//! The factors of EARS are those of least variance x cost: on the paper's two-dimensional example (section 4.1, figure 2)
-//! against a numerical minimum, and in the machine, where they settle.
+//! The factors of EARS are those of least variance x cost: on the paper's two-dimensional example (section 4.1, figure
+//! 2) against a numerical minimum, and in the machine, where they settle.
 
 use croupier::Settings;
 use croupier::learn::Learning;
@@ -98,8 +98,8 @@ impl Example {
     }
 }
 
-/// Thirty examples, grey and coloured, for roulette alone and for roulette and splitting. Killed by: a cost or variance upside
-/// down, a moment where the variance belongs, factors that are not squared roots, a norm taken before the sum.
+/// Thirty examples, grey and coloured, for roulette alone and for roulette and splitting. Killed by: a cost or variance
+/// upside down, a moment where the variance belongs, factors that are not squared roots, a norm taken before the sum.
 #[test]
 fn the_fixed_point_is_the_numerical_minimum() {
     let mut rng = SplitMix(42);
@@ -125,9 +125,9 @@ fn the_fixed_point_is_the_numerical_minimum() {
     assert!(killed > 100 && split > 50 && left > 20);
 }
 
-/// In the machine, with iterations of one length and nothing carried over, cost, variance and efficiency settle. Killed by:
-/// statistics that drift because samples are logged with the factors of the iteration before, a picture's variance that
-/// grows with the number of iterations.
+/// In the machine, with iterations of one length and nothing carried over, cost, variance and efficiency settle. Killed
+/// by: statistics that drift because samples are logged with the factors of the iteration before, a picture's variance
+/// that grows with the number of iterations.
 #[test]
 fn factors_settle_in_the_machine() {
     let scene = blob(&cornell([24, 24]));

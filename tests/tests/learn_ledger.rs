@@ -1,5 +1,5 @@
-//! What the machine logs is what a recursive oracle finds with the same random numbers, and a ledger that is too small spoils
-//! nothing.
+//! What the machine logs is what a recursive oracle finds with the same random numbers, and a ledger that is too small
+//! spoils nothing.
 
 use croupier::accel::WideBvh;
 use croupier::learn::cache::{Cache, CacheSize, Kind};
@@ -14,8 +14,8 @@ use croupier_tests::scenes::*;
 
 const IN_ORDER: Schedule = Schedule::InOrder(1 << 20);
 
-/// One leaf for every kind of vertices: bins stay what they are. Errors are absolute, so that values have the unit that the
-/// oracle gives them.
+/// One leaf for every kind of vertices: bins stay what they are. Errors are absolute, so that values have the unit that
+/// the oracle gives them.
 fn whole_leaves(scene: &[u8], max_depth: u32) -> Settings {
     let s = settings(scene, "ears:plain");
     let learning = Learning {
@@ -131,8 +131,8 @@ fn check(what: &str, b: &Both) {
     }
 }
 
-/// Without splitting. Killed by: a sample logged in the bin it arrives at instead of the one it leaves, values with the weight
-/// of the path before them, emission without its MIS weight, the first camera ray charged to a sample.
+/// Without splitting. Killed by: a sample logged in the bin it arrives at instead of the one it leaves, values with the
+/// weight of the path before them, emission without its MIS weight, the first camera ray charged to a sample.
 #[test]
 fn single_samples_are_logged_as_recursion_has_them() {
     for (name, scene) in [("lamp", lamp_box()), ("mirror and glass", mirror_and_glass())] {
@@ -146,8 +146,8 @@ fn single_samples_are_logged_as_recursion_has_them() {
     }
 }
 
-/// With twenty samples at every vertex, nested. Killed by: an inner estimate over n or over nothing, samples of a split vertex
-/// whose cost is counted once, a sum that is folded into the parent before it is complete.
+/// With twenty samples at every vertex, nested. Killed by: an inner estimate over n or over nothing, samples of a split
+/// vertex whose cost is counted once, a sum that is folded into the parent before it is complete.
 #[test]
 fn nested_splits_are_logged_as_recursion_has_them() {
     for (name, scene) in [("lamp", lamp_box()), ("mirror and glass", mirror_and_glass())] {
@@ -164,9 +164,9 @@ fn nested_splits_are_logged_as_recursion_has_them() {
     }
 }
 
-/// Two faces of a matte edge and a mirror beside it, all in one cell and seen in one picture: each has bins of its own, with
-/// its own radiance, or with that over its pixels where errors are relative. Killed by: bins by the direction of the viewer
-/// alone, a mirror among the matte surfaces, first vertices in other units.
+/// Two faces of a matte edge and a mirror beside it, all in one cell and seen in one picture: each has bins of its own,
+/// with its own radiance, or with that over its pixels where errors are relative. Killed by: bins by the direction of
+/// the viewer alone, a mirror among the matte surfaces, first vertices in other units.
 #[test]
 fn faces_and_materials_in_one_cell_stay_apart() {
     let mut s = under_white_sky(camera([0.0, 1.0, 1.0], [0.0; 3], 20.0, [16, 16]));
@@ -200,9 +200,9 @@ fn faces_and_materials_in_one_cell_stay_apart() {
     }
 }
 
-/// A ledger for a few samples: one iteration has the picture of a large one to the bit, what finds no record is counted, and
-/// what is logged are complete samples: of no bin more than there are. Killed by: a path that ends with its record, a sample
-/// that is logged without what its children would have added.
+/// A ledger for a few samples: one iteration has the picture of a large one to the bit, what finds no record is
+/// counted, and what is logged are complete samples: of no bin more than there are. Killed by: a path that ends with
+/// its record, a sample that is logged without what its children would have added.
 #[test]
 fn a_full_ledger_changes_no_picture() {
     for scene in [blob(&lamp_box()), blob(&mirror_and_glass())] {
@@ -230,8 +230,8 @@ fn a_full_ledger_changes_no_picture() {
     }
 }
 
-/// Shadow rays that play roulette leave the means of what is logged alone, within 1 %. Killed by: contributions that are divided
-/// by their chance in the picture only.
+/// Shadow rays that play roulette leave the means of what is logged alone, within 1 %. Killed by: contributions that
+/// are divided by their chance in the picture only.
 #[test]
 fn shadow_roulette_does_not_change_what_is_logged() {
     let scene = blob(&cornell([16, 16]));
@@ -252,9 +252,9 @@ fn shadow_roulette_does_not_change_what_is_logged() {
     assert!((with / without - 1.0).abs() < 0.01, "{with} for {without}");
 }
 
-/// Complete samples only: with a small ledger a bin's samples cost at least what any sample costs, and where paths have one
-/// bounce left the means are those of a large one. Killed by: a spoiled sample that is logged all the same (too cheap and too
-/// dark).
+/// Complete samples only: with a small ledger a bin's samples cost at least what any sample costs, and where paths have
+/// one bounce left the means are those of a large one. Killed by: a spoiled sample that is logged all the same (too
+/// cheap and too dark).
 #[test]
 fn only_complete_samples_are_logged() {
     let scene = blob(&lamp_box());

@@ -1,5 +1,5 @@
-//! What the statistics leave out, and in which units first vertices are kept: one sample of enormous weight must not decide
-//! all factors.
+//! What the statistics leave out, and in which units first vertices are kept: one sample of enormous weight must not
+//! decide all factors.
 
 use croupier::Settings;
 use croupier::film::PixelStats;
@@ -27,8 +27,8 @@ fn starry(stars: usize) -> SceneDescription {
     s
 }
 
-/// Of 4096 pixels the 5 with the largest errors (0.1 %, rounded down, and one) are left out of the picture's variance, and kept
-/// apart. Killed by: outliers that count, more or fewer of them, a limit that is not the smallest outlier's.
+/// Of 4096 pixels the 5 with the largest errors (0.1 %, rounded down, and one) are left out of the picture's variance,
+/// and kept apart. Killed by: outliers that count, more or fewer of them, a limit that is not the smallest outlier's.
 #[test]
 fn the_worst_thousandth_is_kept_apart() {
     let measured = |stars: usize| {
@@ -61,9 +61,9 @@ fn the_worst_thousandth_is_kept_apart() {
     assert!(share > 5.0 / 40.0 && share < 10.0 / 40.0, "{share}: 5 of 40 stars, the brightest");
 }
 
-/// Light samples of a floor of which one in 20,000 is 20,000 times as bright as the others: in the moments of its cells it
-/// counts no more than the limit. Killed by: contributions that are logged as they are, a limit in other units than those of
-/// the error, a clip that reaches the picture.
+/// Light samples of a floor of which one in 20,000 is 20,000 times as bright as the others: in the moments of its cells
+/// it counts no more than the limit. Killed by: contributions that are logged as they are, a limit in other units than
+/// those of the error, a clip that reaches the picture.
 #[test]
 fn moments_leave_fireflies_out() {
     let mut s = SceneDescription {
@@ -96,13 +96,13 @@ fn moments_leave_fireflies_out() {
     let seen = image.pixels.iter().map(moment).sum::<f64>() / image.pixels.len() as f64 / sun;
     let logged = sums[6] / sums[0];
     assert!(seen > 1000.0, "{seen}: no firefly was met, so nothing is tested");
-    // sun and sky, two lights of about equal light and chance, have the square of their sum as second moment: between 0.44 and 1 of
-    // the pixel's square, as the pixel's estimate knows of the fireflies or not
+    // sun and sky, two lights of about equal light and chance, have the square of their sum as second moment: between
+    // 0.44 and 1 of the pixel's square, as the pixel's estimate knows of the fireflies or not
     assert!(sums[0] > 1e5 && (0.3..3.0).contains(&logged), "{logged} in units of the pixel's square, {seen} seen");
 }
 
-/// Values at vertices that the camera sees are in units of their pixel: a bright and a dim picture of the same thing teach the
-/// same. Killed by: radiance, or radiance over albedo, in their place; a unit that is not that of the error.
+/// Values at vertices that the camera sees are in units of their pixel: a bright and a dim picture of the same thing
+/// teach the same. Killed by: radiance, or radiance over albedo, in their place; a unit that is not that of the error.
 #[test]
 fn first_vertices_count_in_pixels() {
     for radiance in [0.1f32, 100.0] {

@@ -1,5 +1,5 @@
-//! What was learned as part of a session: saved and loaded, carried over, counted, of another scene, in little memory, and in
-//! the face of numbers that are none.
+//! What was learned as part of a session: saved and loaded, carried over, counted, of another scene, in little memory,
+//! and in the face of numbers that are none.
 
 use croupier::film::PixelStats;
 use croupier::learn::cache::{BIN_LIMIT, CacheError, CacheSize};
@@ -28,8 +28,9 @@ fn taught(scene: &[u8], s: &Settings, iterations: &[u32]) -> Vec<u8> {
     bytes.unwrap()
 }
 
-/// A cache that is saved and loaded between two iterations gives the same factors: the picture has the same bits. Killed by: a
-/// sum that is not saved, shares of divided leaves that are dealt out again, look-ups that hang on the numbers of leaves.
+/// A cache that is saved and loaded between two iterations gives the same factors: the picture has the same bits.
+/// Killed by: a sum that is not saved, shares of divided leaves that are dealt out again, look-ups that hang on the
+/// numbers of leaves.
 #[test]
 fn loading_what_was_saved_changes_nothing() {
     for scene in [blob(&cornell([24, 16])), blob(&everything([24, 16]))] {
@@ -54,8 +55,8 @@ fn loading_what_was_saved_changes_nothing() {
     }
 }
 
-/// Statistics loaded before the first iteration change its successors, and with them the picture. Killed by: a first iteration
-/// that forgets them.
+/// Statistics loaded before the first iteration change its successors, and with them the picture. Killed by: a first
+/// iteration that forgets them.
 #[test]
 fn loaded_statistics_are_used() {
     let scene = blob(&cornell([16, 16]));
@@ -72,8 +73,8 @@ fn loaded_statistics_are_used() {
     assert!(without.bits() != with.bits());
 }
 
-/// Counts of the cache are those of the counters, and an iteration hands on what `carry` says. Killed by: samples that are
-/// counted and not logged, shards left out, statistics that decay once per shard.
+/// Counts of the cache are those of the counters, and an iteration hands on what `carry` says. Killed by: samples that
+/// are counted and not logged, shards left out, statistics that decay once per shard.
 #[test]
 fn counts_agree_and_decay() {
     let scene = blob(&cornell([16, 16]));
@@ -98,8 +99,8 @@ fn counts_agree_and_decay() {
     }
 }
 
-/// A bin takes so many samples of a shard in an iteration and no more; the others are counted. Killed by: a limit that looks
-/// at anything but the count, refusals that are not counted.
+/// A bin takes so many samples of a shard in an iteration and no more; the others are counted. Killed by: a limit that
+/// looks at anything but the count, refusals that are not counted.
 #[test]
 fn full_bins_refuse_and_count() {
     let scene = blob(&cornell([16, 16]));
@@ -120,8 +121,8 @@ fn full_bins_refuse_and_count() {
     assert_eq!(counts.iter().sum::<f64>(), (c.samples_logged - c.samples_refused) as f64);
 }
 
-/// Of 16 samples of a pixel the first 3 teach what 3 samples do, and all of them make the picture. Killed by: a limit that is
-/// not looked at, one too many or too few, the last samples instead of the first, pictures without the others.
+/// Of 16 samples of a pixel the first 3 teach what 3 samples do, and all of them make the picture. Killed by: a limit
+/// that is not looked at, one too many or too few, the last samples instead of the first, pictures without the others.
 #[test]
 fn the_first_samples_of_a_pixel_are_learned_from() {
     let scene = blob(&cornell([16, 16]));
@@ -151,10 +152,10 @@ fn the_first_samples_of_a_pixel_are_learned_from() {
     assert_eq!(paths, all);
 }
 
-/// A bright lamp behind a wall, and one before the open side of the box: where light samples never arrive, most shadow rays are
-/// spared after the first iteration, and few where they do. Both pictures agree with those of full light sampling.
-/// Killed by: visibility that is not learned, that is learned of the vertices' own directions, that counts spared rays as
-/// hidden, that is not used.
+/// A bright lamp behind a wall, and one before the open side of the box: where light samples never arrive, most shadow
+/// rays are spared after the first iteration, and few where they do. Both pictures agree with those of full light
+/// sampling. Killed by: visibility that is not learned, that is learned of the vertices' own directions, that counts
+/// spared rays as hidden, that is not used.
 #[test]
 fn lamps_behind_walls_get_few_shadow_rays() {
     // the box is open in front
@@ -176,9 +177,9 @@ fn lamps_behind_walls_get_few_shadow_rays() {
     assert!(hidden < 0.3 && open > 0.8, "{hidden} {open}");
 }
 
-/// Statistics of other bounds are refused with what differs, and nothing has changed. Of other things within the same bounds
-/// they are taken: they change the noise, no mean (`learn_unbiased.rs` loads random ones). Killed by: bounds that are not
-/// looked at, a cache that is emptied before the bytes are checked.
+/// Statistics of other bounds are refused with what differs, and nothing has changed. Of other things within the same
+/// bounds they are taken: they change the noise, no mean (`learn_unbiased.rs` loads random ones). Killed by: bounds
+/// that are not looked at, a cache that is emptied before the bytes are checked.
 #[test]
 fn statistics_of_another_scene_are_refused() {
     let scene = blob(&cornell([16, 16]));
@@ -200,8 +201,9 @@ fn statistics_of_another_scene_are_refused() {
     assert!(run(true).bits() == run(false).bits());
 }
 
-/// Values of first vertices are in units of their pixel or not, as the objective wants: statistics say which, and a session
-/// with the other refuses them. What else differs is no reason to. Killed by: a cache that is told a fixed objective.
+/// Values of first vertices are in units of their pixel or not, as the objective wants: statistics say which, and a
+/// session with the other refuses them. What else differs is no reason to. Killed by: a cache that is told a fixed
+/// objective.
 #[test]
 fn statistics_of_another_objective_are_refused() {
     let scene = blob(&cornell([16, 16]));
@@ -219,8 +221,8 @@ fn statistics_of_another_objective_are_refused() {
     }
 }
 
-/// Statistics over the picture are of no use to another session: they are not offered. Killed by: bytes that say they are a
-/// tree and are none.
+/// Statistics over the picture are of no use to another session: they are not offered. Killed by: bytes that say they
+/// are a tree and are none.
 #[test]
 fn statistics_of_the_picture_are_not_saved() {
     let scene = blob(&cornell([16, 16]));
@@ -232,8 +234,8 @@ fn statistics_of_the_picture_are_not_saved() {
     }
 }
 
-/// Radiance that overflows in f32: the film leaves it out, and so do the statistics, whose sums stay finite. Killed by: a value
-/// that is logged before it is looked at, an infinity whose pair is a NaN.
+/// Radiance that overflows in f32: the film leaves it out, and so do the statistics, whose sums stay finite. Killed by:
+/// a value that is logged before it is looked at, an infinity whose pair is a NaN.
 #[test]
 fn overflowing_radiance_is_not_learned() {
     let mut s =
@@ -290,8 +292,8 @@ fn extreme_statistics_do_no_harm() {
     }
 }
 
-/// Everything at once in 256 KiB besides the film, and the mean is right. Killed by: a slab that is too small for its index, a
-/// cache that needs more than it was given.
+/// Everything at once in 256 KiB besides the film, and the mean is right. Killed by: a slab that is too small for its
+/// index, a cache that needs more than it was given.
 #[test]
 fn everything_fits_in_little_memory() {
     let scene = blob(&cornell([32, 32]));
@@ -320,8 +322,8 @@ fn everything_fits_in_little_memory() {
     assert!(image.counters.samples_logged > 100_000);
 }
 
-/// Adaptive sampling deals out what was asked for, in pictures whose tiles differ in size and much in error. Killed by: shares
-/// that are bounded after they were made to add up, a least sample of each pixel that comes on top.
+/// Adaptive sampling deals out what was asked for, in pictures whose tiles differ in size and much in error. Killed by:
+/// shares that are bounded after they were made to add up, a least sample of each pixel that comes on top.
 #[test]
 fn adaptive_samples_are_as_many_as_were_asked_for() {
     let mut scene = mirror_and_glass();

@@ -1,10 +1,10 @@
-//! Whatever was learned, and however, the mean stays: equivalence tests (TOST) of strategies that learn, of their settings and
-//! of statistics that are nonsense, against renders without roulette and against known radiance.
+//! Whatever was learned, and however, the mean stays: equivalence tests (TOST) of strategies that learn, of their
+//! settings and of statistics that are nonsense, against renders without roulette and against known radiance.
 //!
-//! As in `unbiased.rs`: equal is a difference within 0.2 % of the mean with 95 % confidence from both sides, standard errors
-//! are asserted to be below 0.06 %. A bias of 0.2 % passes with a probability of 5 %, one of 0.3 % with less than 1e-4.
-//! Here the iterations of a render are not independent; where that may matter the error comes from renders with different
-//! seeds.
+//! As in `unbiased.rs`: equal is a difference within 0.2 % of the mean with 95 % confidence from both sides, standard
+//! errors are asserted to be below 0.06 %. A bias of 0.2 % passes with a probability of 5 %, one of 0.3 % with less
+//! than 1e-4. Here the iterations of a render are not independent; where that may matter the error comes from renders
+//! with different seeds.
 
 use croupier::film::{PixelAov, PixelStats};
 use croupier::learn::{Constant, Estimate, Learning, Objective};
@@ -95,7 +95,8 @@ fn strategies() -> Vec<String> {
 }
 
 /// In a closed box that glows radiance is L / (1 - rho) everywhere; paths never find a way out, so every factor counts.
-/// Killed by: weights over n, a sample counted into the pixel twice, iterations of unequal weight that are not divided by it.
+/// Killed by: weights over n, a sample counted into the pixel twice, iterations of unequal weight that are not divided
+/// by it.
 #[test]
 fn closed_boxes_have_their_radiance() {
     let scene = blob(&glowing_box(0.5, 1.0, [8, 8]));
@@ -138,8 +139,8 @@ fn strategies_that_learn_agree_with_none() {
     }
 }
 
-/// All materials under a soft sky, for strategies that key statistics by material and direction. Killed by: a value that
-/// is scaled by the albedo and not scaled back in the pixel, a class of vertices whose record is closed twice.
+/// All materials under a soft sky, for strategies that key statistics by material and direction. Killed by: a value
+/// that is scaled by the albedo and not scaled back in the pixel, a class of vertices whose record is closed twice.
 #[test]
 fn strategies_that_learn_agree_on_all_materials() {
     let scene = blob(&soft(everything([16, 12])));
@@ -150,9 +151,9 @@ fn strategies_that_learn_agree_on_all_materials() {
     }
 }
 
-/// A floor under a point light, between two mirrors or panes of glass that show nothing but a dim sky: all vertices of depth
-/// 2 are on a surface whose lobes are deltas, and paths end at depth 3. What is learned kills most of them; the mean stays.
-/// Killed by: a delta surface that always goes on (factor 1), a death there that nothing makes up for.
+/// A floor under a point light, between two mirrors or panes of glass that show nothing but a dim sky: all vertices of
+/// depth 2 are on a surface whose lobes are deltas, and paths end at depth 3. What is learned kills most of them; the
+/// mean stays. Killed by: a delta surface that always goes on (factor 1), a death there that nothing makes up for.
 #[test]
 fn mirrors_and_glass_play_learned_roulette() {
     let mirror = Model::Mirror { reflectance: Reflectance::Constant([1.0; 3]) };
@@ -195,8 +196,8 @@ fn soft(mut s: SceneDescription) -> SceneDescription {
     s
 }
 
-/// Every choice there is. Killed by: an adaptive pixel whose weight follows its own noise, shadow roulette that divides one
-/// of two sums, a constant that is added without what was rounded away, a bound that lowers n and not s.
+/// Every choice there is. Killed by: an adaptive pixel whose weight follows its own noise, shadow roulette that divides
+/// one of two sums, a constant that is added without what was rounded away, a bound that lowers n and not s.
 #[test]
 fn choices_do_not_bias() {
     let scene = blob(&cornell([16, 16]));
@@ -253,10 +254,10 @@ fn short_renders_are_unbiased() {
     }
 }
 
-/// Sixteen pixels with caustics: an iteration that finds one is brighter and noisier than the others. The picture is the
-/// mean of the iterations by weight; it must not differ from their mean by number. Killed by: an iteration that is
-/// weighted by its own variance (0.9 % too dark here), an adaptive pixel whose later samples outvote those that called for
-/// them.
+/// Sixteen pixels with caustics: an iteration that finds one is brighter and noisier than the others. The picture is
+/// the mean of the iterations by weight; it must not differ from their mean by number. Killed by: an iteration that is
+/// weighted by its own variance (0.9 % too dark here), an adaptive pixel whose later samples outvote those that called
+/// for them.
 #[test]
 fn weights_of_iterations_do_not_follow_their_light() {
     let scene = blob(&mirror_and_glass());
@@ -291,8 +292,9 @@ fn weights_of_iterations_do_not_follow_their_light() {
     }
 }
 
-/// Renders of four samples whose statistics are replaced by random ones before the second iteration, and again before the
-/// third: factors of any size next to each other. Killed by: any use of what was learned but as a factor or a constant.
+/// Renders of four samples whose statistics are replaced by random ones before the second iteration, and again before
+/// the third: factors of any size next to each other. Killed by: any use of what was learned but as a factor or a
+/// constant.
 #[test]
 fn random_statistics_do_not_bias() {
     let scene = blob(&cornell([16, 16]));
@@ -326,8 +328,8 @@ fn random_statistics_do_not_bias() {
     }
 }
 
-/// As above, of visibilities alone: the other factors stay 1. Killed by: a shadow ray that is divided by another chance than
-/// it had, or that visibility cuts off.
+/// As above, of visibilities alone: the other factors stay 1. Killed by: a shadow ray that is divided by another chance
+/// than it had, or that visibility cuts off.
 #[test]
 fn random_visibilities_do_not_bias() {
     let scene = blob(&cornell([16, 16]));

@@ -86,7 +86,8 @@ fn statistics_are_saved_and_begun_with() {
     assert_eq!(stopped.statistics.iterations.len(), 1);
 }
 
-/// Killed by: rendering with bytes that are no cache or another scene's, without a word; ignoring that there is no cache.
+/// Killed by: rendering with bytes that are no cache or another scene's, without a word; ignoring that there is no
+/// cache.
 #[test]
 fn wrong_statistics_are_errors() {
     let good = rendered(&RenderOptions { save_cache: true, ..options("ears", 12) }).cache.unwrap();
@@ -144,8 +145,8 @@ fn every_option_changes_the_picture() {
     }
 }
 
-/// Killed by: a denoised layer that is a copy or of another picture, features left out or wrong, a strategy for which it
-/// is forgotten, a layer that is there unasked.
+/// Killed by: a denoised layer that is a copy or of another picture, features left out or wrong, a strategy for which
+/// it is forgotten, a layer that is there unasked.
 #[test]
 fn denoised_pictures_are_nearer_the_truth() {
     let truth = rendered(&options("classic", 600)).picture.rgb("").unwrap();
@@ -185,8 +186,8 @@ fn the_denoiser_knows_what_the_first_hits_look_like() {
     assert_eq!(["R", "G", "B"].map(|c| layer.channel(c).unwrap().to_vec()), out);
 }
 
-/// Figures that are known otherwise. Killed by: paths over vertices instead of camera samples, a layer of the wrong sums,
-/// the factor of another depth, an efficiency that is not the inverse product, parts of the time counted twice.
+/// Figures that are known otherwise. Killed by: paths over vertices instead of camera samples, a layer of the wrong
+/// sums, the factor of another depth, an efficiency that is not the inverse product, parts of the time counted twice.
 #[test]
 fn figures_fit_together() {
     for (strategy, factor) in [("none", Some(1.0)), ("fixed:2", Some(2.0)), ("ears", None), ("bolin-meyer", None)] {

@@ -356,8 +356,8 @@ fn a_black_map_is_never_sampled() {
     }
 }
 
-/// Uniform over the sphere: 12 bands of equal area x 12 sectors; density 1 / 4 pi. Killed by: a hemisphere, uniform polar
-/// angle, 1 / 2 pi.
+/// Uniform over the sphere: 12 bands of equal area x 12 sectors; density 1 / 4 pi. Killed by: a hemisphere, uniform
+/// polar angle, 1 / 2 pi.
 #[test]
 fn the_constant_environment_is_a_uniform_sphere() {
     let owner = LightScene::default().constant([0.5, 1.0, 2.0]).finish();

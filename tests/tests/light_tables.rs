@@ -68,8 +68,8 @@ fn every_random_number_is_accounted_for() {
     }
 }
 
-/// Widths follow the weights within one unit each, plus the unit that every positive weight is given. Killed by: dealing
-/// out the rest to one item, f32 sums.
+/// Widths follow the weights within one unit each, plus the unit that every positive weight is given. Killed by:
+/// dealing out the rest to one item, f32 sums.
 #[test]
 fn widths_follow_the_weights() {
     let mut rng = SplitMix(11);

@@ -58,8 +58,8 @@ fn obj_dialects() {
     assert!(bake(&scene, &BakeOptions::default(), |_, _| {}).is_ok());
 }
 
-/// A last line that ends in a backslash counts all the same, as a face and as an error. Killed by: joined lines that are read
-/// when the next one comes.
+/// A last line that ends in a backslash counts all the same, as a face and as an error. Killed by: joined lines that
+/// are read when the next one comes.
 #[test]
 fn the_last_line_may_promise_another() {
     let (scene, _) = load_obj(&format!("{}\\", TRIANGLE.trim_end()), "newmtl m\nKd 1 0 0 \\");
@@ -231,8 +231,8 @@ fn jpeg(blocks: &[&[u8]]) -> Vec<u8> {
     file
 }
 
-/// JPEG textures, whatever their file is called; damaged ones are refused with their name and place, never a panic. Killed by:
-/// a decoder chosen by name, channels out of order, grey where a file is cut off.
+/// JPEG textures, whatever their file is called; damaged ones are refused with their name and place, never a panic.
+/// Killed by: a decoder chosen by name, channels out of order, grey where a file is cut off.
 #[test]
 fn jpeg_textures_are_read() {
     let read = |bytes: &[u8], name: &str| {

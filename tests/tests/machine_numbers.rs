@@ -100,8 +100,8 @@ fn a_faulty_intersector_spoils_its_own_lanes_only() {
 }
 
 /// The strongest point light there is, 6e-8 from the sharpest rough metal: 1e18 / r^2 * D overflows. Such samples are
-/// counted, with their pixel, and the film holds the others: the diffuse left half is as bright as it must be. Killed by:
-/// a sum before the test, a NaN that spreads over the packet, infinity minus infinity in the variance.
+/// counted, with their pixel, and the film holds the others: the diffuse left half is as bright as it must be. Killed
+/// by: a sum before the test, a NaN that spreads over the packet, infinity minus infinity in the variance.
 #[test]
 fn overflowing_radiance_is_counted_and_left_out() {
     let mut s =
@@ -194,9 +194,9 @@ fn pictures_do_not_depend_on_the_unit_of_length() {
     }
 }
 
-/// A scene of 1000 units at 1e6 from the origin in every direction looks as it does at the origin. Its corners are exact;
-/// what is tested is the rounding of points between them, whose steps are 0.06. Killed by: spawned rays that start inside
-/// (dark or leaking surfaces), points from `o + t d`, a camera that rounds its axis.
+/// A scene of 1000 units at 1e6 from the origin in every direction looks as it does at the origin. Its corners are
+/// exact; what is tested is the rounding of points between them, whose steps are 0.06. Killed by: spawned rays that
+/// start inside (dark or leaking surfaces), points from `o + t d`, a camera that rounds its axis.
 #[test]
 fn far_scenes_look_the_same() {
     for (name, mut scene) in [("cornell", cornell([16, 16])), ("everything", everything([16, 16]))] {
@@ -221,8 +221,8 @@ fn far_scenes_look_the_same() {
     }
 }
 
-/// Surfaces of needles look like surfaces: a strip of 1e6 : 1, seen across, under sun and sky. Killed by: a hit point or
-/// normal from weights that a needle makes uncertain, self-hits along it.
+/// Surfaces of needles look like surfaces: a strip of 1e6 : 1, seen across, under sun and sky. Killed by: a hit point
+/// or normal from weights that a needle makes uncertain, self-hits along it.
 #[test]
 fn strips_of_needles_are_plain_surfaces() {
     for turn in [0.0f64, 0.6] {
@@ -290,8 +290,8 @@ fn counters_add_up() {
     }
 }
 
-/// A step uses up its budget and passes it by less than a packet with its shadow rays. Killed by: a budget looked at once
-/// per refill, splitting that runs to its end.
+/// A step uses up its budget and passes it by less than a packet with its shadow rays. Killed by: a budget looked at
+/// once per refill, splitting that runs to its end.
 #[test]
 fn steps_keep_to_their_budget() {
     let bytes = blob(&everything([16, 16]));

@@ -66,7 +66,8 @@ fn observers_may_have_their_own_clock() {
     assert_eq!((rendered.iterations.len(), rendered.spp), (3, 3), "a fourth sample at 10 seconds each would pass it");
 }
 
-/// Killed by: showing the film before its shards are merged, counting the observer's time, leaving out the last iteration.
+/// Killed by: showing the film before its shards are merged, counting the observer's time, leaving out the last
+/// iteration.
 #[test]
 fn iterations_are_shown_outside_the_clock() {
     let (scene, settings) = small();

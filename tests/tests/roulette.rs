@@ -99,8 +99,8 @@ fn strategies_follow_their_rules() {
     assert_eq!(factor("fixed:3.3", 0.5, 0.5, 1), 3.3);
 }
 
-/// "Go with the winners": throughput x albedo x sqrt(VR + VV / (shininess + 1)^2). Killed by: a variance in place of its
-/// root, the shininess unsquared, a factor held to 1.
+/// "Go with the winners": throughput x albedo x sqrt(VR + VV / (shininess + 1)^2). Killed by: a variance in place of
+/// its root, the shininess unsquared, a factor held to 1.
 #[test]
 fn winners_follow_their_rule() {
     let winners = |options: &str, beta: f32, shininess: f32| {
@@ -154,8 +154,9 @@ fn with(strategy: &str, v: &Vertices8) -> f32 {
     Strategy::parse(strategy).unwrap().factor(v).lane(6)
 }
 
-/// Eq. 27: roulette by the moment if that says so; splitting by the variance if both say so; else neither. Killed by: splitting
-/// by the moment, roulette by the variance, a NaN or infinity that becomes the largest factor (NUMERICS RRS-3, RRS-4).
+/// Eq. 27: roulette by the moment if that says so; splitting by the variance if both say so; else neither. Killed by:
+/// splitting by the moment, roulette by the variance, a NaN or infinity that becomes the largest factor (NUMERICS
+/// RRS-3, RRS-4).
 #[test]
 fn moment_and_variance_decide_together() {
     let (nan, inf) = (f32::NAN, f32::INFINITY);
@@ -197,8 +198,8 @@ fn moment_and_variance_decide_together() {
     }
 }
 
-/// Eq. 32: s = sqrt(norm(beta^2 x importance x moment) x C / V / c). Killed by: a weight unsquared, the cost upside down, an
-/// importance per colour that is averaged first.
+/// Eq. 32: s = sqrt(norm(beta^2 x importance x moment) x C / V / c). Killed by: a weight unsquared, the cost upside
+/// down, an importance per colour that is averaged first.
 #[test]
 fn factors_are_the_most_efficient_ones() {
     let base = learned(0.5, 0.25, 0.25, 1.0);
@@ -228,8 +229,8 @@ fn factors_are_the_most_efficient_ones() {
     assert!((by(Norm::Luminance) - (0.25 * (0.2126f32 + 8.0 * 0.7152)).sqrt()).abs() < 1e-4);
 }
 
-/// Nothing known is `classic`, much known is the rule itself. Killed by: an empty bin that kills (STA-5), ignorance of the
-/// picture taken for a picture without variance, confidence that shrinks with the samples.
+/// Nothing known is `classic`, much known is the rule itself. Killed by: an empty bin that kills (STA-5), ignorance of
+/// the picture taken for a picture without variance, confidence that shrinks with the samples.
 #[test]
 fn ignorance_is_classic() {
     for strategy in ["ear", "ears", "ear:plain", "ears:plain", "bolin-meyer", "bolin-meyer:plain"] {
@@ -260,8 +261,8 @@ fn ignorance_is_classic() {
     assert!(few[0] < 1.0 && few.is_sorted_by(|a, b| a > b) && few[3] > 0.05, "{few:?}");
 }
 
-/// However little is expected, what roulette leaves alive has a throughput of 10 at most; what had more is not split for it.
-/// Killed by: a limit that is left out, that forgets the albedo, that raises factors above 1.
+/// However little is expected, what roulette leaves alive has a throughput of 10 at most; what had more is not split
+/// for it. Killed by: a limit that is left out, that forgets the albedo, that raises factors above 1.
 #[test]
 fn roulette_does_not_raise_throughput_above_ten() {
     for strategy in ["ear", "ears", "bolin-meyer"] {
@@ -274,8 +275,8 @@ fn roulette_does_not_raise_throughput_above_ten() {
     }
 }
 
-/// Expected contributions are brought into [1/3, 5/3] of the pixel. Killed by: a factor that aims at the middle of the window,
-/// a pixel that multiplies.
+/// Expected contributions are brought into [1/3, 5/3] of the pixel. Killed by: a factor that aims at the middle of the
+/// window, a pixel that multiplies.
 #[test]
 fn the_window_is_left_alone() {
     for (mean, importance, adrrs, adrr) in [

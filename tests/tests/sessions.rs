@@ -63,8 +63,8 @@ fn blocks_must_fit_to_the_byte() {
     }
 }
 
-/// Memory that held something else gives the same picture, and the same is learned. Killed by: a slab that is read before it
-/// is written.
+/// Memory that held something else gives the same picture, and the same is learned. Killed by: a slab that is read
+/// before it is written.
 #[test]
 fn blocks_may_hold_garbage() {
     let bytes = blob(&cornell([20, 12]));
@@ -291,9 +291,10 @@ fn a_shard_can_be_stopped_before_it_starts() {
     assert_eq!(session.film().pixels().iter().map(|p| p.samples).sum::<u64>(), 4 * 128 + 256);
 }
 
-/// Stopping and draining leaves every started sample finished: the sum over (sample - truth) has mean 0, because whether a
-/// sample starts depends on earlier ones only (a martingale), and the next iteration goes on with new samples. Killed by:
-/// a stop that drops waiting vertices (their light is missing), one that counts samples that never started.
+/// Stopping and draining leaves every started sample finished: the sum over (sample - truth) has mean 0, because
+/// whether a sample starts depends on earlier ones only (a martingale), and the next iteration goes on with new
+/// samples. Killed by: a stop that drops waiting vertices (their light is missing), one that counts samples that never
+/// started.
 #[test]
 fn a_stopped_iteration_is_unbiased_and_merges() {
     let bytes = blob(&cornell([8, 8]));
@@ -361,8 +362,8 @@ fn a_stopped_iteration_is_unbiased_and_merges() {
     assert!(error.sqrt() < 1000.0 * light, "the test could not see {} samples' light", error.sqrt() / light);
 }
 
-/// A shard that comes from another session, or from an iteration that was given up, draws what a new one draws. Killed by: a
-/// shard that looks at the iteration's number alone, vertices that wait across iterations.
+/// A shard that comes from another session, or from an iteration that was given up, draws what a new one draws. Killed
+/// by: a shard that looks at the iteration's number alone, vertices that wait across iterations.
 #[test]
 fn used_shards_begin_anew() {
     let bytes = blob(&cornell([16, 16]));

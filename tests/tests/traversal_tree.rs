@@ -115,8 +115,8 @@ fn triangles_that_are_not_finite_are_left_out() {
     assert!(build(&bad, Effort::Medium).nodes.is_empty());
 }
 
-/// The deepest tree that validates, made to fill stacks: every node has seven leaves and, at the same distance and with a
-/// lower reference, the next node. Leaf k holds two triangles at z = +-height(k).
+/// The deepest tree that validates, made to fill stacks: every node has seven leaves and, at the same distance and with
+/// a lower reference, the next node. Leaf k holds two triangles at z = +-height(k).
 fn chain(height: impl Fn(u32) -> f32) -> (Vec<Node>, Vec<Leaf>) {
     let (mut nodes, mut leaves) = (Vec::new(), Vec::new());
     for level in 0..MAX_TREE_DEPTH {
@@ -142,7 +142,8 @@ fn chain(height: impl Fn(u32) -> f32) -> (Vec<Node>, Vec<Leaf>) {
     (nodes, leaves)
 }
 
-// Killed by: rays that take turns keep to their eighth of the stack and lose what does not fit, or forget to begin anew.
+// Killed by: rays that take turns keep to their eighth of the stack and lose what does not fit, or forget to begin
+// anew.
 #[test]
 fn full_stacks_lose_nothing() {
     let last = 7 * MAX_TREE_DEPTH;

@@ -1,9 +1,10 @@
-//! Roulette and splitting leave the mean alone: equivalence tests (two one-sided tests, TOST) against renders without them.
+//! Roulette and splitting leave the mean alone: equivalence tests (two one-sided tests, TOST) against renders without
+//! them.
 //!
-//! Two means count as equal if their difference is within 0.2 % of the mean with 95 % confidence from both sides: a bias
-//! of 0.2 % passes with a probability of 5 %, one of 0.3 % with less than 1e-4. The standard error of every difference is
-//! asserted to be below 0.06 %, so that equal means pass. The pictures are small and their light is soft, because noise
-//! costs time and bias does not depend on size.
+//! Two means count as equal if their difference is within 0.2 % of the mean with 95 % confidence from both sides: a
+//! bias of 0.2 % passes with a probability of 5 %, one of 0.3 % with less than 1e-4. The standard error of every
+//! difference is asserted to be below 0.06 %, so that equal means pass. The pictures are small and their light is soft,
+//! because noise costs time and bias does not depend on size.
 
 use croupier::accel::WideBvh;
 use croupier::light::LightSelector;
@@ -81,8 +82,8 @@ fn a_factor_of_one_is_none() {
     assert!(pixels("fixed:1") == pixels("none"));
 }
 
-/// The ring is always full, or the split budget used up at once; both are counted. Killed by: a cut that lowers the count
-/// but not the factor, vertices dropped when the ring is full.
+/// The ring is always full, or the split budget used up at once; both are counted. Killed by: a cut that lowers the
+/// count but not the factor, vertices dropped when the ring is full.
 #[test]
 fn full_rings_and_spent_budgets_do_not_bias() {
     let scene = blob(&cornell([16, 16]));
@@ -106,8 +107,8 @@ fn full_rings_and_spent_budgets_do_not_bias() {
     }
 }
 
-/// Every strategy that promises it has the mean of `none` at depth 40, where no light is left. Killed by: a strategy whose
-/// factor depends on the sample's own future, one that may be 0.
+/// Every strategy that promises it has the mean of `none` at depth 40, where no light is left. Killed by: a strategy
+/// whose factor depends on the sample's own future, one that may be 0.
 #[test]
 fn strategies_agree_with_none() {
     let scene = blob(&cornell([16, 16]));
@@ -187,8 +188,9 @@ fn chosen_uniformly(scene: &[u8], s: &Settings, spp: u32, stated: f32) -> Image 
     }
 }
 
-/// A host that chooses lights in its own way, of a lamp and a point light of quite different powers, gets the same picture
-/// with other noise. Killed by: a session that uses its own choice for light samples or for what scattered rays find.
+/// A host that chooses lights in its own way, of a lamp and a point light of quite different powers, gets the same
+/// picture with other noise. Killed by: a session that uses its own choice for light samples or for what scattered rays
+/// find.
 #[test]
 fn hosts_may_choose_the_lights() {
     let mut scene = cornell([16, 16]);

@@ -1,21 +1,23 @@
 //! What a roulette strategy is worth: error times cost, per scene and strategy, and how much less of it than with the
 //! baselines.
 //!
-//! Every (scene, seed, strategy) is one render with one thread ([`croupier_benches::measure`]). It ends after a number of
-//! core-seconds, the CPU time of its threads, everything inside: setting up, learning, estimating errors. Its error is relMSE
-//! against the scene's reference, without the worst 0.01 % of the pixels. It has two faults: small pictures keep fireflies in
-//! it, and it contains the noise of the reference, which pulls all ratios to 1 and has a column. So a second figure, with a
-//! star, leaves the worst 0.1 % of the pixels (`--outliers`) out and subtracts, in those that are left, the variance that the
-//! reference states for itself. relMSE falls as 1 / cost, so that their product hardly depends on when the render ended.
-//! Where a few bright samples carry the error, leaving pixels out flatters the render with fewer samples, which has met
-//! fewer of them: compare such rows at equal samples, or leave more out than any has met.
+//! Every (scene, seed, strategy) is one render with one thread ([`croupier_benches::measure`]). It ends after a number
+//! of core-seconds, the CPU time of its threads, everything inside: setting up, learning, estimating errors. Its error
+//! is relMSE against the scene's reference, without the worst 0.01 % of the pixels. It has two faults: small pictures
+//! keep fireflies in it, and it contains the noise of the reference, which pulls all ratios to 1 and has a column. So a
+//! second figure, with a star, leaves the worst 0.1 % of the pixels (`--outliers`) out and subtracts, in those that are
+//! left, the variance that the reference states for itself. relMSE falls as 1 / cost, so that their product hardly
+//! depends on when the render ended. Where a few bright samples carry the error, leaving pixels out flatters the render
+//! with fewer samples, which has met fewer of them: compare such rows at equal samples, or leave more out than any has
+//! met.
 //!
 //! Figures are medians over the seeds, with the interval of [`Median`]. Speed-ups are ratios of the products of two
 //! strategies with the same seed, then their median; over all scenes, the geometric mean of these ratios per seed, then
-//! its median. Renders of one seed follow each other, in another order for each seed, so that what else the machine does
-//! hits all strategies. A time to an error is read from the errors with a star after the iterations ([`time_to`]).
+//! its median. Renders of one seed follow each other, in another order for each seed, so that what else the machine
+//! does hits all strategies. A time to an error is read from the errors with a star after the iterations ([`time_to`]).
 //!
-//! `--equal-samples N` renders N samples per pixel and takes rays as the cost: its tables are the same on every machine.
+//! `--equal-samples N` renders N samples per pixel and takes rays as the cost: its tables are the same on every
+//! machine.
 //!
 //! [`time_to`]: croupier_benches::stats::time_to
 

@@ -1,23 +1,23 @@
-//! Do roulette and splitting leave the picture's mean alone on real scenes? Equivalence tests (two one-sided tests, TOST)
-//! of every unbiased strategy against renders without roulette, both with the same `max_depth`: is the mean over pixels and
-//! channels the same within 0.2 %? A bias of 0.2 % passes with a probability of 5 % at most, one of 0.3 % with less than
-//! 1e-3; a row whose standard error is above [`MAX_ERROR`] fails, as it could not tell.
+//! Do roulette and splitting leave the picture's mean alone on real scenes? Equivalence tests (two one-sided tests,
+//! TOST) of every unbiased strategy against renders without roulette, both with the same `max_depth`: is the mean over
+//! pixels and channels the same within 0.2 %? A bias of 0.2 % passes with a probability of 5 % at most, one of 0.3 %
+//! with less than 1e-3; a row whose standard error is above [`MAX_ERROR`] fails, as it could not tell.
 //!
-//! A row is the mean over renders with different seeds. Its standard error comes from their spread, since the samples of a
-//! render that learns hang together. Pictures are small, because bias does not depend on size; geometry, materials and
-//! lights are the scene's own. Noise that both sides share is taken out; this does not change the expectation of their
-//! difference:
+//! A row is the mean over renders with different seeds. Its standard error comes from their spread, since the samples
+//! of a render that learns hang together. Pictures are small, because bias does not depend on size; geometry, materials
+//! and lights are the scene's own. Noise that both sides share is taken out; this does not change the expectation of
+//! their difference:
 //!
 //! - Every render has a partner without roulette and with the same seed: their paths begin alike.
-//! - Where adaptive sampling gives pixels different numbers of samples, light that the camera sees directly differs all the
-//!   same: the same render with `max_depth` 1 is subtracted on both sides.
+//! - Where adaptive sampling gives pixels different numbers of samples, light that the camera sees directly differs all
+//!   the same: the same render with `max_depth` 1 is subtracted on both sides.
 //!
-//! How many seeds a row takes follows from a pilot with other seeds. A row that is not decided (or noisier than its pilot
-//! said) is rendered once more, longer, with new seeds, and they alone count. `threshold` is biased: its row is there to
-//! show that bias is found.
+//! How many seeds a row takes follows from a pilot with other seeds. A row that is not decided (or noisier than its
+//! pilot said) is rendered once more, longer, with new seeds, and they alone count. `threshold` is biased: its row is
+//! there to show that bias is found.
 //!
-//! The output is `benches/EQUIVALENCE.md`; it depends on nothing but the program and the scenes. Exit status: 0 all rows
-//! as they should be, or the scenes are not there; 1 otherwise.
+//! The output is `benches/EQUIVALENCE.md`; it depends on nothing but the program and the scenes. Exit status: 0 all
+//! rows as they should be, or the scenes are not there; 1 otherwise.
 
 use clap::Parser;
 use croupier::learn::{Constant, Estimate, Learning};
@@ -53,8 +53,8 @@ const PILOT: u64 = 48;
 const SEEDS: [u64; 2] = [64, 20_000];
 /// First seeds of the pilot, of the rounds, of sessions whose cache another one loads, of what finds noisy pixels.
 const STREAMS: [u64; 5] = [0, 1 << 32, 2 << 32, 3 << 32, 4 << 32];
-/// Part of the pixels that rows with `calm` leave out: glints of small lights hold 1 % of the light and nearly all of the
-/// noise, and would take a hundred times as many samples.
+/// Part of the pixels that rows with `calm` leave out: glints of small lights hold 1 % of the light and nearly all of
+/// the noise, and would take a hundred times as many samples.
 const NOISY: f64 = 1.0 / 24.0;
 /// One thread renders one picture.
 const IN_ORDER: Schedule = Schedule::InOrder(1 << 20);

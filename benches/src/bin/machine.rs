@@ -1,9 +1,9 @@
 //! How full the lanes of the packet machine are, how many vertices wait, what a path's state weighs and how many rays a
 //! whole render traces per second, by ring size and roulette strategy.
 //!
-//! Everything but the speed depends on nothing but scene and settings: [`SNAPSHOT`] holds it, and `--check` fails when a
-//! build gives other numbers. Every render is one iteration of 16 shards, stepped one after the other on one thread; runs
-//! of all rows take turns, and a run's time is the CPU time of this thread where the system tells it.
+//! Everything but the speed depends on nothing but scene and settings: [`SNAPSHOT`] holds it, and `--check` fails when
+//! a build gives other numbers. Every render is one iteration of 16 shards, stepped one after the other on one thread;
+//! runs of all rows take turns, and a run's time is the CPU time of this thread where the system tells it.
 
 use clap::Parser;
 use croupier::accel::WideBvh;
@@ -43,8 +43,8 @@ const RINGS: [u32; 5] = [16, 64, 256, 512, 2048];
 const SHARDS: u32 = 16;
 const HEADER: &str = "scene,strategy,ring,scatter,trace,occlude,surface,peak,shard_bytes,bytes_per_path";
 
-/// What a strategy is measured with, so that every row traces about a million rays or more: `fixed:3.3` would give each camera
-/// sample its whole split budget of deep paths.
+/// What a strategy is measured with, so that every row traces about a million rays or more: `fixed:3.3` would give each
+/// camera sample its whole split budget of deep paths.
 struct Load {
     strategy: &'static str,
     /// Samples per pixel of the iterations.

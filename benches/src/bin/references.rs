@@ -1,9 +1,9 @@
-//! Is the picture right? Renders the shared test scenes with every strategy and tests them for bias against references of
-//! another renderer (Mitsuba 3).
+//! Is the picture right? Renders the shared test scenes with every strategy and tests them for bias against references
+//! of another renderer (Mitsuba 3).
 //!
-//! Per scene and strategy, independent seeds are rendered in this process (the scene is loaded and baked once) and their
-//! mean, with the standard error that follows from their spread, is compared with `reference.exr`, whose standard error
-//! is `reference_stderr.exr`. Block means of 8x8 pixels give z-scores with both errors in quadrature
+//! Per scene and strategy, independent seeds are rendered in this process (the scene is loaded and baked once) and
+//! their mean, with the standard error that follows from their spread, is compared with `reference.exr`, whose standard
+//! error is `reference_stderr.exr`. Block means of 8x8 pixels give z-scores with both errors in quadrature
 //! ([`croupier_host::compare::bias`], the firefly-robust kind). A row passes if
 //!
 //! - at most [`MAX_BEYOND3`] of the scores are beyond 3,
@@ -15,8 +15,8 @@
 //! and the table shows the figures with them in brackets. Biased settings must fail: their rows are as expected if the
 //! test notices.
 //!
-//! The output is `benches/REFERENCES.md`; it depends on nothing but the program and the scenes. Exit status: 0 all rows as
-//! expected, or the scenes are not there; 1 otherwise.
+//! The output is `benches/REFERENCES.md`; it depends on nothing but the program and the scenes. Exit status: 0 all rows
+//! as expected, or the scenes are not there; 1 otherwise.
 
 use clap::Parser;
 use croupier::{Scene, Settings};
@@ -48,8 +48,8 @@ struct Args {
     /// Only these scenes.
     #[arg(long = "scene", value_name = "NAME")]
     only: Vec<String>,
-    /// Instead of the table's strategies these (any that `croupier render --rrs` knows, and choices as in `efficiency`),
-    /// expected to be unbiased.
+    /// Instead of the table's strategies these (any that `croupier render --rrs` knows, and choices as in
+    /// `efficiency`), expected to be unbiased.
     #[arg(long = "strategy", value_name = "NAME")]
     strategies: Vec<String>,
     /// Independent seeds per row, at least 2.
@@ -75,8 +75,8 @@ struct Args {
     save: Option<PathBuf>,
 }
 
-/// Scenes, and samples per pixel and seed. All seeds together come near the samples of the reference: with much fewer, a
-/// block that missed its rare bright samples has too low a mean *and* too low a variance, which shifts the mean score
+/// Scenes, and samples per pixel and seed. All seeds together come near the samples of the reference: with much fewer,
+/// a block that missed its rare bright samples has too low a mean *and* too low a variance, which shifts the mean score
 /// below 0 (with many more, the reference's own do the opposite).
 const SCENES: &[(&str, u32)] = &[
     ("cbox", 32),

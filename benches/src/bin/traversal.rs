@@ -1,12 +1,12 @@
 //! Rays per second of the built-in traversal beside obvhs's own Bvh2 and CwBvh traversals, on identical ray arrays.
 //!
 //! Sets: primary rays, first and third diffuse bounce, shadow rays from primary and from first-bounce hits towards a
-//! square lamp below the top of the scene. Kernels take turns inside each round; the table shows medians over the rounds,
-//! the spread between the quartiles, and the ratio to Bvh2. Times are CPU times of this thread where the system tells
-//! them. Answers are checked against each other first.
+//! square lamp below the top of the scene. Kernels take turns inside each round; the table shows medians over the
+//! rounds, the spread between the quartiles, and the ratio to Bvh2. Times are CPU times of this thread where the system
+//! tells them. Answers are checked against each other first.
 //!
-//! Beware: `glam` with `scalar-math` anywhere in the same build turns obvhs's own vectors scalar, which about halves its
-//! Bvh2 on closest hits. The first line of the output says which it is.
+//! Beware: `glam` with `scalar-math` anywhere in the same build turns obvhs's own vectors scalar, which about halves
+//! its Bvh2 on closest hits. The first line of the output says which it is.
 
 use clap::Parser;
 use croupier::accel::{Hit8, Intersector, Ray8, WideBvh};
@@ -26,7 +26,8 @@ use std::time::{Duration, Instant};
 #[derive(Parser)]
 #[command(about = "Rays per second of the traversal, beside obvhs")]
 struct Args {
-    /// Scene: an OBJ file, its camera in scene.json beside it. Default: the kitchen if it is there, else a generated one.
+    /// Scene: an OBJ file, its camera in scene.json beside it. Default: the kitchen if it is there, else a generated
+    /// one.
     scene: Option<PathBuf>,
     /// Rounds.
     #[arg(long, default_value_t = 7)]

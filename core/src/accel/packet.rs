@@ -7,12 +7,13 @@
 //!         the rays that enter it before their closest hits, if any: packet(child)
 //! ```
 //!
-//! 1. The eight children are tested at once against intervals of the packet's origins and inverse directions, then eight
-//!    rays at once against each survivor. Every step is monotone (see `setup`): the intervals never reject a child that
-//!    one of the rays enters.
+//! 1. The eight children are tested at once against intervals of the packet's origins and inverse directions, then
+//!    eight rays at once against each survivor. Every step is monotone (see `setup`): the intervals never reject a
+//!    child that one of the rays enters.
 //! 2. A leaf costs one test per triangle (eight rays each) or one per ray (eight triangles each), whichever is fewer.
-//! 3. The stack holds the interval's entry and where the child's box is, eight bytes. The rays are tested against the box
-//!    when it is popped: fewer tests, as some are behind a hit by then, and a fifth of the memory of keeping their entries.
+//! 3. The stack holds the interval's entry and where the child's box is, eight bytes. The rays are tested against the
+//!    box when it is popped: fewer tests, as some are behind a hit by then, and a fifth of the memory of keeping their
+//!    entries.
 
 use super::setup::{Setup, each};
 use super::single::{Hit1, Hits, Keys, STACK, test_leaf, walk};
@@ -48,7 +49,8 @@ impl Best {
         Hit1 { t: self.t.lane(i), triangle: self.triangle.lane(i), u: self.u.lane(i), v: self.v.lane(i) }
     }
 
-    /// Sets lane `i`. By selection: eight lanes read back right after one of them was written alone stall the processor.
+    /// Sets lane `i`. By selection: eight lanes read back right after one of them was written alone stall the
+    /// processor.
     #[inline(always)]
     fn set(&mut self, i: usize, h: &Hit1) {
         let lane = one(i);

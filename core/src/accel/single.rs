@@ -12,8 +12,8 @@
 //!    three). Lazily sorted stacks were slower or equal.
 //! 2. Entry and child share a `u64`, so that keys compare as integers (entries are never negative).
 //! 3. Any hit: no order, the first hit ends it.
-//! 4. A hit counts from `max(t, entry of its leaf)`: so a subtree entered after the closest hit holds nothing closer, not
-//!    even by rounding, and the result does not depend on the order of visits. Equal t: the lower triangle index.
+//! 4. A hit counts from `max(t, entry of its leaf)`: so a subtree entered after the closest hit holds nothing closer,
+//!    not even by rounding, and the result does not depend on the order of visits. Equal t: the lower triangle index.
 //! 5. While one ray waits for a node or a leaf from memory, the processor already works on the next ray. Rays share one
 //!    stack of the full size: a ray that fills its eighth begins anew with all of it, and (4) gives the same result.
 //!    Dropped: boxes of all rays first and then their decisions, reading ahead what is next (as slow as one by one).
@@ -88,8 +88,8 @@ pub(super) fn test_leaf<const ANY: bool>(leaf: &Leaf, s: &Setup, i: usize, entry
     found
 }
 
-/// Walks the subtree `root` with the rays `lanes` of `s`, which enter it at `entry`. Closest: improves `hits`. Any: returns
-/// the lanes with a hit at or before `hits.t`; each stops at its first.
+/// Walks the subtree `root` with the rays `lanes` of `s`, which enter it at `entry`. Closest: improves `hits`. Any:
+/// returns the lanes with a hit at or before `hits.t`; each stops at its first.
 pub(super) fn walk<const ANY: bool>(
     tree: (&[Node], &[Leaf]),
     root: (u32, &[f32; 8]),
@@ -105,8 +105,8 @@ pub(super) fn walk<const ANY: bool>(
     found
 }
 
-/// [`walk`] with `ROOM` entries of the stack for each ray. Returns the lanes with any hit, and those that need more room:
-/// their `hits` are real, though perhaps not the closest.
+/// [`walk`] with `ROOM` entries of the stack for each ray. Returns the lanes with any hit, and those that need more
+/// room: their `hits` are real, though perhaps not the closest.
 #[inline(never)]
 fn take_turns<const ANY: bool, const ROOM: usize>(
     (nodes, leaves): (&[Node], &[Leaf]),

@@ -18,8 +18,8 @@ pub struct SurfacePoint8 {
 /// The points with weights `1 - u - v`, `u`, `v` on the triangles; lanes outside `mask` may hold anything and give the
 /// point 0 with the normal +z. A triangle without area has the normal +z.
 ///
-/// `error` is `32 2^-24 sum |b_i p_i| . |ng|` (NUMERICS OFF-1): vertices are exact, so weights, products and sums leave a
-/// few roundings of each term; 32 leaves room for the rounding of the offset and of the triangle test.
+/// `error` is `32 2^-24 sum |b_i p_i| . |ng|` (NUMERICS OFF-1): vertices are exact, so weights, products and sums leave
+/// a few roundings of each term; 32 leaves room for the rounding of the offset and of the triangle test.
 pub fn surface_point(scene: &Scene<'_>, triangle: U32x8, u: F32x8, v: F32x8, mask: Mask8) -> SurfacePoint8 {
     let triangle = U32x8::select(mask, triangle, U32x8::splat(0)).to_array();
     let (u, v) = (mask.zero_unless(u), mask.zero_unless(v));
@@ -45,9 +45,9 @@ pub fn surface_point(scene: &Scene<'_>, triangle: U32x8, u: F32x8, v: F32x8, mas
     SurfacePoint8 { p: pa + pb + pc, ng, error: sum.dot(ng.abs()) * (32.0 / 16_777_216.0) }
 }
 
-/// Normal of twice the area's length from the two shorter edges: of a needle the two long ones are nearly parallel, and the
-/// roundings of their cross product would tilt it. If all three are nearly parallel (an obtuse needle) it may be tilted by
-/// some 2^-24 of length over width.
+/// Normal of twice the area's length from the two shorter edges: of a needle the two long ones are nearly parallel, and
+/// the roundings of their cross product would tilt it. If all three are nearly parallel (an obtuse needle) it may be
+/// tilted by some 2^-24 of length over width.
 pub(crate) fn normal(a: Vec3x8, b: Vec3x8, c: Vec3x8) -> Vec3x8 {
     let (ab, bc, ca) = (b - a, c - b, a - c);
     let (x, y, z) = (ab.length_sqr(), bc.length_sqr(), ca.length_sqr());
@@ -64,9 +64,9 @@ pub fn offset(p: Vec3x8, ng: Vec3x8, error: F32x8, d: Vec3x8) -> Vec3x8 {
 
 /// The segments from `p` to `q`, both moved off their surfaces, as rays with `d = q' - p'` and `0 < t < 1`.
 ///
-/// `q` moves by `32 2^-24 |d| . |q_ng|` more than its own error: `d` and the t of the triangle test are rounded relative
-/// to the distance, whatever the coordinates of `q`. A lamp in a plane through the origin has an error of 0 and would
-/// stand in its own light.
+/// `q` moves by `32 2^-24 |d| . |q_ng|` more than its own error: `d` and the t of the triangle test are rounded
+/// relative to the distance, whatever the coordinates of `q`. A lamp in a plane through the origin has an error of 0
+/// and would stand in its own light.
 pub fn shadow_ray(p: Vec3x8, ng: Vec3x8, error: F32x8, q: Vec3x8, q_ng: Vec3x8, q_error: F32x8) -> Ray8 {
     let d = q - p;
     let o = offset(p, ng, error, d);

@@ -12,13 +12,13 @@
 //!    plain `*` and `-` here in every arithmetic.
 //! 2. The same lanes serve one ray against eight triangles and eight rays against one triangle: the two ways of
 //!    traversal agree in every bit.
-//! 3. Where vertices lie on both sides of the origin along the ray, t near 0 may have the wrong sign: a needle that a ray
-//!    has just left can be hit again. If t is within its error bound of 0 (pbrt-v4's bound for this test, section 6.8.8)
-//!    the side of the plane decides, in f64. This rejects hits of the own surface without opening gaps: a triangle that
-//!    lies in front is never rejected.
-//! 4. The same at the other end of a shadow ray: a needle of a lamp (1000 : 1 and thinner) may seem to stand before its own
-//!    sample. If t is within its error bound of the limit, the plane decides as well. Closest hits need no such care:
-//!    nothing ends just before their limit.
+//! 3. Where vertices lie on both sides of the origin along the ray, t near 0 may have the wrong sign: a needle that a
+//!    ray has just left can be hit again. If t is within its error bound of 0 (pbrt-v4's bound for this test, section
+//!    6.8.8) the side of the plane decides, in f64. This rejects hits of the own surface without opening gaps: a
+//!    triangle that lies in front is never rejected.
+//! 4. The same at the other end of a shadow ray: a needle of a lamp (1000 : 1 and thinner) may seem to stand before its
+//!    own sample. If t is within its error bound of the limit, the plane decides as well. Closest hits need no such
+//!    care: nothing ends just before their limit.
 
 use super::setup::Setup;
 use croupier_simd::{F32x8, Mask8};
@@ -54,8 +54,8 @@ pub(super) struct Line<'a> {
     pub lane: Option<usize>,
 }
 
-/// Lanes with `tmin < t <= limit` inside the triangle; `ANY`: for rays that end at `limit`, others treat it as the closest
-/// hit so far. Degenerate triangles (no area seen along the ray) are missed.
+/// Lanes with `tmin < t <= limit` inside the triangle; `ANY`: for rays that end at `limit`, others treat it as the
+/// closest hit so far. Degenerate triangles (no area seen along the ray) are missed.
 #[inline(always)]
 pub(super) fn intersect<const ANY: bool>(p: &Vertices, r: &Line<'_>, limit: F32x8) -> Option<Candidates> {
     let shear = |p: &[F32x8; 3]| {
@@ -143,8 +143,8 @@ fn beyond(p: &Vertices, s: &Setup, axes: [usize; 3], lane: Option<usize>, limit:
     Mask8::from_bits(doubt.lanes().filter(|i| !met(*i)).fold(0, |bits, i| bits | 1 << i))
 }
 
-/// How far the plane of the triangle in lane `i` is from the origin, and how far the direction goes towards it, in units
-/// of twice the area.
+/// How far the plane of the triangle in lane `i` is from the origin, and how far the direction goes towards it, in
+/// units of twice the area.
 fn plane(p: &Vertices, s: &Setup, axes: [usize; 3], lane: Option<usize>, i: usize) -> (f64, f64) {
     let at = |v: &[F32x8; 3]| v.map(|x| f64::from(x.lane(i)));
     let from = |rays: &[[f32; 8]; 3]| axes.map(|k| f64::from(rays[k.min(2)][lane.unwrap_or(i) & 7]));

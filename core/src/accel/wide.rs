@@ -13,9 +13,9 @@ use croupier_simd::{F32x8, Mask8, U32x8};
 
 /// The scene's own tree of 8-wide nodes and 8-triangle leaves.
 ///
-/// Watertight: no ray passes between triangles that share an edge or a vertex. A hit is the closest by computed t, among
-/// equal ones the triangle with the lowest index; which rays share a packet never changes a bit of the result. `tmin`
-/// below 0 counts as 0. Calls need about 9 KiB of stack.
+/// Watertight: no ray passes between triangles that share an edge or a vertex. A hit is the closest by computed t,
+/// among equal ones the triangle with the lowest index; which rays share a packet never changes a bit of the result.
+/// `tmin` below 0 counts as 0. Calls need about 9 KiB of stack.
 #[derive(Clone, Copy, Debug)]
 pub struct WideBvh<'s> {
     nodes: &'s [Node],
@@ -30,8 +30,8 @@ impl<'s> WideBvh<'s> {
         Self::from_parts(scene.nodes, scene.leaves)
     }
 
-    /// A tree outside a scene; the root is node 0, the rules of [`crate::scene::blob`] hold. Wrong indices and boxes give
-    /// wrong hits and nothing worse, but nodes that form a cycle are walked for ever.
+    /// A tree outside a scene; the root is node 0, the rules of [`crate::scene::blob`] hold. Wrong indices and boxes
+    /// give wrong hits and nothing worse, but nodes that form a cycle are walked for ever.
     pub fn from_parts(nodes: &'s [Node], leaves: &'s [Leaf]) -> Self {
         let mut extent = 0.0f32;
         if let Some(root) = nodes.first() {

@@ -43,10 +43,10 @@ pub struct Interface8 {
 
 /// Interface seen at `cos` >= 0 from the normal.
 ///
-/// With k = eta^2 - 1 and e = eta cos_t = sqrt(cos^2 + k): `r_s = -k / (cos + e)^2`,
-/// `r_p = k ((eta^2 + 1) cos^2 - 1) / (eta^2 cos + e)^2` (NUMERICS FRE-1: absolute error up to 1.3e-6 near eta = 1, where
-/// the textbook form is off by 0.2; up to 7e-5 within 1e-6 of the critical cos^2). Total internal reflection is
-/// `reflectance == 1`, decided here only: evaluation, density and sampling must all take it from this function (FRE-2).
+/// With k = eta^2 - 1 and e = eta cos_t = sqrt(cos^2 + k): `r_s = -k / (cos + e)^2`, `r_p = k ((eta^2 + 1) cos^2 - 1) /
+/// (eta^2 cos + e)^2` (NUMERICS FRE-1: absolute error up to 1.3e-6 near eta = 1, where the textbook form is off by 0.2;
+/// up to 7e-5 within 1e-6 of the critical cos^2). Total internal reflection is `reflectance == 1`, decided here only:
+/// evaluation, density and sampling must all take it from this function (FRE-2).
 #[inline(always)]
 pub fn dielectric(cos: F32x8, index: Index8) -> Interface8 {
     let Index8 { eta, inverse, k } = index;
@@ -63,16 +63,17 @@ pub fn dielectric(cos: F32x8, index: Index8) -> Interface8 {
     Interface8 { reflectance: r, cos_t: e * inverse }
 }
 
-/// Transmitted fraction of the energy at an interface that meets the rays at `cos` and `cos_t`, both > 0: 1 - F as a sum
-/// of positive terms, `2 c e (1 / (c + e)^2 + eta^2 / (eta^2 c + e)^2)` with e = eta cos_t. It keeps its relative precision
-/// where almost nothing passes.
+/// Transmitted fraction of the energy at an interface that meets the rays at `cos` and `cos_t`, both > 0: 1 - F as a
+/// sum of positive terms, `2 c e (1 / (c + e)^2 + eta^2 / (eta^2 c + e)^2)` with e = eta cos_t. It keeps its relative
+/// precision where almost nothing passes.
 #[inline(always)]
 pub fn transmittance(cos: F32x8, cos_t: F32x8, eta: F32x8) -> F32x8 {
     let (eta2, e) = (eta * eta, eta * cos_t);
     cos * e * 2.0 * (1.0 / (cos + e).sqr() + eta2 / (eta2 * cos + e).sqr())
 }
 
-/// Largest refractive index and extinction of a conductor that [`conductor`] tells apart: beyond it 4th powers overflow.
+/// Largest refractive index and extinction of a conductor that [`conductor`] tells apart: beyond it 4th powers
+/// overflow.
 pub const MAX_INDEX: f32 = 1e6;
 
 /// Reflectance of a conductor of index `eta + i k` per channel, seen from vacuum at `cos` in [0, 1].

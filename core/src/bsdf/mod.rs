@@ -135,7 +135,8 @@ macro_rules! models {
             match kind { $(MaterialKind::$kind => v.visit::<$model>()),* }
         }
 
-        /// [`dispatch`] for a kernel profile: models outside the constant `profile` are not compiled in and give `None`.
+        /// [`dispatch`] for a kernel profile: models outside the constant `profile` are not compiled in and give
+        /// `None`.
         #[inline(always)]
         pub fn dispatch_in<'s, V: Visitor<'s>>(profile: Effects, kind: MaterialKind, v: V) -> Option<V::Out> {
             match kind {

@@ -1,6 +1,5 @@
-//! Smooth dielectric coat over a diffuse base:
-//! `f = F delta + (1 - F(wi)) (1 - F(wo)) / eta^2 rho / (1 - rho Fdr) / pi`, light scattered back and forth under the coat
-//! summed with colour shifts.
+//! Smooth dielectric coat over a diffuse base: `f = F delta + (1 - F(wi)) (1 - F(wo)) / eta^2 rho / (1 - rho Fdr) /
+//! pi`, light scattered back and forth under the coat summed with colour shifts.
 //!
 //! | parameter | meaning | range |
 //! |---|---|---|
@@ -8,9 +7,9 @@
 //! | `eta[0]` | int_ior / ext_ior | > 0 |
 //! | `fdr` | Fdr, reflectance of the coat from inside for diffuse light | [0, 1) |
 //!
-//! With r = rho / (1 - rho Fdr), the base reflects `(1 - F(wo)) r (1 - Fdr)`, because reciprocity makes the mean of 1 - F
-//! from outside eta^2 (1 - Fdr). Let d be the mean of that over the channels: the coat is chosen with probability
-//! F / (F + d), and the albedo is known exactly.
+//! With r = rho / (1 - rho Fdr), the base reflects `(1 - F(wo)) r (1 - Fdr)`, because reciprocity makes the mean of 1 -
+//! F from outside eta^2 (1 - Fdr). Let d be the mean of that over the channels: the coat is chosen with probability F /
+//! (F + d), and the albedo is known exactly.
 
 use super::fresnel::{self, Index8};
 use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, mirrored, warp};

@@ -1,5 +1,5 @@
-//! GGX conductor: `f = F(wi.h) D G1(wi) G1(wo) / (4 cos_i cos_o)` times a scale. Single scattering, so rough metals lose
-//! energy. Walter et al. 2007, equation 20.
+//! GGX conductor: `f = F(wi.h) D G1(wi) G1(wo) / (4 cos_i cos_o)` times a scale. Single scattering, so rough metals
+//! lose energy. Walter et al. 2007, equation 20.
 //!
 //! | parameter | meaning | range |
 //! |---|---|---|

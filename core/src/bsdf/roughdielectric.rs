@@ -1,5 +1,5 @@
-//! GGX dielectric interface, Walter et al. 2007, equations 20 and 21; single scattering. Radiance scales by 1 / eta^2 on
-//! transmission.
+//! GGX dielectric interface, Walter et al. 2007, equations 20 and 21; single scattering. Radiance scales by 1 / eta^2
+//! on transmission.
 //!
 //! | parameter | meaning | range |
 //! |---|---|---|
@@ -13,10 +13,10 @@
 //! - the refracted direction is `-wo / eta - k m / (eta (c + e))` (NUMERICS REF-1);
 //! - the Jacobian `eta^2 cos_t / (c - e)^2` is `eta e (c + e)^2 / k^2`: no difference of close numbers.
 //!
-//! Rebuilding m from two rounded directions cannot be that good: the half vector has the length |eta - 1|, so D is off by
-//! 1e-7 / (alpha |eta - 1|) (REF-2). Where that reaches 1 %, `alpha |eta - 1| < 1e-5` or `|eta - 1| < 1e-4`, the transmitted
-//! lobe is narrower than 1e-4 rad and is a *delta* lobe to the caller: still sampled through m, so nothing is lost or
-//! bent, but evaluation and density do not know it. The reflected lobe stays rough.
+//! Rebuilding m from two rounded directions cannot be that good: the half vector has the length |eta - 1|, so D is off
+//! by 1e-7 / (alpha |eta - 1|) (REF-2). Where that reaches 1 %, `alpha |eta - 1| < 1e-5` or `|eta - 1| < 1e-4`, the
+//! transmitted lobe is narrower than 1e-4 rad and is a *delta* lobe to the caller: still sampled through m, so nothing
+//! is lost or bent, but evaluation and density do not know it. The reflected lobe stays rough.
 
 use super::fresnel::{self, Index8};
 use super::ggx::{Ggx8, MIN_COS, mirrored_at};

@@ -1,5 +1,5 @@
-//! Thin dielectric sheet: both interfaces at once. Summing all inner reflections, it reflects R' = 2R / (1 + R) and passes
-//! the rest straight through; the two 1 / eta^2 factors cancel.
+//! Thin dielectric sheet: both interfaces at once. Summing all inner reflections, it reflects R' = 2R / (1 + R) and
+//! passes the rest straight through; the two 1 / eta^2 factors cancel.
 //!
 //! | parameter | meaning | range |
 //! |---|---|---|

@@ -1,10 +1,11 @@
-//! How far the samples of an iteration are from independent, seen from outside: iterations are independent, so the squared
-//! difference of the picture before and an iteration is the sum of their true variances, whatever happens within.
+//! How far the samples of an iteration are from independent, seen from outside: iterations are independent, so the
+//! squared difference of the picture before and an iteration is the sum of their true variances, whatever happens
+//! within.
 
 use super::{PixelStats, PixelSums, SqrtNewton, relative_denominator};
 
-/// Sums over the pixels of an iteration that is being merged: by how much it differs from the picture before, and by how
-/// much it should if the samples of each were independent. Relative, as relMSE is.
+/// Sums over the pixels of an iteration that is being merged: by how much it differs from the picture before, and by
+/// how much it should if the samples of each were independent. Relative, as relMSE is.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Differences {
     /// Squared differences of the means: variance of the picture before plus variance of the iteration.
@@ -66,7 +67,8 @@ impl Independence {
         let noise = (a - 2.0 * r * ab + r * r * b).max(0.0);
         let [x, y] = d.weight.map(|w| w * w);
         let next = if y > x {
-            // a long iteration after a short one: what was found is mostly of the short one, and says nothing of the other
+            // a long iteration after a short one: what was found is mostly of the short one, and says nothing of the
+            // other
             Self { ratio: r, noise: noise.sqrt_newton() / (s + t) }
         } else {
             let stated = x * s + y * t;

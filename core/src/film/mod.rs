@@ -66,7 +66,8 @@ pub struct PixelStats {
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct PixelAov {
-    /// Albedo of the first hit from the camera's side, as roulette takes it: reflected and transmitted, 1 for clear glass.
+    /// Albedo of the first hit from the camera's side, as roulette takes it: reflected and transmitted, 1 for clear
+    /// glass.
     pub albedo: [f64; 3],
     /// Shading normal of the first hit, world space.
     pub normal: [f64; 3],
@@ -101,9 +102,9 @@ impl PixelStats {
         self.sum.map(|s| s / w)
     }
 
-    /// Squared standard error of the mean per channel, its samples taken as independent. With roulette or splitting that
-    /// is an upper bound: one comb rounds a packet, and the roundings of its samples cancel (standard errors of up to
-    /// twice the true ones were measured). One sample tells nothing of its error: its own square stands in.
+    /// Squared standard error of the mean per channel, its samples taken as independent. With roulette or splitting
+    /// that is an upper bound: one comb rounds a packet, and the roundings of its samples cancel (standard errors of up
+    /// to twice the true ones were measured). One sample tells nothing of its error: its own square stands in.
     pub fn variance_of_mean(&self) -> [f64; 3] {
         let (w, w2, m) = (self.weight, self.weight_sqr, self.mean());
         // w^2 - w2 is w^2 (1 - 1 / n) for n samples of equal weight
@@ -136,11 +137,11 @@ pub struct Film<'m> {
 
 /// relMSE that the picture is estimated to have against its own expectation.
 ///
-/// Camera samples of one iteration are not independent where roulette or splitting meets every path: one comb rounds the
-/// samples of a packet together, which makes the picture better than its standard errors say. Iterations are independent:
-/// how much the picture's pixels differ between them, over what their samples let expect, corrects the estimate from the
-/// second iteration of two samples on. Before, it is that of an upper bound: in a diffuse box `fixed:3.3` states 1.35 times
-/// the true relMSE, `classic:1` 2.3 times.
+/// Camera samples of one iteration are not independent where roulette or splitting meets every path: one comb rounds
+/// the samples of a packet together, which makes the picture better than its standard errors say. Iterations are
+/// independent: how much the picture's pixels differ between them, over what their samples let expect, corrects the
+/// estimate from the second iteration of two samples on. Before, it is that of an upper bound: in a diffuse box
+/// `fixed:3.3` states 1.35 times the true relMSE, `classic:1` 2.3 times.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ErrorEstimate {
     /// Mean over pixels and channels of variance / (mean^2 + 0.01), without the worst 0.01 % of pixels, times
@@ -233,8 +234,8 @@ pub(crate) struct Trimmed {
     pub limit: f32,
 }
 
-/// Sums of the non-negative values that `visit` shows without the `k` largest, in `f32`. Of equal ones at the limit as many
-/// are left out as make `k`.
+/// Sums of the non-negative values that `visit` shows without the `k` largest, in `f32`. Of equal ones at the limit as
+/// many are left out as make `k`.
 pub(crate) fn trimmed(k: usize, mut visit: impl FnMut(&mut dyn FnMut(f64))) -> Trimmed {
     let mut t = Trimmed { limit: f32::INFINITY, ..Trimmed::default() };
     let mut out = k;
@@ -257,8 +258,8 @@ pub(crate) fn trimmed(k: usize, mut visit: impl FnMut(&mut dyn FnMut(f64))) -> T
     t
 }
 
-/// The `k`-th largest (k >= 1) of the non-negative values that `visit` shows, by radix selection on the float's bits: four
-/// visits, no memory. 0 if there are fewer.
+/// The `k`-th largest (k >= 1) of the non-negative values that `visit` shows, by radix selection on the float's bits:
+/// four visits, no memory. 0 if there are fewer.
 fn kth_largest(k: usize, mut visit: impl FnMut(&mut dyn FnMut(f32))) -> f32 {
     let (mut prefix, mut left) = (0u32, k);
     for shift in [24u32, 16, 8, 0] {

@@ -1,9 +1,9 @@
 //! Adaptive sampling: how many camera samples the pixels of each tile get in an iteration.
 //!
-//! A pixel's error falls as variance over samples; the sum over the picture is least for a given work when the samples are
-//! as the square root of variance over cost. Numbers are the same for a tile of 8x8 pixels, because a pixel's own variance is
-//! mostly noise. Every pixel has one sample at least, and an iteration counts as much in all of them: were samples
-//! pooled, a pixel that happened to look dark and smooth would keep its error for ever.
+//! A pixel's error falls as variance over samples; the sum over the picture is least for a given work when the samples
+//! are as the square root of variance over cost. Numbers are the same for a tile of 8x8 pixels, because a pixel's own
+//! variance is mostly noise. Every pixel has one sample at least, and an iteration counts as much in all of them: were
+//! samples pooled, a pixel that happened to look dark and smooth would keep its error for ever.
 
 use super::estimate::{Pixels, tile_of, tiles};
 use crate::film::{Film, SqrtNewton};
@@ -98,7 +98,8 @@ impl<'m> Allotment<'m> {
         f64::from((to[0] - from[0]) * (to[1] - from[1]))
     }
 
-    /// sqrt(variance / cost) of a tile's samples. Pixels count their rays, of whatever kind, so the cost is their number.
+    /// sqrt(variance / cost) of a tile's samples. Pixels count their rays, of whatever kind, so the cost is their
+    /// number.
     fn wish(&self, tile: u32, film: &Film<'_>, pixels: &Pixels<'_>) -> f64 {
         let [from, to] = self.corners(tile);
         let (mut error, mut rays) = (0.0, 0.0);

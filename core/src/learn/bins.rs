@@ -175,8 +175,8 @@ impl BinSums {
     }
 }
 
-/// What look-ups read: all numbers finite, none negative. One row of eight words, half a cache line: a render reads one at
-/// every vertex, so colours are [`short`].
+/// What look-ups read: all numbers finite, none negative. One row of eight words, half a cache line: a render reads one
+/// at every vertex, so colours are [`short`].
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub(super) struct Frozen {
@@ -193,8 +193,8 @@ fn saturate(x: f64, max: f32) -> f32 {
     if x > 0.0 { x.min(f64::from(max)) as f32 } else { 0.0 }
 }
 
-/// The upper half of a number that is finite and not negative: 8 significant bits. Rounded towards 0: above 1e-38 by less than
-/// 2^-7 of it.
+/// The upper half of a number that is finite and not negative: 8 significant bits. Rounded towards 0: above 1e-38 by
+/// less than 2^-7 of it.
 fn short(x: f32) -> u32 {
     x.to_bits() >> 16
 }
@@ -233,7 +233,8 @@ impl Frozen {
     }
 }
 
-/// What look-ups read of one leaf, whose surroundings have the sums `prior`. One without samples says so with `count` 0.
+/// What look-ups read of one leaf, whose surroundings have the sums `prior`. One without samples says so with `count`
+/// 0.
 pub(super) fn freeze_leaf(
     sums: &[BinSums],
     frozen: &mut [Frozen],
@@ -267,8 +268,8 @@ pub struct Local8 {
     pub variance: Vec3x8,
     /// Mean counted cost of a sample ([`crate::learn::COST_BOUNCE`] and its like).
     pub cost: F32x8,
-    /// Confidence: samples of the bin itself, older ones discounted. Its surroundings, which the other numbers lean on, do
-    /// not count.
+    /// Confidence: samples of the bin itself, older ones discounted. Its surroundings, which the other numbers lean on,
+    /// do not count.
     pub count: F32x8,
 }
 

@@ -6,9 +6,9 @@
 //! variance at a point, whereas `moment - mean^2` has the spread of the mean over the cell in it as well. And it keeps
 //! how many shadow rays from the leaf towards its directions met nothing.
 //!
-//! There are several octrees, for kinds of vertices that should not be mixed, and the direction is the caller's choice: see
-//! [`Kind`]. Shards look up in what [`Cache::freeze`] computed and log into their own [`Training`]; between iterations
-//! those are absorbed in shard order, so the cache is the same whatever the threads did.
+//! There are several octrees, for kinds of vertices that should not be mixed, and the direction is the caller's choice:
+//! see [`Kind`]. Shards look up in what [`Cache::freeze`] computed and log into their own [`Training`]; between
+//! iterations those are absorbed in shard order, so the cache is the same whatever the threads did.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 pub use super::bins::{BIN_LIMIT, Local8, MAX_VALUE};
@@ -136,8 +136,8 @@ impl<'m> Cache<'m> {
         Ok(cache)
     }
 
-    /// The bins of eight vertices, `u32::MAX` in inactive lanes. `kind` holds [`Kind`]s, `dir` unit vectors in world space.
-    /// Places outside the bounds belong to the nearest leaf.
+    /// The bins of eight vertices, `u32::MAX` in inactive lanes. `kind` holds [`Kind`]s, `dir` unit vectors in world
+    /// space. Places outside the bounds belong to the nearest leaf.
     #[inline]
     pub fn find(&self, kind: U32x8, p: Vec3x8, dir: Vec3x8, active: Mask8) -> U32x8 {
         self.bins_of(self.tree.find(kind & U32x8::splat(ROOTS - 1), p, None), dir, active)
@@ -155,16 +155,16 @@ impl<'m> Cache<'m> {
         U32x8::select(active, first + direction_bin(dir), U32x8::splat(u32::MAX))
     }
 
-    /// The bins of the same leaves as `bin` for other directions: unit vectors `dir`, world space. `u32::MAX` in inactive
-    /// lanes and where `bin` is no bin.
+    /// The bins of the same leaves as `bin` for other directions: unit vectors `dir`, world space. `u32::MAX` in
+    /// inactive lanes and where `bin` is no bin.
     #[inline]
     pub fn bins_towards(&self, bin: U32x8, dir: Vec3x8, active: Mask8) -> U32x8 {
         let known = active & bin.lt(U32x8::splat(self.bins()));
         self.bins_of(bin & U32x8::splat(!(BINS as u32 - 1)), dir, known)
     }
 
-    /// Square root of the chance that a shadow ray from the leaf of a bin towards its directions meets nothing, rounded up
-    /// to 255ths; 1 where nothing is known and for bins that are not in use.
+    /// Square root of the chance that a shadow ray from the leaf of a bin towards its directions meets nothing, rounded
+    /// up to 255ths; 1 where nothing is known and for bins that are not in use.
     #[inline]
     pub fn visibility_root(&self, bin: U32x8) -> F32x8 {
         let used = self.visibility.get(..self.bins() as usize).unwrap_or(&[]);
@@ -259,8 +259,8 @@ impl<'m> Cache<'m> {
         true
     }
 
-    /// Computes what look-ups read: every node is shrunk towards its parent, so that rare bright samples, which a cell has
-    /// not met yet but its surroundings have, are reckoned with.
+    /// Computes what look-ups read: every node is shrunk towards its parent, so that rare bright samples, which a cell
+    /// has not met yet but its surroundings have, are reckoned with.
     pub(super) fn refresh(&mut self) {
         self.tree.refresh();
         if let Some(leaves) = self.flat {

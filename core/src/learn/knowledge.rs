@@ -113,8 +113,8 @@ impl<'m> Knowledge<'m> {
         self.allotment.of_tile(tile)
     }
 
-    /// What a squared error of a sample of a pixel counts, per channel: less if the pixel has more samples. And its samples
-    /// over those of the mean pixel.
+    /// What a squared error of a sample of a pixel counts, per channel: less if the pixel has more samples. And its
+    /// samples over those of the mean pixel.
     #[inline]
     pub(crate) fn importance(&self, film: u32) -> ([f32; 3], f32) {
         let share = self.allotment.share(film) as f32;
@@ -199,14 +199,14 @@ impl<'m> Knowledge<'m> {
         }
     }
 
-    /// Weight of the samples of a pixel: less where adaptive sampling took more, so that every iteration counts as much in
-    /// all pixels.
+    /// Weight of the samples of a pixel: less where adaptive sampling took more, so that every iteration counts as much
+    /// in all pixels.
     ///
-    /// All iterations weigh the same per sample, because other weights make pictures wrong. EARS merges iterations by inverse
-    /// variance, but bright iterations are the noisy ones: pictures of 16 pixels with caustics came out 0.9 % too dark, and
-    /// with weights by the variance or the work of earlier iterations up to 2 % too bright. As lengths double, little is lost
-    /// with the first ones, which have learned least. A quarter of the weight for the very first made the next pictures
-    /// worse and no later one better.
+    /// All iterations weigh the same per sample, because other weights make pictures wrong. EARS merges iterations by
+    /// inverse variance, but bright iterations are the noisy ones: pictures of 16 pixels with caustics came out 0.9 %
+    /// too dark, and with weights by the variance or the work of earlier iterations up to 2 % too bright. As lengths
+    /// double, little is lost with the first ones, which have learned least. A quarter of the weight for the very first
+    /// made the next pictures worse and no later one better.
     pub(crate) fn weight_of(&self, film: usize) -> f64 {
         1.0 / self.allotment.share(film as u32)
     }

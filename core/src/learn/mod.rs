@@ -1,5 +1,5 @@
-//! What paths have taught so far: statistics by place and direction ([`cache`]), an estimate of every pixel, and variance
-//! and cost of the picture. All of it is frozen while an iteration runs and changes when it ends.
+//! What paths have taught so far: statistics by place and direction ([`cache`]), an estimate of every pixel, and
+//! variance and cost of the picture. All of it is frozen while an iteration runs and changes when it ends.
 //!
 //! This layer knows places, directions, values and costs. It must not know materials, lights or how paths are traced.
 //! Statistics change efficiency only: whatever they hold, no estimate's mean moves.

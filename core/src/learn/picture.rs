@@ -8,8 +8,8 @@ use crate::rrs::Norm;
 use crate::tracer::Counters;
 
 /// Share of the pixels whose variance is left out of the picture's. A single outlier would decide all factors: with the
-/// 0.001 % of EARS (section 5.2), none in a small picture, one bright sample made all vertices look worthless, and roulette
-/// then made more such samples.
+/// 0.001 % of EARS (section 5.2), none in a small picture, one bright sample made all vertices look worthless, and
+/// roulette then made more such samples.
 const OUTLIERS: f64 = 1e-3;
 
 /// What is known of the picture's error and cost per camera sample.

@@ -8,11 +8,11 @@
 //!
 //! All numbers are little-endian. The header says what the sums hang on: the bounds, which place the cells, and the
 //! objective, because values of [first vertices](super::cache::Kind::FirstMatte) are in units of their pixel under the
-//! relative one, and radiance under the absolute one. Nothing else has to agree: after a change of strategy, norm, depth,
-//! camera or scene the sums are what they were of a render alike, in the same units, and fade as new ones come.
+//! relative one, and radiance under the absolute one. Nothing else has to agree: after a change of strategy, norm,
+//! depth, camera or scene the sums are what they were of a render alike, in the same units, and fade as new ones come.
 //!
-//! There are no indices, so bytes cannot describe anything but a tree: what is left to check is that the shape ends where it
-//! says, how deep it goes, and the numbers. Bytes are checked as a whole before anything is changed.
+//! There are no indices, so bytes cannot describe anything but a tree: what is left to check is that the shape ends
+//! where it says, how deep it goes, and the numbers. Bytes are checked as a whole before anything is changed.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use super::bins::{BINS, BinSums};
@@ -290,8 +290,8 @@ impl Cache<'_> {
         length(self.nodes(), self.leaves())
     }
 
-    /// Writes the tree and its sums; returns the bytes written. Equal statistics give equal bytes, whatever the order in
-    /// which the tree grew.
+    /// Writes the tree and its sums; returns the bytes written. Equal statistics give equal bytes, whatever the order
+    /// in which the tree grew.
     pub fn save(&self, out: &mut [u8]) -> Result<usize, CacheError> {
         let (needed, given) = (self.saved_len(), out.len());
         let short = CacheError::Length { needed, given };
@@ -332,8 +332,8 @@ impl Cache<'_> {
     }
 
     /// Takes over a saved cache of the same bounds and objective, in place of what it has. Bytes with more leaves than
-    /// there is room for are refused; [`Self::merge`] into an empty cache takes what fits. After an error the cache is as
-    /// before.
+    /// there is room for are refused; [`Self::merge`] into an empty cache takes what fits. After an error the cache is
+    /// as before.
     pub fn load(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
         let saved = Saved::check(bytes, self)?;
         let room = self.size.leaves();
@@ -346,8 +346,8 @@ impl Cache<'_> {
     }
 
     /// Adds a saved cache of the same bounds and objective. Where its tree is finer, this one grows as long as there is
-    /// room, else the finer sums join in one leaf; where it is coarser, leaves get an eighth per level. After an error the
-    /// cache is as before.
+    /// room, else the finer sums join in one leaf; where it is coarser, leaves get an eighth per level. After an error
+    /// the cache is as before.
     pub fn merge(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
         let saved = Saved::check(bytes, self)?;
         self.add(&saved);

@@ -44,9 +44,9 @@ impl<'m> Training<'m> {
     /// Adds a sample. Negative values count as 0, values above [`super::cache::MAX_VALUE`] as that.
     ///
     /// `false` if it was not taken: the bin does not exist, a number is not finite, or the bin has
-    /// [`super::cache::BIN_LIMIT`] samples of this iteration. A full bin keeps the first ones, so what it says leans to the
-    /// tiles that the shard begins with; factors, and so the noise, are a little off then, but no picture is biased.
-    /// [`crate::Counters::samples_refused`] counts them.
+    /// [`super::cache::BIN_LIMIT`] samples of this iteration. A full bin keeps the first ones, so what it says leans to
+    /// the tiles that the shard begins with; factors, and so the noise, are a little off then, but no picture is
+    /// biased. [`crate::Counters::samples_refused`] counts them.
     #[inline]
     pub fn log(&mut self, bin: u32, x: [f32; 3], cost: f32) -> bool {
         let finite = x.iter().all(|x| x.is_finite()) && cost.is_finite();
@@ -62,8 +62,8 @@ impl<'m> Training<'m> {
     }
 
     /// Adds a shadow ray from a vertex in the leaf of `bin` towards its directions
-    /// ([`super::cache::Cache::bins_towards`]), and whether it met nothing. `false` if it was not taken: the bin does not
-    /// exist or has 65,535 of this iteration, the first ones; [`crate::Counters::shadows_refused`] counts them.
+    /// ([`super::cache::Cache::bins_towards`]), and whether it met nothing. `false` if it was not taken: the bin does
+    /// not exist or has 65,535 of this iteration, the first ones; [`crate::Counters::shadows_refused`] counts them.
     #[inline]
     pub fn log_shadow(&mut self, bin: u32, visible: bool) -> bool {
         self.shadows_mut().get_mut(bin as usize).is_some_and(|s| s.add(visible))

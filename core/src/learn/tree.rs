@@ -2,11 +2,11 @@
 //!
 //! A node is one word. A leaf's has the high bit, its depth and its number; an inner node's is the index of the first
 //! of its eight children, which lie together. Places are numbers of cells on a grid of 2^16 per axis in a cube around
-//! the bounds; bit `15 - d` of the three numbers picks the child at depth `d`. So a descent compares no floats, and eight
-//! lanes go down in lockstep with their loads overlapping.
+//! the bounds; bit `15 - d` of the three numbers picks the child at depth `d`. So a descent compares no floats, and
+//! eight lanes go down in lockstep with their loads overlapping.
 //!
-//! The first levels of a large tree are also kept as one table, a coarse grid, where a descent starts: a jittered look-up
-//! needs two descents.
+//! The first levels of a large tree are also kept as one table, a coarse grid, where a descent starts: a jittered
+//! look-up needs two descents.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use super::bins::BINS;

@@ -86,8 +86,8 @@ impl LightSample8 {
     }
 }
 
-/// How a light is chosen for a reference point. [`PowerSelector`] is built in; hosts may bring their own, such as a light
-/// tree.
+/// How a light is chosen for a reference point. [`PowerSelector`] is built in; hosts may bring their own, such as a
+/// light tree.
 ///
 /// Pictures are right if both functions tell the same probabilities and every light that could be seen from a point has
 /// one above 0: point and directional lights are found in no other way. How good the choice is shows in the noise only.

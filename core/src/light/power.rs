@@ -24,9 +24,9 @@ impl LightSelector for PowerSelector<'_> {
     }
 }
 
-/// The items that the random numbers `r` pick from tables of `len` entries that start at `start` of `tables`, a table per
-/// lane; [`NONE`] where there is no such entry. No branch hangs on what is loaded: entries of large tables come from memory,
-/// and eight loads that wait for each other take much longer than eight at a time.
+/// The items that the random numbers `r` pick from tables of `len` entries that start at `start` of `tables`, a table
+/// per lane; [`NONE`] where there is no such entry. No branch hangs on what is loaded: entries of large tables come
+/// from memory, and eight loads that wait for each other take much longer than eight at a time.
 #[inline(always)]
 pub(super) fn pick(tables: &[Alias], start: U32x8, len: u32, r: U32x8) -> U32x8 {
     let (start, r) = (start.to_array(), r.to_array());

@@ -1,5 +1,5 @@
-//! Roulette by albedo (EARS sections 2 and 6.4): of this vertex, or of all vertices so far multiplied, which path guiding
-//! needs because a guided throughput says nothing about how much light is left.
+//! Roulette by albedo (EARS sections 2 and 6.4): of this vertex, or of all vertices so far multiplied, which path
+//! guiding needs because a guided throughput says nothing about how much light is left.
 
 use super::{RrsStrategy, Vertices8};
 use croupier_simd::F32x8;

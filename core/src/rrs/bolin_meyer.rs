@@ -1,8 +1,9 @@
-//! Factors per pixel and path length (Bolin and Meyer 1997): those of EARS with statistics that know nothing but the block of
-//! pixels and the depth. Two vertices of one depth under one pixel get the same factor however much they differ.
+//! Factors per pixel and path length (Bolin and Meyer 1997): those of EARS with statistics that know nothing but the
+//! block of pixels and the depth. Two vertices of one depth under one pixel get the same factor however much they
+//! differ.
 //!
-//! Guarded as [`super::Ears`] is: trusted at once, statistics of a few fireflies split paths for ever or kill them, and come
-//! back as samples so rare that a picture of 512 samples a pixel looks biased (kitchen).
+//! Guarded as [`super::Ears`] is: trusted at once, statistics of a few fireflies split paths for ever or kill them, and
+//! come back as samples so rare that a picture of 512 samples a pixel looks biased (kitchen).
 
 use super::{RrsStrategy, Space, Vertices8, ears};
 use croupier_simd::F32x8;

@@ -1,5 +1,5 @@
-//! The baseline of the EARS paper (section 6): throughput times albedo from the fifth bounce. The absolute form is what other
-//! renderers mean by "classic"; the authors' program plays relative to the pixel, which suits dark pictures.
+//! The baseline of the EARS paper (section 6): throughput times albedo from the fifth bounce. The absolute form is what
+//! other renderers mean by "classic"; the authors' program plays relative to the pixel, which suits dark pictures.
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|

@@ -4,9 +4,9 @@
 //! C_i = s_0 + ... + s_i,   n_i = floor(C_i + u) - floor(C_{i-1} + u),   u uniform in [0, 1)
 //! ```
 //!
-//! E\[n_i\] = s_i, and the total is within 1 of the sum of the factors, so that a packet scaled to its free slots cannot
-//! overflow. In 32.32 fixed point every factor in [2^-8, 2^24) is exact, hence so is the expectation over the 2^32 values
-//! of `u`; a factor of 1 always gives 1 (NUMERICS RRS-2).
+//! E\[n_i\] = s_i, and the total is within 1 of the sum of the factors, so that a packet scaled to its free slots
+//! cannot overflow. In 32.32 fixed point every factor in [2^-8, 2^24) is exact, hence so is the expectation over the
+//! 2^32 values of `u`; a factor of 1 always gives 1 (NUMERICS RRS-2).
 
 use croupier_simd::F32x8;
 

@@ -1,9 +1,9 @@
-//! Efficiency-aware roulette and splitting (Rath et al., SIGGRAPH 2022): the factors that make error x cost of the whole
-//! picture least, from local and global variance and cost (eq. 32), as a fixed point over the iterations.
+//! Efficiency-aware roulette and splitting (Rath et al., SIGGRAPH 2022): the factors that make error x cost of the
+//! whole picture least, from local and global variance and cost (eq. 32), as a fixed point over the iterations.
 //!
-//! Where little is known the paper's rule acts on noise: a bin whose few samples found nothing kills every path. So the factor
-//! grows out of simpler rules, geometrically: `classic` without samples, `adrrs` (which needs a mean) with some, EARS (which
-//! needs a second moment) with more.
+//! Where little is known the paper's rule acts on noise: a bin whose few samples found nothing kills every path. So the
+//! factor grows out of simpler rules, geometrically: `classic` without samples, `adrrs` (which needs a mean) with some,
+//! EARS (which needs a second moment) with more.
 //!
 //! | parameter | unit | value |
 //! |---|---|---|
@@ -52,8 +52,8 @@ pub(super) fn split_or_kill(l: &Learned8, beta: Vec3x8) -> F32x8 {
     kill.le(one).select(kill, split.max(one)).sqrt()
 }
 
-/// Steps of a float from 1 to a factor: 2^23 times its logarithm to base 2, linear between powers of 2. Means of levels are
-/// geometric means within 6 %, exact at both ends, and take no logarithm.
+/// Steps of a float from 1 to a factor: 2^23 times its logarithm to base 2, linear between powers of 2. Means of levels
+/// are geometric means within 6 %, exact at both ends, and take no logarithm.
 #[inline(always)]
 fn level(s: F32x8) -> F32x8 {
     (s.clamp(MIN_FACTOR, MAX_FACTOR).to_bits().to_i32() - I32x8::splat(ONE)).to_f32()

@@ -1,6 +1,6 @@
 //! "Go with the winners" (Szirmay-Kalos, Antal and Sbert 2005): what a path may still bring, times how much its samples
-//! differ. The variance of a vertex is taken to be that of reflected light plus that of visibility, the latter the less the
-//! narrower the lobe.
+//! differ. The variance of a vertex is taken to be that of reflected light plus that of visibility, the latter the less
+//! the narrower the lobe.
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|

@@ -89,8 +89,8 @@ kinds! {
         Environment = 11, "environment";
         /// `[f32; 3]` radiance texels of the environment map, row 0 first.
         EnvTexels = 12, "environment texels";
-        /// [`Alias`] tables of the environment map: one over the cell rows, then one per row over its cells. Empty if the
-        /// map is black. Rows of probability 0 may hold any well-formed table.
+        /// [`Alias`] tables of the environment map: one over the cell rows, then one per row over its cells. Empty if
+        /// the map is black. Rows of probability 0 may hold any well-formed table.
         EnvAlias = 13, "environment alias tables";
         /// [`Camera`], exactly one.
         Cameras = 14, "camera";

@@ -56,12 +56,14 @@ pub struct Counters {
     pub path_segments: u64,
     /// Samples that were offered to the statistics, the refused ones included.
     pub samples_logged: u64,
-    /// Samples that were not learned from because their bin had enough of this iteration ([`crate::learn::cache::BIN_LIMIT`]),
-    /// or because a number overflowed. Many of them: the statistics lean to the first tiles of each shard.
+    /// Samples that were not learned from because their bin had enough of this iteration
+    /// ([`crate::learn::cache::BIN_LIMIT`]), or because a number overflowed. Many of them: the statistics lean to the
+    /// first tiles of each shard.
     pub samples_refused: u64,
     /// Shadow rays whose visibility was not learned from because their bin had 65,535 of this iteration.
     pub shadows_refused: u64,
-    /// Samples without a ledger record because the slab was full: they, and those they are part of, were not learned from.
+    /// Samples without a ledger record because the slab was full: they, and those they are part of, were not learned
+    /// from.
     pub ledger_full: u64,
     /// Vertices whose factor was not a finite number and became 1.
     pub factors_not_finite: u64,
@@ -93,7 +95,8 @@ impl Counters {
         self.camera_rays + self.scatter_rays + self.shadow_rays
     }
 
-    /// What efficiency is reckoned with: rays, each times its relative cost ([`crate::learn::COST_SHADOW`] and its like).
+    /// What efficiency is reckoned with: rays, each times its relative cost ([`crate::learn::COST_SHADOW`] and its
+    /// like).
     pub fn cost(&self) -> f64 {
         let parts =
             [(self.camera_rays, COST_CAMERA), (self.scatter_rays, COST_BOUNCE), (self.shadow_rays, COST_SHADOW)];

@@ -1,4 +1,5 @@
-//! Which slots of a slab are free. The one given back last is taken first, so that few slots stay in the processor's caches.
+//! Which slots of a slab are free. The one given back last is taken first, so that few slots stay in the processor's
+//! caches.
 
 use crate::memory::{Carver, Measure, MemoryError};
 

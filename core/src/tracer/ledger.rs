@@ -1,13 +1,13 @@
 //! What each sample gave: a fixed slab with one record per unfinished sample, nested like the samples themselves.
 //!
 //! A record belongs to one sample of a vertex (one light sample and one bounce) or to a camera sample. It gathers the
-//! sample's own estimate of reflected radiance, without any weight of the path before it, and its cost. The bounce ends at
-//! one vertex at most; what the samples of that vertex give comes back times `inner` (bounce weight over the vertex's
-//! factor). When the last of them is closed the sample is finished: it is logged to the bin of *its* vertex, which its
-//! parent record holds, and folded into the parent (EARS, SIGGRAPH 2022, algorithm 2, without the recursion).
+//! sample's own estimate of reflected radiance, without any weight of the path before it, and its cost. The bounce ends
+//! at one vertex at most; what the samples of that vertex give comes back times `inner` (bounce weight over the
+//! vertex's factor). When the last of them is closed the sample is finished: it is logged to the bin of *its* vertex,
+//! which its parent record holds, and folded into the parent (EARS, SIGGRAPH 2022, algorithm 2, without the recursion).
 //!
-//! When the slab is full a sample gets no record: it and what follows are not learned from, and the samples that contain
-//! it are incomplete, so they are not logged either. Nothing else changes; the image never passes through here.
+//! When the slab is full a sample gets no record: it and what follows are not learned from, and the samples that
+//! contain it are incomplete, so they are not logged either. Nothing else changes; the image never passes through here.
 
 use super::free_list::FreeList;
 use crate::memory::{Carver, Measure, MemoryError};
@@ -138,8 +138,8 @@ impl<'m> Ledger<'m> {
         }
     }
 
-    /// Closes a lane or a drained vertex of a sample. If that finishes it, and perhaps the samples it is part of, `log` is
-    /// called for each.
+    /// Closes a lane or a drained vertex of a sample. If that finishes it, and perhaps the samples it is part of, `log`
+    /// is called for each.
     #[inline]
     pub(crate) fn close(&mut self, mut slot: u32, mut log: impl FnMut(Finished)) {
         while let Some(r) = self.records.get_mut(slot as usize) {
@@ -343,10 +343,11 @@ mod tests {
         (logged, refused)
     }
 
-    /// Random trees, several at a time, in random order, through slabs that suffice and slabs that do not: what is logged is
-    /// what recursion gives, for complete samples and for no others, and every slot comes back. Killed by: values times the
-    /// child's own scale, `inner` left out or applied twice, rays that stay with the child, a pair with a sample of another
-    /// vertex, a spoiled sample whose parents are not, a drained vertex that counts on, a slot not given back.
+    /// Random trees, several at a time, in random order, through slabs that suffice and slabs that do not: what is
+    /// logged is what recursion gives, for complete samples and for no others, and every slot comes back. Killed by:
+    /// values times the child's own scale, `inner` left out or applied twice, rays that stay with the child, a pair
+    /// with a sample of another vertex, a spoiled sample whose parents are not, a drained vertex that counts on, a slot
+    /// not given back.
     #[test]
     fn what_is_logged_is_what_recursion_gives() {
         let mut r = Random(5);

@@ -1,5 +1,5 @@
-//! The packet machine. One turn takes eight samples from waiting vertices of one class (or eight camera samples) through
-//! the stages, each its own file:
+//! The packet machine. One turn takes eight samples from waiting vertices of one class (or eight camera samples)
+//! through the stages, each its own file:
 //!
 //! `refill` -> `scatter` -> `occlude` -> `trace` -> `surface` -> `roulette` -> `settle`
 //!

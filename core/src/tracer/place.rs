@@ -61,7 +61,8 @@ pub(super) fn place<P: Profile, I: Intersector, L: LightSelector>(
             let bin = knowledge.scene_bins(kind, v.p, dir, jitter(v.key), known);
             let mut unscale = a.albedo;
             if (seen & a.active).any() {
-                // in one cell bright pixels see bright samples: only their ratio is alike, however many samples a pixel has
+                // in one cell bright pixels see bright samples: only their ratio is alike, however many samples a pixel
+                // has
                 let share = roots.targets(v.root, a.active).share;
                 let own = inverse(v.importance * share.sqr(), f32::MIN_POSITIVE);
                 unscale = Vec3x8::select(seen, own.map(F32x8::sqrt), unscale);

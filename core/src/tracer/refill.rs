@@ -1,5 +1,5 @@
-//! Stage `refill`: camera samples in the order of tiles, pixels (Morton) and samples, eight at a time. Neighbouring lanes
-//! are samples of one pixel or of neighbouring pixels, so primary packets are coherent.
+//! Stage `refill`: camera samples in the order of tiles, pixels (Morton) and samples, eight at a time. Neighbouring
+//! lanes are samples of one pixel or of neighbouring pixels, so primary packets are coherent.
 
 use super::flight::Flight8;
 use super::ledger::NO_RECORD;
@@ -42,7 +42,8 @@ impl Cursor {
         self.tile.is_none()
     }
 
-    /// The next (pixel, pixel slot, sample); a finished cursor gives `None`. `samples` is the number per pixel of a tile.
+    /// The next (pixel, pixel slot, sample); a finished cursor gives `None`. `samples` is the number per pixel of a
+    /// tile.
     fn next(&mut self, tiles: &Tiles, shard: u32, samples: impl Fn(u32) -> u32) -> Option<([u32; 2], u32, u32)> {
         while let Some(tile) = self.tile {
             let found = tiles.pixel(tile, self.slot).map(|p| (p, self.base + self.slot, self.sample));

@@ -1,5 +1,5 @@
-//! Stage `roulette`: how many samples each arrived vertex gets. The masks n = 0 (the path ends) and n >= 1 (it waits with
-//! n samples) are the packet's roulette masks; one comb rounds the whole packet.
+//! Stage `roulette`: how many samples each arrived vertex gets. The masks n = 0 (the path ends) and n >= 1 (it waits
+//! with n samples) are the packet's roulette masks; one comb rounds the whole packet.
 
 use super::ledger::{NO_BIN, NO_RECORD};
 use super::place::{Place8, place};

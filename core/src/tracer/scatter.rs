@@ -209,10 +209,10 @@ impl Shard<'_> {
         self.gather(clear, v.root, s.ledger, &found);
     }
 
-    /// Plays roulette for shadow rays: a light sample has a known value if nothing hides it and the cost of a ray, so the
-    /// factor that is best for it is that of EARS (eq. 32) with the square of its value, times the learned chance that it
-    /// is visible (of `bin`), as second moment (Veach 1997, section 10.4.1, "efficiency-optimised Russian roulette", with
-    /// the same idea of a threshold). The lanes that go on.
+    /// Plays roulette for shadow rays: a light sample has a known value if nothing hides it and the cost of a ray, so
+    /// the factor that is best for it is that of EARS (eq. 32) with the square of its value, times the learned chance
+    /// that it is visible (of `bin`), as second moment (Veach 1997, section 10.4.1, "efficiency-optimised Russian
+    /// roulette", with the same idea of a threshold). The lanes that go on.
     fn shadow_roulette<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
         session: &Session<'_, '_, P, I, L>,

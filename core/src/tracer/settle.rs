@@ -1,5 +1,5 @@
-//! Stage `settle`: radiance goes to its root and its ledger record, finished samples to the statistics, finished roots to the
-//! film.
+//! Stage `settle`: radiance goes to its root and its ledger record, finished samples to the statistics, finished roots
+//! to the film.
 
 use super::ledger::{NO_BIN, NO_RECORD};
 use super::shard::Shard;
@@ -49,8 +49,8 @@ impl Shard<'_> {
         }
     }
 
-    /// What part of eight contributions the statistics take. The variance of the picture leaves outliers out; so must the
-    /// moments that are weighed against it, or cells that met one sample of them would split for ever.
+    /// What part of eight contributions the statistics take. The variance of the picture leaves outliers out; so must
+    /// the moments that are weighed against it, or cells that met one sample of them would split for ever.
     fn tamed(&mut self, mask: Mask8, radiance: Vec3x8, root: U32x8) -> F32x8 {
         let limit = F32x8::splat(self.outlier);
         let square = radiance * radiance;
@@ -110,8 +110,8 @@ impl Shard<'_> {
         });
     }
 
-    /// Ends a path of `depth` segments: closes a lane or a drained vertex of `root` and `ledger`. A finished camera sample
-    /// goes to its pixel.
+    /// Ends a path of `depth` segments: closes a lane or a drained vertex of `root` and `ledger`. A finished camera
+    /// sample goes to its pixel.
     #[inline]
     pub(super) fn close(&mut self, root: u32, ledger: u32, depth: u32) {
         self.counters.path_segments += u64::from(depth);

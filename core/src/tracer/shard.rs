@@ -60,8 +60,8 @@ impl fmt::Display for ShardError {
 
 impl core::error::Error for ShardError {}
 
-/// All state of one unit of work, in the caller's block. It works for one session: another one of the same scene and plan
-/// needs shards of its own, unless it is to continue with equal iterations.
+/// All state of one unit of work, in the caller's block. It works for one session: another one of the same scene and
+/// plan needs shards of its own, unless it is to continue with equal iterations.
 #[derive(Debug)]
 pub struct Shard<'m> {
     pub(super) plan: Plan,
@@ -126,7 +126,8 @@ impl<'m> Shard<'m> {
         self.cursor = Cursor::finished();
     }
 
-    /// Works until the budget is used or the iteration is finished. Many small steps and one big step give the same bits.
+    /// Works until the budget is used or the iteration is finished. Many small steps and one big step give the same
+    /// bits.
     pub fn step<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
         session: &Session<'_, '_, P, I, L>,

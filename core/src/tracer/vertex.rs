@@ -260,8 +260,8 @@ impl<'m> Pool<'m> {
         self.pending[class] += u64::from(v.count());
     }
 
-    /// Takes up to eight samples of `class`, newest vertices first, so that even if every one of them goes on there is a
-    /// slot for each. Calls `taken(vertex, lanes, drained)` per vertex. `None` if no sample fits.
+    /// Takes up to eight samples of `class`, newest vertices first, so that even if every one of them goes on there is
+    /// a slot for each. Calls `taken(vertex, lanes, drained)` per vertex. `None` if no sample fits.
     pub(crate) fn take(&mut self, class: usize, mut taken: impl FnMut(&Vertex, u32, bool)) -> Option<Batch> {
         let mut slot = [0u32; 8];
         let mut sample = [0u32; 8];
@@ -319,9 +319,9 @@ mod tests {
         v
     }
 
-    /// Random (subcritical) trees through pools of every small size: each turn takes what fits and pushes as `roulette` may. Every
-    /// sample is taken exactly once, no turn is stuck, no slot is lost. Killed by: `room` off by one, a drained slot not
-    /// given back, `RESERVE` of 0.
+    /// Random (subcritical) trees through pools of every small size: each turn takes what fits and pushes as `roulette`
+    /// may. Every sample is taken exactly once, no turn is stuck, no slot is lost. Killed by: `room` off by one, a
+    /// drained slot not given back, `RESERVE` of 0.
     #[test]
     fn no_pool_gets_stuck() {
         let mut word = 7u32;

@@ -30,8 +30,8 @@ pub fn missing() -> Option<&'static str> {
 #[cfg(any(test, all(target_arch = "x86_64", target_feature = "avx2")))]
 const OSXSAVE: u32 = 1 << 27;
 
-/// From `ecx` of leaf 1, `ebx` of leaf 7, `ecx` of leaf 0x8000_0001 and the extended control register 0 (Intel SDM vol. 2,
-/// CPUID; AMD APM vol. 3, appendix E).
+/// From `ecx` of leaf 1, `ebx` of leaf 7, `ecx` of leaf 0x8000_0001 and the extended control register 0 (Intel SDM vol.
+/// 2, CPUID; AMD APM vol. 3, appendix E).
 #[cfg(any(test, all(target_arch = "x86_64", target_feature = "avx2")))]
 fn first_missing(one: u32, seven: u32, extended: u32, state: u64) -> Option<&'static str> {
     let sets = [
@@ -52,8 +52,8 @@ fn first_missing(one: u32, seven: u32, extended: u32, state: u64) -> Option<&'st
 mod tests {
     use super::*;
 
-    /// A processor of 2013 (Haswell), one of 2012 (Ivy Bridge), and a system that does not save AVX registers. Dies with
-    /// a wrong bit number.
+    /// A processor of 2013 (Haswell), one of 2012 (Ivy Bridge), and a system that does not save AVX registers. Dies
+    /// with a wrong bit number.
     #[test]
     fn names_what_is_missing() {
         let (one, seven, extended) = (0x7ffa_fbff, 0x0000_27ab, 0x0000_0021);

@@ -80,7 +80,8 @@ pub struct Object {
 pub struct Material {
     /// Name; messages and scene files know it by this.
     pub name: String,
-    /// Both sides behave like the front; else the back of an opaque surface is black. Ignored by dielectrics and `Null`.
+    /// Both sides behave like the front; else the back of an opaque surface is black. Ignored by dielectrics and
+    /// `Null`.
     pub two_sided: bool,
     /// How it scatters.
     pub model: Model,

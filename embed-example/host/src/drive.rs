@@ -1,5 +1,5 @@
-//! Drives the core: memory, threads, iterations and when to stop. The core has no clock; time lives here. [`crate::render`]
-//! is the same with pictures and names.
+//! Drives the core: memory, threads, iterations and when to stop. The core has no clock; time lives here.
+//! [`crate::render`] is the same with pictures and names.
 
 mod calibrate;
 pub mod schedule;
@@ -94,7 +94,8 @@ pub struct IterationRecord {
 pub struct CacheRecord {
     /// Leaves in use.
     pub leaves: u32,
-    /// Splits for which there was no room, in all iterations so far. A leaf that remains too large counts again in each.
+    /// Splits for which there was no room, in all iterations so far. A leaf that remains too large counts again in
+    /// each.
     pub splits_refused: u64,
 }
 

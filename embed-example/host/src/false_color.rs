@@ -63,8 +63,8 @@ impl Scale {
     /// Of roulette factors, 1/20 to 20: red ends paths, white leaves them, blue splits them.
     pub const FACTORS: Self = Self { low: 0.05, high: 20.0, diverging: true };
 
-    /// Of numbers above 0, from the smallest of them to what all but a thousandth stay below, widened to 1, 2 or 5 times
-    /// a power of ten.
+    /// Of numbers above 0, from the smallest of them to what all but a thousandth stay below, widened to 1, 2 or 5
+    /// times a power of ten.
     pub fn sequential(values: &[f32]) -> Self {
         // the clamp keeps the ends, and what is computed from them, finite
         let positive = values.iter().filter(|x| **x > 0.0 && x.is_finite());

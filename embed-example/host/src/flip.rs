@@ -34,8 +34,8 @@ const KNEE_VALUE: f64 = 0.95;
 const FEATURE_WIDTH: f64 = 0.082;
 /// Exponent of feature differences (q_f).
 const FEATURE_EXPONENT: f64 = 0.5;
-/// Contrast sensitivity of Y, Cx, Cz as sums of Gaussians a exp(-b f²) over the frequency f in cycles per degree: (a, b)
-/// (the paper's table 1).
+/// Contrast sensitivity of Y, Cx, Cz as sums of Gaussians a exp(-b f²) over the frequency f in cycles per degree: (a,
+/// b) (the paper's table 1).
 const SENSITIVITY: [[(f64, f64); 2]; 3] =
     [[(1.0, 0.0047), (0.0, 1e-5)], [(1.0, 0.0053), (0.0, 1e-5)], [(34.1, 0.04), (13.5, 0.025)]];
 
@@ -53,8 +53,8 @@ struct Plane {
 }
 
 /// The error map in [0, 1], row by row, of two images of `width * height` linear Rec. 709 pixels in [0, 1] (a picture
-/// as the display shows it, before the sRGB transfer function); symmetric in the two. Values outside are clamped, NaN and
-/// missing pixels are black.
+/// as the display shows it, before the sRGB transfer function); symmetric in the two. Values outside are clamped, NaN
+/// and missing pixels are black.
 pub fn flip(width: usize, height: usize, reference: &[[f32; 3]], test: &[[f32; 3]], viewing: Viewing) -> Vec<f64> {
     let [a, b] = [reference, test].map(|pixels| Seen::new(width, height, pixels, viewing));
     let largest = hyab(hunt_lab([0.0, 1.0, 0.0]), hunt_lab([0.0, 0.0, 1.0])).powf(COLOR_EXPONENT);
@@ -98,9 +98,9 @@ impl Seen {
     }
 }
 
-/// The image of one opponent channel on the retina: each Gaussian a exp(-b f²) over frequencies is the Gaussian
-/// a sqrt(pi / b) exp(-pi² x² / b) over degrees. The filter as a whole has sum 1; all three channels use the radius of the
-/// widest one.
+/// The image of one opponent channel on the retina: each Gaussian a exp(-b f²) over frequencies is the Gaussian a
+/// sqrt(pi / b) exp(-pi² x² / b) over degrees. The filter as a whole has sum 1; all three channels use the radius of
+/// the widest one.
 fn sensitivity_filter(plane: &Plane, gaussians: &[(f64, f64); 2], ppd: f64) -> Vec<f64> {
     let widest = SENSITIVITY.iter().flatten().map(|g| g.1).fold(0.0, f64::max);
     let radius = (3.0 * (widest / (2.0 * PI * PI)).sqrt() * ppd).ceil() as usize;

@@ -8,7 +8,8 @@ pub const TABLE_SIZE: usize = croupier::bsdf::TABLE_SIZE;
 /// What a rough coat does to light that scatters below it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoughPlasticTable {
-    /// T: energy transmitted from outside at cosines 0, 1/63, ... 1: the mean over visible normals of (1 - F) G1(refracted).
+    /// T: energy transmitted from outside at cosines 0, 1/63, ... 1: the mean over visible normals of (1 - F)
+    /// G1(refracted).
     pub transmittance: [f32; TABLE_SIZE],
     /// R: energy reflected from inside for diffuse light: twice the mean over the same 64 cosines of cosine times the
     /// mean over visible normals of F G1(reflected). The plain mean, not the integral, because Mitsuba's `roughplastic`

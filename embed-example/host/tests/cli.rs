@@ -244,8 +244,8 @@ fn picture(level: f32, stderr: Option<f32>) -> Picture {
     picture
 }
 
-/// Standard errors come from where they lie: a layer of the image, a file beside the reference, an argument, seeds. Dies
-/// if one of these ways is not taken.
+/// Standard errors come from where they lie: a layer of the image, a file beside the reference, an argument, seeds.
+/// Dies if one of these ways is not taken.
 #[test]
 fn compare_finds_the_standard_errors() {
     let dir = tempfile::tempdir().unwrap();

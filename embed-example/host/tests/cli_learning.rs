@@ -126,8 +126,8 @@ fn usage_errors_are_status_2() {
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
 }
 
-/// What no flag tells alone is refused by the core, before there is a scene. Killed by: a check that waits for the scene, or
-/// that takes other choices than the render does.
+/// What no flag tells alone is refused by the core, before there is a scene. Killed by: a check that waits for the
+/// scene, or that takes other choices than the render does.
 #[test]
 fn flags_that_do_not_fit_together_are_status_1() {
     let dir = tempfile::tempdir().unwrap();

@@ -93,7 +93,8 @@ pub(super) fn build(triangles: &[[[f32; 3]; 3]], effort: Effort) -> Vec<Binary> 
 }
 
 /// Share of the nodes that may look for a better place. Each looks at about as many nodes as a random ray would visit,
-/// which is some hundred in real scenes, but all of them where boxes coincide: unlimited, the search is quadratic there.
+/// which is some hundred in real scenes, but all of them where boxes coincide: unlimited, the search is quadratic
+/// there.
 fn affordable(bvh: &Bvh2) -> f32 {
     const STEPS: f64 = 3e8;
     let area = |n: &Bvh2Node| f64::from(n.aabb().half_area());

@@ -1,8 +1,8 @@
 //! Binary tree to 8-wide tree at the lowest expected cost (surface area heuristic), by dynamic programming as for
 //! compressed wide trees (Ylitie, Karras, Laine, HPG 2017, section 4), with leaves of up to eight triangles.
 //!
-//! `cost[i][j]` is the least cost of the subtree i as at most j siblings: one wide node or leaf (j = 1), or its children
-//! with k and j - k of them.
+//! `cost[i][j]` is the least cost of the subtree i as at most j siblings: one wide node or leaf (j = 1), or its
+//! children with k and j - k of them.
 
 use super::Tree;
 use super::binary::{Binary, Bounds};

@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 pub struct Args {
     /// Folder with scene.json, or .obj file
     scene: PathBuf,
-    /// Where the baked scene goes. Programs map this file into memory: replace it by another `bake`, never edit it in place
+    /// Where the baked scene goes. Programs map this file into memory: replace it by another `bake`, never edit it in
+    /// place
     #[arg(short, long, value_name = "FILE", value_parser = crp_path)]
     output: PathBuf,
     /// Print the figures as one line of JSON

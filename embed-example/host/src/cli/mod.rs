@@ -1,7 +1,7 @@
 //! Command line: arguments, exit status, and one file per command.
 //!
-//! Exit status 0: done (also when stopped by Ctrl-C with the picture so far written); 1: the last line on stderr says what went
-//! wrong; 2: the arguments make no sense. Results go to stdout, progress, notes and errors to stderr.
+//! Exit status 0: done (also when stopped by Ctrl-C with the picture so far written); 1: the last line on stderr says
+//! what went wrong; 2: the arguments make no sense. Results go to stdout, progress, notes and errors to stderr.
 
 mod bake;
 mod compare;

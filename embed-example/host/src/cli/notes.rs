@@ -1,4 +1,5 @@
-//! What loading and baking assumed, ignored or left out: printed on stderr, and part of every JSON report about a scene.
+//! What loading and baking assumed, ignored or left out: printed on stderr, and part of every JSON report about a
+//! scene.
 
 use super::scene::about;
 use croupier_host::bake::BakeReport;

@@ -1,5 +1,5 @@
-//! The files of a render: checked before it begins, and every one of them written when it has ended, whatever happens to
-//! the others. An hour of rendering must not be lost to a full disk or a mistyped name.
+//! The files of a render: checked before it begins, and every one of them written when it has ended, whatever happens
+//! to the others. An hour of rendering must not be lost to a full disk or a mistyped name.
 
 use croupier_host::false_color::{Scale, draw};
 use croupier_host::image::{ImageError, Picture, part_name, write_png, write_whole};

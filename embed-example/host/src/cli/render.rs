@@ -67,8 +67,8 @@ struct Until {
     /// Stop after this many samples per pixel
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
-    /// Stop after this time, loading and writing not counted: no iteration begins that would pass it at the speed so far,
-    /// one that has begun is finished, and the first, a sample per pixel, is rendered in any case
+    /// Stop after this time, loading and writing not counted: no iteration begins that would pass it at the speed so
+    /// far, one that has begun is finished, and the first, a sample per pixel, is rendered in any case
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// Stop after this many rays: no iteration begins that would pass them at the cost so far, but for the first

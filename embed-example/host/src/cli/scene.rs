@@ -32,8 +32,8 @@ impl Deref for SceneBytes {
     }
 }
 
-/// Opens a scene: a baked `.crp` file, anything that loads and bakes (a folder with `scene.json`, an `.obj`), or, without
-/// a path, the built-in one. What had to be assumed, ignored or left out is printed and returned.
+/// Opens a scene: a baked `.crp` file, anything that loads and bakes (a folder with `scene.json`, an `.obj`), or,
+/// without a path, the built-in one. What had to be assumed, ignored or left out is printed and returned.
 pub fn open(path: Option<&Path>) -> Result<(SceneBytes, Notes), Box<dyn Error>> {
     let (description, loaded) = match path {
         Some(path) if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")) => {
@@ -64,8 +64,8 @@ fn map(path: &Path) -> Result<SceneBytes, Box<dyn Error>> {
         return Err(format!("{}: the file is empty", path.display()).into());
     }
     // SAFETY: the bytes must not change while they are mapped. This program never writes into an existing file
-    // (`image::write_whole` renames a new one over it, which leaves the mapped one as it is); that no other program does
-    // is asked of the user in the help text of `bake`.
+    // (`image::write_whole` renames a new one over it, which leaves the mapped one as it is); that no other program
+    // does is asked of the user in the help text of `bake`.
     let map = unsafe { Mmap::map(&file) }.map_err(failed)?;
     Ok(SceneBytes::Mapped(map))
 }

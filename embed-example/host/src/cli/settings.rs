@@ -17,11 +17,12 @@ pub struct SettingsFlags {
     /// Size in pixels; the scene's own if absent
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
-    /// Units of parallel work; the image depends on their number. 16 if absent, as many as --cache-bytes has room for if that
-    /// is fewer
+    /// Units of parallel work; the image depends on their number. 16 if absent, as many as --cache-bytes has room for
+    /// if that is fewer
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     shards: Option<u32>,
-    /// Path vertices that may wait in a shard, 16 to 2^24; 512 if absent. With fewer, factors above 1 become 1 more often
+    /// Path vertices that may wait in a shard, 16 to 2^24; 512 if absent. With fewer, factors above 1 become 1 more
+    /// often
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(i64::from(MIN_RING)..=1 << 24))]
     ring: Option<u32>,
     /// Samples that splitting may add to one camera sample; 4096 if absent
@@ -41,8 +42,8 @@ impl SettingsFlags {
     }
 }
 
-/// The usual number of shards, less where their statistics do not fit. If not even those of one do, the core says what one
-/// needs.
+/// The usual number of shards, less where their statistics do not fit. If not even those of one do, the core says what
+/// one needs.
 fn shards(options: &RenderOptions) -> u32 {
     let learns = Strategy::parse(&options.strategy).is_ok_and(|s| s.space().is_some());
     let fits = |shards: &u32| !learns || CacheSize::within(options.learning.cache_bytes, *shards).is_some();

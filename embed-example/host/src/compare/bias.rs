@@ -12,11 +12,11 @@
 //! *Fireflies.* With rare bright samples that breaks: a block that missed its fireflies has too low a mean *and* too
 //! low a variance, one that was hit has both too high. If the reference has fewer samples than the image, the mean of z
 //! drifts above 0 (by 0.1 to 0.3 with one firefly a block) without any bias. Robust location estimates are no way out:
-//! the median of means, winsorised and trimmed means of skewed noise are themselves biased, and the reference is a plain
-//! mean. The robust test therefore keeps the means and repairs the variances: a block's relative variance is the larger
-//! of its own and the average over the 3x3 blocks around it, for image and reference apart, because what one block missed
-//! its neighbours have seen. That takes the drift below 0.1 and only ever makes |z| smaller (Gaussian noise: 0.2 % beyond
-//! 3 instead of 0.27 %); a bias over an area larger than its noise still shows.
+//! the median of means, winsorised and trimmed means of skewed noise are themselves biased, and the reference is a
+//! plain mean. The robust test therefore keeps the means and repairs the variances: a block's relative variance is the
+//! larger of its own and the average over the 3x3 blocks around it, for image and reference apart, because what one
+//! block missed its neighbours have seen. That takes the drift below 0.1 and only ever makes |z| smaller (Gaussian
+//! noise: 0.2 % beyond 3 instead of 0.27 %); a bias over an area larger than its noise still shows.
 
 use super::{CompareError, Estimate};
 use serde::Serialize;

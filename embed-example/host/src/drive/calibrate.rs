@@ -1,4 +1,5 @@
-//! What a look-up in the learned statistics and entering a sample into them take, measured on the statistics of a finished render.
+//! What a look-up in the learned statistics and entering a sample into them take, measured on the statistics of a
+//! finished render.
 
 use crate::blob::AlignedBytes;
 use croupier::Scene;

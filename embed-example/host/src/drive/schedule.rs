@@ -24,8 +24,8 @@ pub struct Work {
     pub seconds: f64,
 }
 
-/// Samples per pixel of the next iteration, 0 when the target is reached. `learns`: the cost of a sample may change from
-/// iteration to iteration, and that of the `last` one counts; else the mean cost does.
+/// Samples per pixel of the next iteration, 0 when the target is reached. `learns`: the cost of a sample may change
+/// from iteration to iteration, and that of the `last` one counts; else the mean cost does.
 ///
 /// The next iteration is meant to take no more than `all` before it together, and no more than what is left, but at
 /// least one sample. With a target in samples it depends on counts alone, never on the clock, so that the picture is a

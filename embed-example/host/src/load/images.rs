@@ -41,7 +41,8 @@ fn png(bytes: &[u8]) -> Result<Texture, String> {
 }
 
 /// Any JPEG of 8 bits a channel, up to 16384 pixels a side; grey, RGB, YCbCr or CMYK, sRGB is assumed. Files that end
-/// early are refused (strict mode), which would fill up with grey; if only their last bytes are missing that may go unnoticed.
+/// early are refused (strict mode), which would fill up with grey; if only their last bytes are missing that may go
+/// unnoticed.
 fn jpeg(bytes: &[u8]) -> Result<Texture, String> {
     let options = DecoderOptions::default().jpeg_set_out_colorspace(ColorSpace::RGBA).set_strict_mode(true);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
@@ -54,8 +55,8 @@ fn jpeg(bytes: &[u8]) -> Result<Texture, String> {
     Ok(Texture { name: String::new(), width: size[0].into(), height: size[1].into(), texels })
 }
 
-/// The RGB picture of an EXR as an unscaled, unrotated environment map, and how many negative or NaN numbers (filters leave
-/// them behind) became 0.
+/// The RGB picture of an EXR as an unscaled, unrotated environment map, and how many negative or NaN numbers (filters
+/// leave them behind) became 0.
 pub(super) fn exr(bytes: &[u8]) -> Result<(Environment, usize), String> {
     let picture = Picture::decode_exr(Cursor::new(bytes)).map_err(|e| format!("not a readable EXR: {e}"))?;
     let Rgb { width, height, pixels: mut texels } = picture.main().ok_or("no layer with channels R, G and B")?;
