@@ -139,7 +139,7 @@ impl Trial {
         }
     }
 
-    /// Did it happen? Else the row means nothing.
+    /// Did it happen? Else the row means nothing. What settings alone bring about cannot fail to.
     fn happened(self, c: &Counters) -> bool {
         match self {
             Self::None | Self::Cache | Self::Adaptive | Self::Reloaded => true,
@@ -204,7 +204,7 @@ const CBOX: &[Row] = &[
     plain("classic"),
     plain("classic:5:relative"),
     plain("winners"),
-    short("bolin-meyer", Trial::Budget, 4, USUAL),
+    plain("bolin-meyer"),
     plain("adrr"),
     plain("adrrs"),
     plain("ear"),
@@ -217,6 +217,7 @@ const CBOX: &[Row] = &[
     short("fixed:20", Trial::None, 3, &[2]),
     short("fixed:0.05", Trial::None, 2, &[64]),
     quick(short("fixed:3.3", Trial::Ring, 4, &[8])),
+    short("fixed:3.3", Trial::Budget, 4, &[8]),
     short("fixed:20", Trial::Ring, 3, &[2]),
     tried("adrrs", Trial::Ledger),
     tried("adrrs", Trial::Cache),
@@ -268,7 +269,7 @@ const MATERIAL_SPHERES: &[Row] = &[
     plain("classic"),
     plain("classic:5:relative"),
     calm(plain("winners")),
-    calm(short("bolin-meyer", Trial::Budget, 3, USUAL)),
+    calm(plain("bolin-meyer")),
     plain("adrr"),
     calm(plain("adrrs")),
     calm(plain("ear")),
@@ -279,6 +280,7 @@ const MATERIAL_SPHERES: &[Row] = &[
     calm(short("fixed:20", Trial::None, 2, &[4])),
     calm(short("fixed:0.05", Trial::None, 2, &[64])),
     calm(short("fixed:3.3", Trial::Ring, 3, &[8])),
+    calm(short("fixed:3.3", Trial::Budget, 3, &[8])),
     calm(short("fixed:20", Trial::Ring, 3, &[2])),
     calm(tried("adrrs", Trial::Ring)),
     calm(tried("adrrs", Trial::Small)),

@@ -122,8 +122,8 @@ impl LightSample8 {
 /// }
 /// ```
 pub trait LightSelector {
-    /// Index in [`Scene::lights`] and its probability from a 32-bit random number, for points with unit normals, world
-    /// space. No such light, or a probability of 0: no light is sampled.
+    /// Index in [`Records::lights`](crate::scene::Records::lights) and its probability from a 32-bit random number, for
+    /// points with unit normals, world space. No such light, or a probability of 0: no light is sampled.
     fn select(&self, point: Vec3x8, normal: Vec3x8, r: U32x8) -> (U32x8, F32x8);
 
     /// Probability that [`Self::select`] picks `light` in the lanes of `mask`, 0 in the others.
