@@ -22,7 +22,7 @@ pub struct Replay<'a, 's> {
     pub scene: Scene<'s>,
     /// Its tree.
     pub bvh: WideBvh<'s>,
-    /// Numbers the bins.
+    /// Numbers the bins; no tree has been split.
     pub cache: &'a Cache<'a>,
     /// Settings of the same names.
     pub seed: u64,
@@ -164,7 +164,6 @@ impl Replay<'_, '_> {
             MaterialKind::Dielectric => v.wo,
             _ => v.ns * (v.ns.dot(v.wo) * F32x8::splat(2.0)) - v.wo,
         };
-        let [a, b, c, _] = key.uniforms(3);
         let kind = match (depth, v.kind) {
             (1, MaterialKind::Diffuse) => Kind::FirstMatte,
             (1, _) => Kind::FirstShiny,
@@ -172,7 +171,7 @@ impl Replay<'_, '_> {
             _ => Kind::Shiny,
         };
         let kind = U32x8::splat(kind as u32);
-        let bin = self.cache.find_jittered(kind, v.p, dir, [a, b, c], one()).lane(0) as usize;
+        let bin = self.cache.find(kind, v.p, dir, one()).lane(0) as usize;
         let scale = rgb(albedo).map(|a| match a {
             _ if depth == 1 => 1.0,
             a if a < 1e-3 => 0.0,
