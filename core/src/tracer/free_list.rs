@@ -16,7 +16,7 @@ impl<'m> FreeList<'m> {
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, capacity: usize) -> Result<Self, MemoryError> {
-        let mut list = Self { slots: c.take(capacity)?, len: 0 };
+        let mut list = Self { slots: c.take_unset(capacity)?, len: 0 };
         list.reset();
         Ok(list)
     }

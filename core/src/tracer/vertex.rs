@@ -222,7 +222,7 @@ impl<'m> Pool<'m> {
         let free = FreeList::carve(c, capacity)?;
         let mut rings = core::array::from_fn(|_| Ring { slots: &mut [], head: 0, len: 0 });
         for r in &mut rings {
-            r.slots = c.take(capacity)?;
+            r.slots = c.take_unset(capacity)?;
         }
         Ok(Self { records, free, rings, pending: [0; CLASSES] })
     }
