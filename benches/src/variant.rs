@@ -10,7 +10,7 @@ pub const MODIFIERS: &[(&str, &str)] = &[
     ("constant", "the cached mean stands in for what roulette skips"),
     ("small", "one shard, and less than 256 KiB for all that is learned"),
     ("truth", "strategies that learn are told the true pixels instead of denoised ones"),
-    ("idle", "learned factors are all 1: what learning costs where paths are as with `fixed:1`"),
+    ("idle", "learned factors are all 1: what learning costs where paths are as with `classic:200`"),
 ];
 
 /// A strategy and choices, written `ears`, `ears+adaptive`, `ears+small+truth`.

@@ -61,7 +61,7 @@ const ALL: [&str; 26] = [
     "ears+constant",
     "ears+small",
     "ears+truth",
-    "fixed:1",
+    "classic:200",
     "ears+idle",
 ];
 const BASELINES: [&str; 2] = ["classic", "adrrs"];

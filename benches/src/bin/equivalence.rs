@@ -139,7 +139,7 @@ impl Trial {
         }
     }
 
-    /// Did it happen? Else the row means nothing. What settings alone bring about cannot fail to.
+    /// Did it happen? Else the row means nothing. Settings alone need no check.
     fn happened(self, c: &Counters) -> bool {
         match self {
             Self::None | Self::Cache | Self::Adaptive | Self::Reloaded => true,
@@ -330,15 +330,15 @@ impl Place {
         let small = Learning { cache_bytes: 1 << 20, split_count: 2000.0, ..s.learning };
         let mut s = Settings { seed, max_depth: depth, learning: small, ..s };
         row.trial.set(&mut s);
-        let mut saved = None;
+        let mut saved = Vec::new();
         if row.trial == Trial::Reloaded {
-            let mut save = |_, l: &mut dyn Learned| saved = l.saved();
+            let mut save = |_, l: &mut dyn Learned| saved = l.saved().expect("a strategy with a cache");
             learning(&self.blob, &Settings { seed: seed + STREAMS[3], ..s }, &[2, 2, 4, 1], IN_ORDER, &mut save);
         }
         let mut rng = SplitMix(seed);
-        learning(&self.blob, &s, row.iterations, IN_ORDER, &mut |i, l: &mut dyn Learned| match (row.trial, &saved) {
-            (Trial::Reloaded, Some(bytes)) if i % 2 == 0 => l.load(bytes).expect("statistics of this scene"),
-            (Trial::Poisoned, _) if i > 0 => poison(l, &mut rng),
+        learning(&self.blob, &s, row.iterations, IN_ORDER, &mut |i, l: &mut dyn Learned| match row.trial {
+            Trial::Reloaded if i % 2 == 0 => l.load(&saved).expect("statistics of this scene"),
+            Trial::Poisoned if i > 0 => poison(l, &mut rng),
             _ => {}
         })
     }
