@@ -84,8 +84,8 @@ impl<'m> Carver<'m> {
         Ok(records)
     }
 
-    /// The next `n` records with whatever the caller's memory holds: for slabs that are written before they are read
-    /// and seldom used to their end. The system need not provide the pages beyond. `Debug` shows what is there.
+    /// The next `n` records with whatever the caller's memory holds: for slabs that are written before they are read.
+    /// The system need not provide pages that are never used. `Debug` shows what is there.
     pub(crate) fn take_unset<T: Pod>(&mut self, n: usize) -> Result<&'m mut [T], MemoryError> {
         let used = n * size_of::<T>();
         let padded = (used + BLOCK_ALIGN - 1) & !(BLOCK_ALIGN - 1);

@@ -150,8 +150,8 @@ fn the_worst_pixels_are_left_out() {
     assert!(image.error.low < image.error.rel_mse && image.error.rel_mse < image.error.high);
 }
 
-/// One sample cannot know its error and does not claim to: its own square stands in. Killed by: a division by n - 1 =
-/// 0.
+/// One sample cannot know its error and does not claim to: its own square stands in. Killed by: a division by
+/// `n - 1 = 0`.
 #[test]
 fn one_sample_claims_nothing() {
     let scene = grey_wall([4, 4]);

@@ -233,8 +233,7 @@ impl Frozen {
     }
 }
 
-/// What look-ups read of one leaf, whose surroundings have the sums `prior`. One without samples says so with `count`
-/// 0.
+/// What look-ups read of one leaf, whose surroundings have the sums `prior`. Without samples all `count` are 0.
 pub(super) fn freeze_leaf(
     sums: &[BinSums],
     frozen: &mut [Frozen],

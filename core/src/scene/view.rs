@@ -6,8 +6,8 @@ use super::sections::Sections;
 use super::{Effects, validate};
 use core::ops::Deref;
 
-/// A validated scene: its [`Records`], to be read and not to be changed. [`Scene::from_bytes`] makes it, and nothing
-/// re-checks after that:
+/// A validated scene: its [`Records`], to be read and not to be changed. [`Scene::from_bytes`] makes one if all of this
+/// holds, and nothing re-checks it:
 ///
 /// * every index that a record holds is in range of its section or [`NONE`], and every section has fewer than 2^31
 ///   records,
@@ -67,12 +67,6 @@ impl<'s> Deref for Scene<'s> {
 }
 
 impl<'s> Scene<'s> {
-    /// Takes records as they are: for tests and tools that need a part of a scene only. If they break a promise of
-    /// [`Scene`], pictures may be wrong and a walk of the tree may never end; memory stays safe.
-    pub fn assume_valid(records: Records<'s>) -> Self {
-        Self(records)
-    }
-
     /// Validates a blob in one pass without allocating; survives any bytes. Bytes beyond the blob's own length are
     /// ignored. The bytes must start at a multiple of 4 (of 64 for full speed).
     ///
@@ -110,6 +104,13 @@ impl<'s> Scene<'s> {
         };
         records.effects = validate::scene(&records)?;
         Ok(Self(records))
+    }
+
+    /// Takes records as they are, for tests that need a part of a scene. If they break a promise of [`Scene`], pictures
+    /// may be wrong, it may panic, and a walk of the tree may never end; memory stays safe.
+    #[doc(hidden)]
+    pub fn assume_valid(records: Records<'s>) -> Self {
+        Self(records)
     }
 
     /// Name of a material, empty if it has none.

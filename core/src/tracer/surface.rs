@@ -203,6 +203,7 @@ fn albedo<P: Profile>(scene: &Scene<'_>, vertex: &Vertex8, kinds: &[u32; 8], act
 struct Shading8 {
     material: U32x8,
     kind: [u32; 8],
+    /// Lanes whose material lets light through.
     transmissive: Mask8,
     reflectance: Vec3x8,
     /// Shading normal, turned towards `wo` on two-sided materials.

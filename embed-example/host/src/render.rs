@@ -121,7 +121,7 @@ pub struct Progress {
     pub relmse_estimate: Option<f64>,
 }
 
-/// Watches a render, and may end it. Called from the thread that called [`render`] and from its workers.
+/// Watches a render, and may end it. Called from the thread that called [`render_scene`] and from its workers.
 pub trait Observer: Sync {
     /// Called by each worker after each step: when a shard has traced some 65 000 rays or has finished its part of the
     /// iteration. Workers do not wait for each other, so that several may call at a time; each waits for its own call.
@@ -136,7 +136,7 @@ pub trait Observer: Sync {
     fn iteration(&self, _film: &Film<'_>, _seconds: f64) {}
     /// Seconds of rendering so far, for [`Target::Seconds`]; `None` is time on the wall without that in
     /// [`Self::iteration`]. On a machine with other work a host may count CPU time instead. Asked between iterations,
-    /// by the thread that called [`render`].
+    /// by the thread that called [`render_scene`].
     fn seconds(&self) -> Option<f64> {
         None
     }
