@@ -3,11 +3,11 @@
 //! *Slabs.* A ray meets the plane `x = b` at `(b - o) / d`, computed as `(o' - b) * -(1/d)` where `o'` is the origin
 //! moved by `e = 2^-21 (|o| + S)` so that the box looks larger: against the direction for the far planes, along it for
 //! the near ones; S is the largest |coordinate| of the tree. Three roundings (difference, reciprocal, product) are each
-//! at most `u |b - o| / |d|` with `u = 2^-24`, the rounding of `o'` at most `u (|o| + e)`: together below `4u (|o| + S)
-//! / |d|`, half of `e / |d|`. The other half covers the rounding of the triangle test, which moves a triangle's outline
-//! sideways by a few `u` of its distance. So a box that holds a triangle is never missed by a ray that hits the
-//! triangle (NUMERICS BOX-1 to BOX-4). Components below `1e-18` of the largest act as if they were that large: with `e
-//! > 0` a ray inside a face stays inside.
+//! at most `u |b - o| / |d|` with `u = 2^-24`, the rounding of `o'` at most `u (|o| + e)`: together below
+//! `4u (|o| + S) / |d|`, half of `e / |d|`. The other half covers the rounding of the triangle test, which moves a
+//! triangle's outline sideways by a few `u` of its distance. So a box that holds a triangle is never missed by a ray
+//! that hits the triangle (NUMERICS BOX-1 to BOX-4). Components below `1e-18` of the largest act as if they were that
+//! large: with `e > 0` a ray inside a face stays inside.
 //!
 //! *Monotone.* Each step is a monotone function of the plane, rounding included. So a child is never entered earlier
 //! than its parent, and the interval test of a packet never rejects what one of its rays accepts: which leaves a ray

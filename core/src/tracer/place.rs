@@ -86,8 +86,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// No bit of a key moves two axes, and each axis has its whole range. Killed by: one axis used twice, a shift by
-    /// less.
+    /// No bit of a key moves two axes, each axis has its whole range. Killed by: an axis used twice, a shift by less.
     #[test]
     fn axes_share_no_bits() {
         let bits = |lo: u32, hi: u32| jitter(Key8 { lo: U32x8::splat(lo), hi: U32x8::splat(hi) }).map(|x| x.lane(5));
