@@ -92,6 +92,7 @@ pub fn iterate(cache: &mut Cache<'_>, shards: &mut [Training<'_>], n: usize, spl
             assert!(t.log(bin, x, (rng.bits() >> 61) as f32));
             assert!(t.log_pair(bin, x));
             assert!(t.log_shadow(bin, x[0] < 0.02));
+            t.log_light(bin, x[1] * x[1]);
         }
     }
     cache.begin_merge(1.0);
@@ -124,8 +125,12 @@ enum Node {
     Leaf(usize),
 }
 
-/// Of a bin: count, pairs, cost, sum (3), squared sum (3), pair sum (3), shadow rays, those that met nothing.
-pub type Sums = [f64; 14];
+/// Numbers of a bin.
+pub const FIELDS: usize = 15;
+
+/// Of a bin: count, pairs, cost, sum (3), squared sum (3), pair sum (3), shadow rays, those that met nothing, squares of
+/// light samples.
+pub type Sums = [f64; FIELDS];
 
 /// What saved bytes mean, in f64.
 pub struct Oracle {
@@ -166,7 +171,7 @@ impl Oracle {
             Node::Inner((0..8).map(|_| self.read(shape, sums)).collect())
         } else {
             let mut number = || f64::from_le_bytes(sums.next().unwrap().try_into().unwrap());
-            self.leaves.push([(); 16].map(|()| [(); 14].map(|()| number())));
+            self.leaves.push([(); 16].map(|()| [(); FIELDS].map(|()| number())));
             Node::Leaf(self.leaves.len() - 1)
         };
         self.nodes.push(node);
@@ -221,7 +226,7 @@ pub fn height_and_azimuth(d: [f64; 3]) -> [f64; 2] {
 /// Puts other sums into saved bytes: `sums` gives those of a bin.
 pub fn overwrite(bytes: &mut [u8], mut sums: impl FnMut() -> Sums) {
     let at = sums_at(bytes);
-    for bin in bytes[at..].chunks_exact_mut(112) {
+    for bin in bytes[at..].chunks_exact_mut(8 * FIELDS) {
         for (b, x) in bin.chunks_exact_mut(8).zip(sums()) {
             b.copy_from_slice(&x.to_le_bytes());
         }
@@ -240,10 +245,12 @@ pub fn random_sums(rng: &mut SplitMix) -> Sums {
     let pair = [(); 3].map(|()| log(1e-4, 100.0) * pairs);
     let rays = log(1.0, 1e4);
     let visible = rays * log(1e-6, 2.0);
+    let light = count * log(1e-8, 1e2);
     if log(1.0, 10.0) < 1.3 {
-        return [0.0; 14];
+        return [0.0; FIELDS];
     }
     let of = |c: usize| mean[c] * count;
     let sqr = |c: usize| mean[c] * mean[c] * (1.0 + spread[c]) * count;
-    [count, pairs, cost, of(0), of(1), of(2), sqr(0), sqr(1), sqr(2), pair[0], pair[1], pair[2], rays, visible]
+    let (s, p) = ([sqr(0), sqr(1), sqr(2)], pair);
+    [count, pairs, cost, of(0), of(1), of(2), s[0], s[1], s[2], p[0], p[1], p[2], rays, visible, light]
 }

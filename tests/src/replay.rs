@@ -180,9 +180,10 @@ impl Replay<'_, '_> {
         let n = f64::from(self.factor);
         let (mut mean, mut square, mut rays) = ([0.0; 3], [0.0; 3], 0.0);
         for k in 0..self.factor {
-            let (x, cost) = self.sample(v, key.child(U32x8::splat(k)), depth, delta);
+            let (x, light, cost) = self.sample(v, key.child(U32x8::splat(k)), depth, delta);
             let logged = [0, 1, 2].map(|c| x[c] * scale[c]);
             for c in 0..3 {
+                self.sums[bin][14] += (light[c] * scale[c]).powi(2);
                 mean[c] += x[c] / n;
                 square[c] += logged[c] * logged[c];
                 self.sums[bin][3 + c] += logged[c];
@@ -200,8 +201,8 @@ impl Replay<'_, '_> {
         (mean, rays)
     }
 
-    /// One light sample and one bounce.
-    fn sample(&mut self, v: &Place, key: Key8, depth: u32, delta: bool) -> ([f64; 3], f64) {
+    /// One light sample and one bounce: what they give, the light sample's part of it, what they cost.
+    fn sample(&mut self, v: &Place, key: Key8, depth: u32, delta: bool) -> ([f64; 3], [f64; 3], f64) {
         let scene = self.scene;
         let [a, b, c, _] = key.uniforms(0);
         let light = if delta {
@@ -220,6 +221,7 @@ impl Replay<'_, '_> {
                 x = rgb(direct);
             }
         }
+        let lit = x;
         if s.valid.lane(0) && s.weight.any_positive().lane(0) {
             let (radiance, rays) = self.fly(&Flight {
                 ray: Ray8 { o: offset(v.p, v.ng, v.error, s.wi), d: s.wi, tmin: F32x8::ZERO, tmax: F32x8::INFINITY },
@@ -234,6 +236,6 @@ impl Replay<'_, '_> {
             (0..3).for_each(|c| x[c] += weight[c] * radiance[c]);
             cost += rays;
         }
-        (x, cost)
+        (x, lit, cost)
     }
 }

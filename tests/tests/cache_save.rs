@@ -140,7 +140,8 @@ fn damage_is_named() {
     assert!(matches!(try_load(&|b| b[64..sums].fill(1), true), CacheError::Node { index: 16, found: 1, depth: 16 }));
     assert!(matches!(try_load(&|b| b[64..sums].fill(0), true), CacheError::Shape { found: [4, 4], .. }));
     for x in [-1.0, f64::NAN, f64::INFINITY, 1e101, -1e-300] {
-        let edit = |b: &mut Vec<u8>| b[sums + 8 * (16 * 14 + 14 + 2)..][..8].copy_from_slice(&f64::to_le_bytes(x));
+        let edit =
+            |b: &mut Vec<u8>| b[sums + 8 * (16 * FIELDS + FIELDS + 2)..][..8].copy_from_slice(&f64::to_le_bytes(x));
         let e = try_load(&edit, true);
         assert!(matches!(e, CacheError::Sum { leaf: 1, bin: 1, field: 2, found } if found.to_bits() == x.to_bits()));
         assert!(format!("{e}").starts_with("leaf 1 bin 1 field 2 of the saved cache is "), "{e}");

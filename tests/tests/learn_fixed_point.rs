@@ -89,6 +89,7 @@ impl Example {
                     moment: rgb(&|k, c| self.variance[k][c] + self.mean[k][c].powi(2)),
                     variance: rgb(&|k, c| self.variance[k][c]),
                     cost: F32x8::from_fn(|k| self.cost[k] as f32),
+                    light_share: F32x8::ONE,
                     count: F32x8::splat(1e6),
                 },
             });

@@ -5,7 +5,7 @@ use croupier::Settings;
 use croupier::film::PixelStats;
 use croupier::learn::{Learning, PictureStatistics};
 use croupier_host::description::*;
-use croupier_tests::cache::Oracle;
+use croupier_tests::cache::{FIELDS, Oracle};
 use croupier_tests::runner::{Learned, Schedule, learning, settings};
 use croupier_tests::scenes::*;
 
@@ -83,12 +83,12 @@ fn moments_leave_fireflies_out() {
     let s = settings(&scene, "ears");
     let s =
         Settings { max_depth: 2, seed: 3, learning: Learning { carry: 1.0, split_count: f32::MAX, ..s.learning }, ..s };
-    let mut sums = [0.0; 14];
+    let mut sums = [0.0; FIELDS];
     let image =
         learning(&scene, &s, &[[1].as_slice(), &[4; 40], &[0]].concat(), IN_ORDER, &mut |_, l: &mut dyn Learned| {
             let oracle = Oracle::new(&l.saved().unwrap());
             let leaf = oracle.cell(FIRST_MATTE, [0.0; 3]).leaf;
-            sums = [0.0; 14];
+            sums = [0.0; FIELDS];
             oracle.leaves[leaf].iter().flat_map(|bin| bin.iter().enumerate()).for_each(|(i, x)| sums[i] += x);
         });
     let sun = (80.0 / std::f64::consts::PI).powi(2);

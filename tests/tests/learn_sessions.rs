@@ -7,7 +7,7 @@ use croupier::learn::{Constant, Estimate, Learning, Objective};
 use croupier::rrs::Norm;
 use croupier::{Counters, Plan, Settings, SettingsError, Strategy};
 use croupier_host::description::*;
-use croupier_tests::cache::{Oracle, Sums, overwrite};
+use croupier_tests::cache::{FIELDS, Oracle, Sums, overwrite};
 use croupier_tests::runner::{Learned, Schedule, learning, render, scheduled, settings};
 use croupier_tests::scenes::*;
 use croupier_tests::stats::equivalent;
@@ -171,7 +171,7 @@ fn lamps_behind_walls_get_few_shadow_rays() {
         let ratio = image.mean() / full.mean();
         assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
         let of = |f: fn(&Counters) -> u64| (f(&seen[3]) - f(&seen[1])) as f64;
-        of(|c| c.shadow_rays) / of(|c| c.shadow_rays + c.shadow_kills)
+        of(|c| c.shadow_rays) / of(|c| c.shadow_rays + c.shadow_kills + c.light_kills)
     });
     println!("{hidden} of the shadow rays behind the wall, {open} in front of the box");
     assert!(hidden < 0.3 && open > 0.8, "{hidden} {open}");
@@ -276,7 +276,8 @@ fn extreme_statistics_do_no_harm() {
     let only = |fields: &[usize], x: f64| std::array::from_fn(|k| if fields.contains(&k) { x } else { 0.0 });
     let [hidden, mut bright]: [Sums; 2] = [only(&[0, 3, 6, 12], 1e100), only(&[0, 3, 6, 13], 1e100)];
     bright[12] = 1e-300;
-    for sums in [[1e100; 14], [0.0; 14], [1e-300; 14], only(&[0, 3, 6], 1e100), hidden, bright] {
+    let lit = only(&[0, 3, 6, 14], 1e100);
+    for sums in [[1e100; FIELDS], [0.0; FIELDS], [1e-300; FIELDS], only(&[0, 3, 6], 1e100), hidden, bright, lit] {
         for constant in [Constant::Off, Constant::Cached] {
             let s = Settings { constant, shadow_roulette: true, ..learns(&scene, "ears:plain", 4) };
             let image = learning(&scene, &s, &[1, 1, 1], IN_ORDER, &mut |_, l: &mut dyn Learned| {

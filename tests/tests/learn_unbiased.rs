@@ -171,7 +171,7 @@ fn mirrors_and_glass_play_learned_roulette() {
             s.emitters.push(Emitter::Point { position: [0.0, y, 0.0], intensity: [intensity; 3] });
         }
         let scene = blob(&s);
-        let none = Known::of(&render(&scene, &Settings { seed: 15, ..learns(&scene, "none", 3) }, 14_000));
+        let none = Known::of(&render(&scene, &Settings { seed: 15, ..learns(&scene, "none", 3) }, 60_000));
         for strategy in ["adrrs", "ears"] {
             let s = Settings { seed: 17, aovs: true, ..learns(&scene, strategy, 3) };
             let image = scheduled(&scene, &s, &doubling(7000), IN_ORDER);
@@ -298,9 +298,9 @@ fn weights_of_iterations_do_not_follow_their_light() {
 #[test]
 fn random_statistics_do_not_bias() {
     let scene = blob(&cornell([16, 16]));
-    let none = Known::of(&render(&scene, &Settings { seed: 8, ..learns(&scene, "none", 3) }, 14_000));
+    let none = Known::of(&render(&scene, &Settings { seed: 8, ..learns(&scene, "none", 3) }, 60_000));
     for (strategy, constant, renders) in [
-        ("ears:plain", Constant::Off, 700),
+        ("ears:plain", Constant::Off, 900),
         ("ears", Constant::Cached, 1000),
         ("ear:plain", Constant::Off, 1500),
         ("adrrs", Constant::Cached, 1700),
@@ -328,13 +328,13 @@ fn random_statistics_do_not_bias() {
     }
 }
 
-/// As above, of visibilities alone: the other factors stay 1. Killed by: a shadow ray that is divided by another chance
-/// than it had, or that visibility cuts off.
+/// As above, of light samples alone, by their visibilities and shares: the other factors stay 1. Killed by: a light
+/// sample or its ray that is divided by another chance than it had, or by none, a chance of 0.
 #[test]
-fn random_visibilities_do_not_bias() {
+fn random_roulette_of_light_samples_does_not_bias() {
     let scene = blob(&cornell([16, 16]));
-    let none = Known::of(&render(&scene, &Settings { seed: 8, ..learns(&scene, "none", 3) }, 14_000));
-    let (mut rays, mut kills) = (0, 0);
+    let none = Known::of(&render(&scene, &Settings { seed: 8, ..learns(&scene, "none", 3) }, 60_000));
+    let (mut samples, mut light_kills, mut rays, mut kills) = (0, 0, 0, 0);
     let one = |seed: u64| {
         let mut s = Settings { seed, shadow_roulette: true, ..learns(&scene, "ears", 3) };
         (s.learning.cache_bytes, s.learning.factors) = (32 << 10, [1.0, 1.0]);
@@ -346,12 +346,14 @@ fn random_visibilities_do_not_bias() {
         });
         rays += image.counters.shadow_rays;
         kills += image.counters.shadow_kills;
+        samples += image.counters.vertex_samples;
+        light_kills += image.counters.light_kills;
         image.mean()
     };
-    let known = Known::over((0..7000).map(one));
-    println!("{rays} shadow rays, {kills} spared");
-    assert!(kills > rays / 4);
-    assert_equivalent("random visibilities", known, none);
+    let known = Known::over((9000..18_000).map(one));
+    println!("{light_kills} of {samples} light samples spared, {rays} shadow rays, {kills} spared");
+    assert!(kills > rays / 4 && light_kills > samples / 10);
+    assert_equivalent("random roulette of light samples", known, none);
 }
 
 /// A random estimate of the pixels from the host. Killed by: an estimate that finds its way into the film.

@@ -129,6 +129,12 @@ pub trait Visitor<'s> {
 
 macro_rules! models {
     ($($kind:ident => $model:ty),* $(,)?) => {
+        /// Bits of the kinds that have nothing but delta lobes ([`Bsdf::DELTA`]).
+        #[expect(clippy::extra_unused_lifetimes, reason = "a model names it")]
+        pub(crate) const fn delta_kinds<'s>() -> u32 {
+            0 $(| (<$model as Bsdf<'s>>::DELTA as u32) << MaterialKind::$kind as u32)*
+        }
+
         /// Calls `v` with the model of `kind`: the one table of the models.
         #[inline(always)]
         pub fn dispatch<'s, V: Visitor<'s>>(kind: MaterialKind, v: V) -> V::Out {

@@ -8,7 +8,7 @@ use croupier_simd::{F32x8, U32x8, Vec3x8};
 pub(super) const BINS: usize = 16;
 
 /// Samples (and pairs) that one bin takes from one shard in one iteration: below it no f32 sum stalls.
-pub const BIN_LIMIT: u32 = 1 << 16;
+pub const BIN_LIMIT: u16 = u16::MAX;
 
 /// Values and costs above 2^55 count as 2^55: [`BIN_LIMIT`] of their squares are still finite.
 pub const MAX_VALUE: f32 = 36_028_797_018_963_968.0;
@@ -22,18 +22,20 @@ const SPREAD_PAIRS: f64 = 16.0;
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Record {
-    count: u32,
-    pairs: u32,
+    count: u16,
+    pairs: u16,
     cost: f32,
     sum: [f32; 3],
     sqr: [f32; 3],
     pair: [f32; 3],
+    /// Squares of the light samples, all channels.
+    light: f32,
 }
 
 impl Record {
     /// Adds a finite sample; `false` if the bin is full.
     pub(super) fn add(&mut self, x: [f32; 3], cost: f32) -> bool {
-        if self.count >= BIN_LIMIT {
+        if self.count == BIN_LIMIT {
             return false;
         }
         self.count += 1;
@@ -46,9 +48,16 @@ impl Record {
         true
     }
 
+    /// Adds the square of a light sample.
+    pub(super) fn add_light(&mut self, square: f32) {
+        if self.count != BIN_LIMIT {
+            self.light += square.clamp(0.0, MAX_SQUARE);
+        }
+    }
+
     /// Adds a finite half squared difference; `false` if the bin is full.
     pub(super) fn add_pair(&mut self, half_squared_difference: [f32; 3]) -> bool {
-        if self.pairs >= BIN_LIMIT {
+        if self.pairs == BIN_LIMIT {
             return false;
         }
         self.pairs += 1;
@@ -93,6 +102,8 @@ pub(super) struct BinSums {
     rays: f64,
     /// Those that met nothing.
     visible: f64,
+    /// Squares of light samples, all channels, as if each sample had drawn one.
+    light: f64,
 }
 
 /// Numbers of a [`BinSums`].
@@ -108,6 +119,7 @@ impl BinSums {
         pair: [0.0; 3],
         rays: 0.0,
         visible: 0.0,
+        light: 0.0,
     };
 
     pub(super) fn fields(&self) -> &[f64; FIELDS] {
@@ -169,6 +181,7 @@ impl BinSums {
         self.count += f64::from(r.count);
         self.pairs += f64::from(r.pairs);
         self.cost += f64::from(r.cost);
+        self.light += f64::from(r.light);
         for (a, b) in [(&mut self.sum, r.sum), (&mut self.sqr, r.sqr), (&mut self.pair, r.pair)] {
             a.iter_mut().zip(b).for_each(|(a, b)| *a += f64::from(b));
         }
@@ -184,8 +197,8 @@ pub(super) struct Frozen {
     cost: f32,
     /// Mean, moment, variance, rgb each: two [`short`]s a word, the first below.
     colors: [u32; 5],
-    /// Makes rows of eight words.
-    reserved: u32,
+    /// See [`Local8::light_share`].
+    light_share: f32,
 }
 
 /// `x`, between 0 and `max`; a NaN is 0.
@@ -209,7 +222,7 @@ fn long(x: u32) -> f32 {
 }
 
 impl Frozen {
-    pub(super) const ZERO: Self = Self { count: 0.0, cost: 0.0, colors: [0; 5], reserved: 0 };
+    pub(super) const ZERO: Self = Self { count: 0.0, cost: 0.0, colors: [0; 5], light_share: 0.0 };
 
     /// What is known of one sample with the sums `s`.
     fn of(s: &BinSums) -> Self {
@@ -228,6 +241,8 @@ impl Frozen {
             *variance = short(saturate(v, MAX_SQUARE)).min(*moment);
         }
         let ([a, b, c], [d, e, g], [h, i, j]) = (mean, moment, variance);
+        let squares: f64 = s.sqr.iter().sum();
+        f.light_share = if squares > 0.0 { saturate(s.light / squares, 1.0) } else { 1.0 };
         f.colors = [a | b << 16, c | d << 16, e | g << 16, h | i << 16, j];
         f
     }
@@ -267,6 +282,8 @@ pub struct Local8 {
     pub variance: Vec3x8,
     /// Mean counted cost of a sample ([`crate::learn::COST_BOUNCE`] and its like).
     pub cost: F32x8,
+    /// Mean square of their light samples over `moment`, over all channels, at most 1.
+    pub light_share: F32x8,
     /// Confidence: samples of the bin itself, older ones discounted. Its surroundings, which the other numbers lean on,
     /// do not count.
     pub count: F32x8,
@@ -278,7 +295,7 @@ impl Local8 {
         let row = |f: &Frozen| F32x8::new(*bytemuck::cast_ref::<_, [f32; 8]>(f));
         let [f0, f1, f2, f3, f4, f5, f6, f7] = rows;
         let rows = [row(f0), row(f1), row(f2), row(f3), row(f4), row(f5), row(f6), row(f7)];
-        let [count, cost, a, b, c, d, e, _] = F32x8::transpose(rows);
+        let [count, cost, a, b, c, d, e, light_share] = F32x8::transpose(rows);
         let below = |w: F32x8| F32x8::from_bits(w.to_bits() << 16);
         let above = |w: F32x8| F32x8::from_bits(w.to_bits() & U32x8::splat(0xffff_0000));
         Self {
@@ -286,6 +303,7 @@ impl Local8 {
             moment: Vec3x8::new(above(b), below(c), above(c)),
             variance: Vec3x8::new(below(d), above(d), below(e)),
             cost,
+            light_share,
             count,
         }
     }

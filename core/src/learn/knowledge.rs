@@ -169,6 +169,7 @@ impl<'m> Knowledge<'m> {
         learned.moment = l.moment * square;
         learned.variance = l.variance * square;
         learned.cost = l.cost.max(F32x8::splat(COST_BOUNCE));
+        learned.light_share = l.light_share;
         learned.count = l.count;
     }
 

@@ -26,7 +26,7 @@ use core::fmt;
 /// First bytes of a saved cache.
 const MAGIC: u64 = u64::from_le_bytes(*b"CRPCACHE");
 /// Version of the format.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// Largest sum: adding up such files, or squaring their means, stays finite.
 const MAX_SUM: f64 = 1e100;
 

@@ -61,6 +61,15 @@ impl<'m> Training<'m> {
         finite && self.used_mut().get_mut(bin as usize).is_some_and(|r| r.add_pair(half_squared_difference))
     }
 
+    /// Adds what the light sample of a sample of `bin` gave: the sum over the channels of its square. Of samples that
+    /// draw none by chance the others must make up for it.
+    #[inline]
+    pub fn log_light(&mut self, bin: u32, square: f32) {
+        if let Some(r) = self.used_mut().get_mut(bin as usize).filter(|_| square.is_finite()) {
+            r.add_light(square);
+        }
+    }
+
     /// Adds a shadow ray from a vertex in the leaf of `bin` towards its directions
     /// ([`super::cache::Cache::bins_towards`]), and whether it met nothing. `false` if it was not taken: the bin does
     /// not exist or has 65,535 of this iteration, the first ones; [`crate::Counters::shadows_refused`] counts them.

@@ -17,7 +17,7 @@ use croupier_simd::{F32x8, I32x8, Vec3x8};
 /// Samples at which the mean counts half.
 const TRUST_MEAN: f32 = 32.0;
 /// Samples at which the second moment counts half.
-const TRUST_MOMENT: f32 = 256.0;
+pub(super) const TRUST_MOMENT: f32 = 256.0;
 /// Bits of 1.
 const ONE: i32 = 0x3F80_0000;
 /// Throughput (times albedo) that roulette may lead to.
@@ -65,6 +65,12 @@ fn from_level(level: F32x8) -> F32x8 {
     F32x8::from_bits((level.to_i32() + I32x8::splat(ONE)).to_u32())
 }
 
+/// The least factor of roulette that keeps the throughput within its limit, at most 1.
+#[inline(always)]
+pub(super) fn least_throughput(beta: Vec3x8, albedo: Vec3x8) -> F32x8 {
+    ((beta * albedo).max_component() / MOST_THROUGHPUT).min(F32x8::ONE)
+}
+
 /// `s` where much is known, simpler rules where less is.
 #[inline(always)]
 pub(super) fn grown(v: &Vertices8, s: F32x8, plain: bool) -> F32x8 {
@@ -81,7 +87,7 @@ pub(super) fn grown(v: &Vertices8, s: F32x8, plain: bool) -> F32x8 {
     let s = known.select(from_level(blend(level(classic), learned, l.trust(TRUST_MEAN))), classic);
     // what is killed out of ignorance comes back as a few samples of enormous weight: no factor below 1 brings the
     // throughput over the limit
-    let s = s.max(((v.beta * v.albedo).max_component() / MOST_THROUGHPUT).min(F32x8::ONE));
+    let s = s.max(least_throughput(v.beta, v.albedo));
     // levels hide what is not finite, `Strategy::factor` looks for it
     broken.select(F32x8::splat(f32::NAN), s)
 }

@@ -62,6 +62,8 @@ pub struct Learned8 {
     pub variance: Vec3x8,
     /// Mean cost of one sample (eq. 38).
     pub cost: F32x8,
+    /// Mean square of the sample's light sample over `moment`, at most 1.
+    pub light_share: F32x8,
     /// Samples behind these; 0 means that nothing is known.
     pub count: F32x8,
 }
@@ -76,6 +78,7 @@ impl Learned8 {
         moment: Vec3x8::ZERO,
         variance: Vec3x8::ZERO,
         cost: F32x8::ONE,
+        light_share: F32x8::ONE,
         count: F32x8::ZERO,
     };
 

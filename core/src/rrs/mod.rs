@@ -17,6 +17,7 @@ mod ear;
 mod ears;
 mod fixed;
 mod learned;
+mod light;
 mod none;
 mod threshold;
 mod throughput;

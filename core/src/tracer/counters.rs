@@ -52,6 +52,8 @@ pub struct Counters {
     pub budget_capped: u64,
     /// Shadow rays that roulette spared.
     pub shadow_kills: u64,
+    /// Light samples that roulette spared.
+    pub light_kills: u64,
     /// Sum of the segments of all paths, shared ones counted for each.
     pub path_segments: u64,
     /// Samples that were offered to the statistics, the refused ones included.
@@ -120,6 +122,7 @@ impl Counters {
         self.ring_capped += o.ring_capped;
         self.budget_capped += o.budget_capped;
         self.shadow_kills += o.shadow_kills;
+        self.light_kills += o.light_kills;
         self.path_segments += o.path_segments;
         self.samples_logged += o.samples_logged;
         self.samples_refused += o.samples_refused;

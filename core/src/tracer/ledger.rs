@@ -131,6 +131,11 @@ impl<'m> Ledger<'m> {
         }
     }
 
+    /// What the samples of the vertex that a sample led to are logged times.
+    pub(crate) fn scale(&self, slot: u32) -> [f32; 3] {
+        self.records.get(slot as usize).map_or([0.0; 3], |r| r.scale)
+    }
+
     /// Part of a sample's estimate is lost to the ledger.
     pub(crate) fn spoil(&mut self, slot: u32) {
         if let Some(r) = self.get(slot) {

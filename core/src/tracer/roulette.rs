@@ -5,8 +5,9 @@ use super::ledger::{NO_BIN, NO_RECORD};
 use super::place::{Place8, place};
 use super::settle::Found8;
 use super::shard::Shard;
-use super::vertex::{RESERVE, Vertex8};
+use super::vertex::{RESERVE, Vertex8, samples};
 use crate::accel::Intersector;
+use crate::bsdf;
 use crate::light::LightSelector;
 use crate::profile::Profile;
 use crate::rrs::{self, Learned8, Vertices8};
@@ -94,9 +95,14 @@ impl Shard<'_> {
             self.record_places(a.active, v, p, a.weight / s);
         }
         let (root, ledger, depth) = (v.root.to_array(), v.ledger.to_array(), v.depth.to_array());
-        a.vertex.beta = v.beta / s;
+        let beta = v.beta / s;
+        let plays = settings.shadow_roulette && logged.is_some();
+        let drawn = if plays { learned.drawn(beta, a.albedo) } else { F32x8::ONE };
+        let lit = self.lit(n, drawn, &a);
+        a.vertex.beta = beta;
+        a.vertex.drawn = drawn;
         a.vertex.albedo_product *= a.albedo.mean();
-        a.vertex.count = U32x8::new(n);
+        a.vertex.samples = U32x8::from_fn(|i| samples(n[i], lit[i]));
         a.vertex.bin = logged.map_or(U32x8::splat(NO_BIN), |p| p.bin);
         let records = a.vertex.records();
         for i in a.active.lanes() {
@@ -107,11 +113,25 @@ impl Shard<'_> {
             };
             let extra = n[i] - 1;
             self.counters.splits += u64::from(extra);
+            self.counters.light_kills += u64::from(n[i] - lit[i]);
             let r = self.roots.get(root[i]);
             r.splits = r.splits.saturating_add(extra);
             // the lane's share of `open` passes to the waiting vertex
             self.pool.push(class as usize, records[i]);
         }
+    }
+
+    /// How many of the `n` samples of each vertex draw a light sample, if each does with the chance `drawn`: one more
+    /// comb. Vertices that nothing draws one for keep theirs, so that they all wait in one ring.
+    fn lit(&mut self, n: [u32; 8], drawn: F32x8, a: &Arrival8<'_>) -> [u32; 8] {
+        let delta = (0..8).fold(0, |m, i| m | (bsdf::delta_kinds() >> a.kind[i] & 1) << i);
+        let play = (a.active & drawn.lt(F32x8::ONE)).and_not(Mask8::from_bits(delta));
+        if play.none() {
+            return n;
+        }
+        let wanted = drawn * F32x8::from_fn(|i| n[i] as f32);
+        let lit = rrs::comb(play.zero_unless(wanted), self.comb_bits());
+        core::array::from_fn(|i| if play.bits() >> i & 1 == 1 { lit[i] } else { n[i] })
     }
 
     /// Tells the samples that led here where the vertex's samples are logged and what they count.

@@ -5,14 +5,12 @@ use super::flight::Flight8;
 use super::ledger::{NO_BIN, NO_RECORD};
 use super::settle::Found8;
 use super::shard::Shard;
-use super::vertex::{Batch, CLASSES, Vertex8};
+use super::vertex::{Batch, CLASSES, RINGS, Vertex8};
 use crate::accel::{self, Intersector, Ray8};
 use crate::bsdf::{self, Bsdf, Eval8, Inputs8, Sample8, Visitor};
-use crate::learn::COST_SHADOW;
 use crate::light::{self, LightSample8, LightSelector, power_heuristic};
 use crate::profile::Profile;
 use crate::rng::Key8;
-use crate::rrs::MIN_FACTOR;
 use crate::scene::Scene;
 use crate::scene::blob::MaterialKind;
 use crate::session::Session;
@@ -68,17 +66,6 @@ impl<'s> Visitor<'s> for Scatter<'_, 's> {
     }
 }
 
-/// Which classes have nothing but delta lobes.
-struct IsDelta;
-
-impl<'s> Visitor<'s> for IsDelta {
-    type Out = bool;
-
-    fn visit<B: Bsdf<'s>>(self) -> bool {
-        B::DELTA
-    }
-}
-
 impl Shard<'_> {
     /// Scatters a packet of the fullest class, or of the next from which a sample fits.
     pub(super) fn scatter<P: Profile, I: Intersector, L: LightSelector>(
@@ -87,13 +74,13 @@ impl Shard<'_> {
     ) -> Option<Flight8> {
         let (fullest, _) = self.pool.fullest();
         let mut taken = self.take(fullest).map(|b| (fullest, b));
-        for class in 0..CLASSES {
-            taken = taken.or_else(|| self.take(class).map(|b| (class, b)));
+        for ring in 0..RINGS {
+            taken = taken.or_else(|| self.take(ring).map(|b| (ring, b)));
         }
-        let (class, batch) = taken?;
+        let (ring, batch) = taken?;
         let v = &batch.vertex;
         let scene = session.scene();
-        let kind = MaterialKind::ALL[class];
+        let kind = MaterialKind::ALL[ring % CLASSES];
         let active = Mask8::first(batch.lanes);
         self.counters.scatter.count(batch.lanes as u32);
         self.counters.vertex_samples += batch.lanes as u64;
@@ -102,8 +89,8 @@ impl Shard<'_> {
         let key = v.key.child(batch.sample);
         let [u0, u1, u2, _] = key.uniforms(SCATTER_BLOCK);
         let lit = active & v.depth.lt(U32x8::splat(session.max_depth()));
-        let delta = bsdf::dispatch_in(P::EFFECTS, kind, IsDelta)?;
-        let light = if delta || lit.none() || scene.lights.is_empty() {
+        let delta = bsdf::delta_kinds() >> kind as u32 & 1 == 1;
+        let light = if ring >= CLASSES || delta || lit.none() || scene.lights.is_empty() {
             None
         } else {
             Some(sample_lights::<P>(scene, session, v, key, lit))
@@ -147,9 +134,9 @@ impl Shard<'_> {
 
     /// Takes samples of a class and books them on their roots and ledger records: a lane each, less the vertex if it is
     /// drained.
-    fn take(&mut self, class: usize) -> Option<Batch> {
+    fn take(&mut self, ring: usize) -> Option<Batch> {
         let (roots, ledger) = (&mut self.roots, &mut self.ledger);
-        self.pool.take(class, |v, lanes, drained| {
+        self.pool.take(ring, |v, lanes, drained| {
             roots.get(v.root()).open += lanes - u32::from(drained);
             ledger.draw(v.ledger(), lanes, drained);
         })
@@ -185,7 +172,7 @@ impl Shard<'_> {
         mask: Mask8,
     ) {
         let v = s.vertex;
-        let weight = l.delta.select(F32x8::ONE, power_heuristic(l.pdf, f.pdf)) / l.pdf;
+        let weight = l.delta.select(F32x8::ONE, power_heuristic(l.pdf, f.pdf)) / (l.pdf * v.drawn);
         let radiance = v.beta * f.f * l.radiance * weight;
         let mut found = Found8 { pixel: radiance, local: f.f * l.radiance * weight };
         let mut mask = mask & (radiance.any_positive() | !radiance.is_finite());
@@ -199,20 +186,13 @@ impl Shard<'_> {
             return;
         }
         let clear = self.occlude(session, s, l, mask);
-        if let (Some(training), Some(bin)) = (&mut self.training, bin) {
-            let known = bin.lt(U32x8::splat(NO_BIN)).and_not(s.ledger.eq(U32x8::splat(NO_RECORD)));
-            for i in (mask & known).lanes() {
-                let taken = training.log_shadow(bin.lane(i), clear.lane(i));
-                self.counters.shadows_refused += u64::from(!taken);
-            }
+        if let Some(bin) = bin {
+            self.learn_light(s, bin, mask, clear, &found);
         }
         self.gather(clear, v.root, s.ledger, &found);
     }
 
-    /// Plays roulette for shadow rays: a light sample has a known value if nothing hides it and the cost of a ray, so
-    /// the factor that is best for it is that of EARS (eq. 32) with the square of its value, times the learned chance
-    /// that it is visible (of `bin`), as second moment (Veach 1997, section 10.4.1, "efficiency-optimised Russian
-    /// roulette", with the same idea of a threshold). The lanes that go on.
+    /// Plays roulette for shadow rays, of light samples in directions of the bins `bin`. The lanes that go on.
     fn shadow_roulette<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
         session: &Session<'_, '_, P, I, L>,
@@ -221,20 +201,33 @@ impl Shard<'_> {
         found: &mut Found8,
         mask: Mask8,
     ) -> Mask8 {
-        let ratio = session.knowledge().cost_over_variance();
-        if ratio <= 0.0 {
-            return mask;
-        }
-        let norm = self.plan.settings().learning.norm;
-        let error = norm.of(found.pixel * found.pixel * s.vertex.importance);
-        let p = (error * F32x8::splat(ratio / COST_SHADOW)).sqrt() * session.knowledge().visibility_root(bin);
-        let p = p.is_finite().select(p, F32x8::ONE).clamp(MIN_FACTOR, 1.0);
+        let knowledge = session.knowledge();
+        let p = knowledge.image8(s.vertex.importance).traced(found.pixel, knowledge.visibility_root(bin));
         let [u, ..] = s.key.uniforms(SHADOW_BLOCK);
         let on = mask & (u.lt(p) | p.ge(F32x8::ONE));
         self.counters.shadow_kills += u64::from(mask.count() - on.count());
         found.pixel = found.pixel / p;
         found.local = found.local / p;
         on
+    }
+
+    /// Tells the statistics what came of the shadow rays of `traced` in directions of the bins `bin`: those of `clear`
+    /// met nothing, and found what they say.
+    fn learn_light(&mut self, s: &LitSamples<'_>, bin: U32x8, traced: Mask8, clear: Mask8, found: &Found8) {
+        let Some(training) = &mut self.training else { return };
+        let v = s.vertex;
+        let known = bin.lt(U32x8::splat(NO_BIN)).and_not(s.ledger.eq(U32x8::splat(NO_RECORD)));
+        for i in (traced & known).lanes() {
+            let taken = training.log_shadow(bin.lane(i), clear.lane(i));
+            self.counters.shadows_refused += u64::from(!taken);
+        }
+        let local = found.local * self.tamed(clear & known, found.pixel, v.root);
+        let Some(training) = &mut self.training else { return };
+        for i in (clear & known).lanes() {
+            let (x, scale) = (local.lane(i), self.ledger.scale(v.ledger.lane(i)));
+            let square: f32 = x.iter().zip(scale).map(|(x, s)| (x * s) * (x * s)).sum();
+            training.log_light(v.bin.lane(i), square * v.drawn.lane(i));
+        }
     }
 }
 

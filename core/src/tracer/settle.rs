@@ -51,7 +51,7 @@ impl Shard<'_> {
 
     /// What part of eight contributions the statistics take. The variance of the picture leaves outliers out; so must
     /// the moments that are weighed against it, or cells that met one sample of them would split for ever.
-    fn tamed(&mut self, mask: Mask8, radiance: Vec3x8, root: U32x8) -> F32x8 {
+    pub(super) fn tamed(&mut self, mask: Mask8, radiance: Vec3x8, root: U32x8) -> F32x8 {
         let limit = F32x8::splat(self.outlier);
         let square = radiance * radiance;
         // the importance of a channel is at most that of a black pixel

@@ -83,8 +83,8 @@ impl Shard<'_> {
             depth: f.depth,
             albedo_product: f.albedo_product,
             ledger: f.ledger,
-            count: U32x8::splat(0),
-            next: U32x8::splat(0),
+            samples: U32x8::splat(0),
+            drawn: F32x8::ONE,
             bin: U32x8::splat(NO_BIN),
             importance: f.importance,
         };

@@ -10,6 +10,9 @@ use croupier_simd::{F32x8, U32x8, Vec3x8};
 /// Scattering classes: one per material kind, so that a packet runs one kernel.
 pub(crate) const CLASSES: usize = MaterialKind::ALL.len();
 
+/// Rings of waiting vertices: of each class those whose next samples draw light samples, then of each class the others.
+pub(crate) const RINGS: usize = 2 * CLASSES;
+
 /// One waiting vertex, 128 bytes: four rows of eight words, so that eight of them transpose into [`Vertex8`].
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
@@ -46,10 +49,10 @@ pub(crate) struct Vertex8 {
     pub albedo_product: F32x8,
     /// Ledger record of the sample that led here.
     pub ledger: U32x8,
-    /// Samples left.
-    pub count: U32x8,
-    /// Number of the next sample.
-    pub next: U32x8,
+    /// Samples left, the number of the next one, and how many of those left draw a light sample: see [`samples`].
+    pub samples: U32x8,
+    /// Chance of a sample to draw a light sample ([`crate::rrs::Learned8::drawn`]).
+    pub drawn: F32x8,
     /// Its bin of the statistics, [`NO_BIN`](super::ledger::NO_BIN) if there is none.
     pub bin: U32x8,
     /// See [`Target::importance`](super::root::Target::importance).
@@ -59,12 +62,27 @@ pub(crate) struct Vertex8 {
 /// Row and column of the words that are read or changed while a vertex waits.
 const ROOT: (usize, usize) = (1, 6);
 const LEDGER: (usize, usize) = (3, 1);
-const COUNT: (usize, usize) = (3, 2);
-const NEXT: (usize, usize) = (3, 3);
+const SAMPLES: (usize, usize) = (3, 2);
+
+/// The word of a vertex with `count` samples to draw, the first `lit` of them with a light sample. A byte each: no
+/// factor is larger than [`crate::rrs::MAX_FACTOR`].
+pub(crate) fn samples(count: u32, lit: u32) -> u32 {
+    debug_assert!(count < 256 && lit <= count);
+    count | lit << 16
+}
 
 impl Vertex {
+    fn samples(&self) -> u32 {
+        self.rows[SAMPLES.0][SAMPLES.1].to_bits()
+    }
+
     pub(crate) fn count(&self) -> u32 {
-        self.rows[COUNT.0][COUNT.1].to_bits()
+        self.samples() & 0xff
+    }
+
+    /// Samples left that draw a light sample. They come first.
+    fn lit(&self) -> u32 {
+        self.samples() >> 16
     }
 
     pub(crate) fn root(&self) -> u32 {
@@ -77,9 +95,9 @@ impl Vertex {
 
     /// Takes `m` of its samples; returns the number of the first.
     fn take(&mut self, m: u32) -> u32 {
-        let first = self.rows[NEXT.0][NEXT.1].to_bits();
-        self.rows[COUNT.0][COUNT.1] = f32::from_bits(self.count().saturating_sub(m));
-        self.rows[NEXT.0][NEXT.1] = f32::from_bits(first.wrapping_add(m));
+        let first = self.samples() >> 8 & 0xff;
+        let (count, lit) = (self.count().saturating_sub(m), self.lit().saturating_sub(m));
+        self.rows[SAMPLES.0][SAMPLES.1] = f32::from_bits(count | (first.wrapping_add(m) & 0xff) << 8 | lit << 16);
         first
     }
 }
@@ -103,8 +121,8 @@ impl Vertex8 {
             [
                 self.albedo_product,
                 f(self.ledger),
-                f(self.count),
-                f(self.next),
+                f(self.samples),
+                self.drawn,
                 f(self.bin),
                 self.importance.x,
                 self.importance.y,
@@ -129,8 +147,8 @@ impl Vertex8 {
             key: Key8 { lo: d[6].to_bits(), hi: d[7].to_bits() },
             albedo_product: e[0],
             ledger: e[1].to_bits(),
-            count: e[2].to_bits(),
-            next: e[3].to_bits(),
+            samples: e[2].to_bits(),
+            drawn: e[3],
             bin: e[4].to_bits(),
             importance: Vec3x8::new(e[5], e[6], e[7]),
         }
@@ -204,9 +222,9 @@ pub(crate) struct Batch {
 pub(crate) struct Pool<'m> {
     records: &'m mut [Vertex],
     free: FreeList<'m>,
-    rings: [Ring<'m>; CLASSES],
-    /// Samples waiting per class.
-    pending: [u64; CLASSES],
+    rings: [Ring<'m>; RINGS],
+    /// Samples that can be taken from each ring.
+    pending: [u64; RINGS],
 }
 
 /// Vertices that may start while this many slots stay free can always run their packet to its end.
@@ -214,7 +232,7 @@ pub(crate) const RESERVE: usize = 8;
 
 impl<'m> Pool<'m> {
     pub(crate) fn measure(m: Measure, capacity: usize) -> Measure {
-        (0..CLASSES).fold(FreeList::measure(m.add::<Vertex>(capacity), capacity), |m, _| m.add::<u32>(capacity))
+        (0..RINGS).fold(FreeList::measure(m.add::<Vertex>(capacity), capacity), |m, _| m.add::<u32>(capacity))
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, capacity: usize) -> Result<Self, MemoryError> {
@@ -224,7 +242,7 @@ impl<'m> Pool<'m> {
         for r in &mut rings {
             r.slots = c.take_unset(capacity)?;
         }
-        Ok(Self { records, free, rings, pending: [0; CLASSES] })
+        Ok(Self { records, free, rings, pending: [0; RINGS] })
     }
 
     /// Forgets all that waits.
@@ -233,7 +251,7 @@ impl<'m> Pool<'m> {
         for r in &mut self.rings {
             (r.head, r.len) = (0, 0);
         }
-        self.pending = [0; CLASSES];
+        self.pending = [0; RINGS];
     }
 
     /// Empty slots.
@@ -241,7 +259,7 @@ impl<'m> Pool<'m> {
         self.free.len()
     }
 
-    /// The class with most samples waiting, and how many.
+    /// The ring with most samples waiting, and how many.
     pub(crate) fn fullest(&self) -> (usize, u64) {
         let mut best = (0, 0);
         for (c, &n) in self.pending.iter().enumerate() {
@@ -252,27 +270,35 @@ impl<'m> Pool<'m> {
         best
     }
 
-    /// Stores a vertex with `count` samples; the caller has made sure that a slot is free.
+    /// Stores a vertex with its samples; the caller has made sure that a slot is free.
     pub(crate) fn push(&mut self, class: usize, v: Vertex) {
         let Some(slot) = self.free.take() else { return };
         self.records[slot as usize] = v;
-        self.rings[class].push(slot);
-        self.pending[class] += u64::from(v.count());
+        self.wait(class, slot);
     }
 
-    /// Takes up to eight samples of `class`, newest vertices first, so that even if every one of them goes on there is
-    /// a slot for each. Calls `taken(vertex, lanes, drained)` per vertex. `None` if no sample fits.
-    pub(crate) fn take(&mut self, class: usize, mut taken: impl FnMut(&Vertex, u32, bool)) -> Option<Batch> {
+    /// Puts a vertex into the ring of its next samples.
+    fn wait(&mut self, class: usize, slot: u32) {
+        let v = &self.records[slot as usize];
+        let (ring, n) = if v.lit() > 0 { (class, v.lit()) } else { (CLASSES + class, v.count()) };
+        self.rings[ring].push(slot);
+        self.pending[ring] += u64::from(n);
+    }
+
+    /// Takes up to eight samples from a ring, newest vertices first, so that even if every one of them goes on there is
+    /// a slot for each. A vertex that has no light samples left goes over to the other ring of its class. Calls `taken(vertex, lanes, drained)` per vertex. `None` if no sample fits.
+    pub(crate) fn take(&mut self, ring: usize, mut taken: impl FnMut(&Vertex, u32, bool)) -> Option<Batch> {
         let mut slot = [0u32; 8];
         let mut sample = [0u32; 8];
         let mut lanes = 0usize;
         let mut room = self.free.len();
-        let ring = &mut self.rings[class];
+        let lit = ring < CLASSES;
         while lanes < 8 {
-            let Some(s) = ring.newest() else { break };
+            let Some(s) = self.rings[ring].newest() else { break };
             let v = &mut self.records[s as usize];
             let count = v.count();
-            let want = count.min((8 - lanes) as u32);
+            let left = if lit { v.lit() } else { count };
+            let want = left.min((8 - lanes) as u32);
             // a drained vertex gives its own slot back
             let m = if want == count && want as usize <= room + 1 {
                 want
@@ -290,11 +316,15 @@ impl<'m> Pool<'m> {
                 lanes += 1;
             }
             room = room + usize::from(drained) - m as usize;
-            self.pending[class] -= u64::from(m);
+            self.pending[ring] -= u64::from(m);
             taken(v, m, drained);
+            if m == left {
+                self.rings[ring].pop_newest();
+            }
             if drained {
-                ring.pop_newest();
                 self.free.give(s);
+            } else if m == left {
+                self.wait(ring % CLASSES, s);
             }
         }
         if lanes == 0 {
@@ -313,15 +343,16 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    fn vertex(count: u32) -> Vertex {
+    fn vertex(count: u32, lit: u32) -> Vertex {
         let mut v: Vertex = Zeroable::zeroed();
-        v.rows[COUNT.0][COUNT.1] = f32::from_bits(count);
+        v.rows[SAMPLES.0][SAMPLES.1] = f32::from_bits(samples(count, lit));
         v
     }
 
     /// Random (subcritical) trees through pools of every small size: each turn takes what fits and pushes as `roulette`
-    /// may. Every sample is taken exactly once, no turn is stuck, no slot is lost. Killed by: `room` off by one, a
-    /// drained slot not given back, `RESERVE` of 0.
+    /// may. Every sample is taken exactly once, those with a light sample from a ring of theirs, no turn is stuck, no
+    /// slot is lost. Killed by: `room` off by one, a drained slot not given back, `RESERVE` of 0, a vertex that stays
+    /// in the ring of its light samples or leaves it early.
     #[test]
     fn no_pool_gets_stuck() {
         let mut word = 7u32;
@@ -335,16 +366,17 @@ mod tests {
             let offset = block.as_ptr().align_offset(crate::memory::BLOCK_ALIGN);
             let layout = Pool::measure(Measure::new(), capacity).layout().unwrap();
             let mut pool = Pool::carve(&mut Carver::new(&mut block[offset..], layout).unwrap(), capacity).unwrap();
-            let (mut started, mut pushed, mut taken) = (0, 0u64, 0u64);
+            let (mut started, mut pushed, mut taken, mut waiting_lit) = (0, 0u64, 0u64, 0u64);
             while started < 4000 || pool.fullest().1 > 0 {
                 let (_, pending) = pool.fullest();
                 let lanes = if pending < 8 && started < 4000 && pool.free() >= 2 * RESERVE {
                     started += 8;
                     8
                 } else {
-                    let batch = (0..=CLASSES)
-                        .find_map(|c| pool.take(if c == 0 { pool.fullest().0 } else { c - 1 }, |_, _, _| ()));
-                    let batch = batch.expect("some class must always have a sample that fits");
+                    let rings = [pool.fullest().0].into_iter().chain(0..RINGS);
+                    let batch = rings.into_iter().find_map(|r| Some((r, pool.take(r, |_, _, _| ())?)));
+                    let (ring, batch) = batch.expect("some ring must always have a sample that fits");
+                    waiting_lit -= if ring < CLASSES { batch.lanes as u64 } else { 0 };
                     assert!(pool.free() >= batch.lanes, "a lane has no slot to go on to");
                     taken += batch.lanes as u64;
                     batch.lanes
@@ -359,12 +391,14 @@ mod tests {
                         1
                     };
                     if n > 0 {
-                        pool.push(next(CLASSES as u32) as usize, vertex(n));
+                        let lit = next(n + 1);
+                        waiting_lit += u64::from(lit);
+                        pool.push(next(CLASSES as u32) as usize, vertex(n, lit));
                         pushed += u64::from(n);
                     }
                 }
             }
-            assert_eq!(pushed, taken);
+            assert_eq!((pushed, waiting_lit), (taken, 0));
             assert_eq!(pool.free(), capacity);
         }
     }
@@ -388,15 +422,15 @@ mod tests {
             key: Key8 { lo: u(22), hi: u(23) },
             depth: u(24),
             albedo_product: f(25),
-            count: u(26),
-            next: u(27),
+            samples: u(26),
+            drawn: f(27),
             bin: u(29),
             importance: v3(30),
             ledger: u(28),
         };
         let records = v.records();
         for (i, r) in records.iter().enumerate() {
-            assert_eq!((r.count(), r.root(), r.ledger()), (26_000 + i as u32, 21_000 + i as u32, 28_000 + i as u32));
+            assert_eq!((r.samples(), r.root(), r.ledger()), (26_000 + i as u32, 21_000 + i as u32, 28_000 + i as u32));
         }
         let back = Vertex8::from_records(core::array::from_fn(|i| &records[7 - i]));
         for i in 0..8 {
@@ -404,7 +438,7 @@ mod tests {
             assert_eq!(back.reflectance.lane(i), v.reflectance.lane(7 - i));
             assert_eq!((back.key.lo.lane(i), back.key.hi.lane(i)), (v.key.lo.lane(7 - i), v.key.hi.lane(7 - i)));
             assert_eq!(back.albedo_product.lane(i), v.albedo_product.lane(7 - i));
-            assert_eq!((back.count.lane(i), back.next.lane(i)), (v.count.lane(7 - i), v.next.lane(7 - i)));
+            assert_eq!((back.samples.lane(i), back.drawn.lane(i)), (v.samples.lane(7 - i), v.drawn.lane(7 - i)));
             assert_eq!((back.ledger.lane(i), back.bin.lane(i)), (v.ledger.lane(7 - i), v.bin.lane(7 - i)));
             assert_eq!(back.importance.lane(i), v.importance.lane(7 - i));
         }

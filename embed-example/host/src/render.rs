@@ -372,6 +372,7 @@ fn stats(r: &Rendered) -> RenderStats {
         ("budget_capped", c.budget_capped),
         ("ring_peak", c.ring_peak),
         ("shadow_kills", c.shadow_kills),
+        ("light_kills", c.light_kills),
         ("look_ups", c.look_ups.lanes),
         ("samples_logged", c.samples_logged),
         ("samples_refused", c.samples_refused),
