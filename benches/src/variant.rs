@@ -6,7 +6,7 @@ use croupier::{Settings, Strategy};
 /// Other choices by name, and what they are.
 pub const MODIFIERS: &[(&str, &str)] = &[
     ("adaptive", "adaptive sampling"),
-    ("shadow", "roulette of shadow rays"),
+    ("shadow", "roulette of light samples and their rays"),
     ("constant", "the cached mean stands in for what roulette skips"),
     ("small", "one shard, and less than 256 KiB for all that is learned"),
     ("truth", "strategies that learn are told the true pixels instead of denoised ones"),

@@ -40,8 +40,9 @@ pub struct Settings {
     /// Give pixels with much error more samples, others fewer, from the second iteration on. Every pixel gets one at
     /// least, and every iteration counts as much in all of them, so that no pixel's mean hangs on its own noise.
     pub adaptive: bool,
-    /// Play roulette for shadow rays too, with the most efficient factor. Strategies that learn also
-    /// learn where light samples are hidden. Worth it with [`crate::rrs::Ears`], whose rule it is.
+    /// Play roulette for light samples too, with the most efficient factor: before their shadow ray is traced, and with
+    /// strategies that learn before they are drawn. Those also learn where light samples are hidden. Worth it with
+    /// [`crate::rrs::Ears`], whose rule it is.
     pub shadow_roulette: bool,
     /// What stands in for samples that roulette skips.
     pub constant: Constant,

@@ -70,7 +70,8 @@ pub fn locals(cache: &Cache<'_>) -> impl Iterator<Item = Local8> {
 
 /// Panics unless all of `l` is as documented.
 pub fn assert_sane(l: &Local8) {
-    let mut ok = l.cost.is_finite() & l.cost.ge(F32x8::ZERO) & l.count.is_finite() & l.count.ge(F32x8::ZERO);
+    let share = l.light_share.ge(F32x8::ZERO) & l.light_share.le(F32x8::ONE);
+    let mut ok = share & l.cost.is_finite() & l.cost.ge(F32x8::ZERO) & l.count.is_finite() & l.count.ge(F32x8::ZERO);
     for (m, q, v) in [
         (l.mean.x, l.moment.x, l.variance.x),
         (l.mean.y, l.moment.y, l.variance.y),
@@ -92,7 +93,7 @@ pub fn iterate(cache: &mut Cache<'_>, shards: &mut [Training<'_>], n: usize, spl
             assert!(t.log(bin, x, (rng.bits() >> 61) as f32));
             assert!(t.log_pair(bin, x));
             assert!(t.log_shadow(bin, x[0] < 0.02));
-            t.log_light(bin, x[1] * x[1]);
+            t.log_light(bin, x, 0.5);
         }
     }
     cache.begin_merge(1.0);
@@ -128,8 +129,8 @@ enum Node {
 /// Numbers of a bin.
 pub const FIELDS: usize = 15;
 
-/// Of a bin: count, pairs, cost, sum (3), squared sum (3), pair sum (3), shadow rays, those that met nothing, squares of
-/// light samples.
+/// Of a bin: count, pairs, cost, sum (3), squared sum (3), pair sum (3), shadow rays, those that met nothing, squares
+/// of light samples.
 pub type Sums = [f64; FIELDS];
 
 /// What saved bytes mean, in f64.
@@ -245,10 +246,10 @@ pub fn random_sums(rng: &mut SplitMix) -> Sums {
     let pair = [(); 3].map(|()| log(1e-4, 100.0) * pairs);
     let rays = log(1.0, 1e4);
     let visible = rays * log(1e-6, 2.0);
-    let light = count * log(1e-8, 1e2);
     if log(1.0, 10.0) < 1.3 {
         return [0.0; FIELDS];
     }
+    let light = count * log(1e-8, 1e2);
     let of = |c: usize| mean[c] * count;
     let sqr = |c: usize| mean[c] * mean[c] * (1.0 + spread[c]) * count;
     let (s, p) = ([sqr(0), sqr(1), sqr(2)], pair);

@@ -36,7 +36,7 @@ fn a_saved_cache_comes_back_bit_for_bit() {
             let bin = croupier::simd::U32x8::splat(find(c, 0, p, d));
             let l = c.local(bin, croupier::simd::Mask8::first(1));
             let others = [l.cost.lane(0), l.count.lane(0), c.visibility_root(bin).lane(0)];
-            [l.mean.lane(0), l.moment.lane(0), l.variance.lane(0), others]
+            ([l.mean.lane(0), l.moment.lane(0), l.variance.lane(0), others], l.light_share.lane(0))
         });
         assert_eq!(a, b);
     }

@@ -155,7 +155,7 @@ fn the_first_samples_of_a_pixel_are_learned_from() {
 /// A bright lamp behind a wall, and one before the open side of the box: where light samples never arrive, most shadow
 /// rays are spared after the first iteration, and few where they do. Both pictures agree with those of full light
 /// sampling. Killed by: visibility that is not learned, that is learned of the vertices' own directions, that counts
-/// spared rays as hidden, that is not used.
+/// spared rays as hidden, that is not used; light samples that are drawn whatever they are worth.
 #[test]
 fn lamps_behind_walls_get_few_shadow_rays() {
     // the box is open in front
@@ -171,10 +171,39 @@ fn lamps_behind_walls_get_few_shadow_rays() {
         let ratio = image.mean() / full.mean();
         assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
         let of = |f: fn(&Counters) -> u64| (f(&seen[3]) - f(&seen[1])) as f64;
-        of(|c| c.shadow_rays) / of(|c| c.shadow_rays + c.shadow_kills + c.light_kills)
+        [
+            of(|c| c.shadow_rays) / of(|c| c.shadow_rays + c.shadow_kills),
+            of(|c| c.light_kills) / of(|c| c.vertex_samples),
+        ]
     });
-    println!("{hidden} of the shadow rays behind the wall, {open} in front of the box");
-    assert!(hidden < 0.3 && open > 0.8, "{hidden} {open}");
+    println!("behind the wall {hidden:?}, in front of the box {open:?} of shadow rays traced, of light samples spared");
+    assert!(hidden[0] < 0.4 && open[0] > 0.8 && hidden[1] > 0.2 && open[1] < 0.1, "{hidden:?} {open:?}");
+}
+
+/// A cache that was taught while all light samples were drawn, most of them for a hidden lamp, knows what they are worth:
+/// roulette spares as many as with one that was taught while they played. Killed by: light samples that are learned from
+/// only if they play.
+#[test]
+fn light_samples_are_learned_from_in_any_case() {
+    let mut s = cornell([16, 16]);
+    s.emitters.push(Emitter::Point { position: [3.0, 0.0, 0.0], intensity: [300.0; 3] });
+    let scene = blob(&s);
+    let spared = |shadow_roulette: bool| {
+        let s = Settings { shadow_roulette: true, ..learns(&scene, "ears", 4) };
+        let bytes = taught(&scene, &Settings { shadow_roulette, ..s }, &[16, 64, 64]);
+        let mut seen = Vec::new();
+        learning(&scene, &s, &[16, 64, 0], IN_ORDER, &mut |i, l: &mut dyn Learned| {
+            seen.push(l.counters());
+            if i == 1 {
+                l.load(&bytes).unwrap();
+            }
+        });
+        let of = |f: fn(&Counters) -> u64| (f(&seen[2]) - f(&seen[1])) as f64;
+        of(|c| c.light_kills) / of(|c| c.vertex_samples)
+    };
+    let (off, on) = (spared(false), spared(true));
+    println!("{off} and {on} of the light samples spared");
+    assert!(on > 0.1 && (off / on - 1.0).abs() < 0.2, "{off} {on}");
 }
 
 /// Statistics of other bounds are refused with what differs, and nothing has changed. Of other things within the same

@@ -171,7 +171,7 @@ fn mirrors_and_glass_play_learned_roulette() {
             s.emitters.push(Emitter::Point { position: [0.0, y, 0.0], intensity: [intensity; 3] });
         }
         let scene = blob(&s);
-        let none = Known::of(&render(&scene, &Settings { seed: 15, ..learns(&scene, "none", 3) }, 60_000));
+        let none = Known::of(&render(&scene, &Settings { seed: 15, ..learns(&scene, "none", 3) }, 14_000));
         for strategy in ["adrrs", "ears"] {
             let s = Settings { seed: 17, aovs: true, ..learns(&scene, strategy, 3) };
             let image = scheduled(&scene, &s, &doubling(7000), IN_ORDER);
@@ -222,9 +222,10 @@ fn choices_do_not_bias() {
     check("adaptive", "ears", &|s| s.adaptive = true);
     check("adaptive", "none", &|s| s.adaptive = true);
     let c = check("shadow roulette", "ears", &|s| s.shadow_roulette = true);
-    assert!(c.shadow_kills > c.shadow_rays / 50, "{c:?}");
+    assert!(c.shadow_kills > c.shadow_rays / 50 && c.light_kills > c.vertex_samples / 50, "{c:?}");
     check("shadow roulette", "classic", &|s| s.shadow_roulette = true);
-    check("shadow roulette", "bolin-meyer", &|s| s.shadow_roulette = true);
+    let c = check("shadow roulette", "bolin-meyer", &|s| s.shadow_roulette = true);
+    assert!(c.light_kills > c.vertex_samples / 100, "{c:?}");
     check("cached constant", "ears", &|s| s.constant = Constant::Cached);
     check("cached constant", "ear:plain", &|s| s.constant = Constant::Cached);
     check("constant of 0.3", "fixed:0.7", &|s| s.constant = Constant::Number(0.3));
@@ -350,7 +351,7 @@ fn random_roulette_of_light_samples_does_not_bias() {
         light_kills += image.counters.light_kills;
         image.mean()
     };
-    let known = Known::over((9000..18_000).map(one));
+    let known = Known::over((0..18_000).map(one));
     println!("{light_kills} of {samples} light samples spared, {rays} shadow rays, {kills} spared");
     assert!(kills > rays / 4 && light_kills > samples / 10);
     assert_equivalent("random roulette of light samples", known, none);

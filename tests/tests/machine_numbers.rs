@@ -252,8 +252,9 @@ fn strips_of_needles_are_plain_surfaces() {
 fn counters_add_up() {
     for (name, scene) in [("cornell", cornell([20, 20])), ("everything", everything([20, 20]))] {
         let bytes = blob(&scene);
-        for strategy in ["none", "classic:2", "fixed:2.5", "fixed:0.4"] {
-            let s = Settings { max_depth: 5, shards: 3, ring: 200, aovs: true, ..settings(&bytes, strategy) };
+        for strategy in ["none", "classic:2", "fixed:2.5", "fixed:0.4", "ears"] {
+            let mut s = Settings { max_depth: 5, shards: 3, ring: 200, aovs: true, ..settings(&bytes, strategy) };
+            s.shadow_roulette = strategy == "ears";
             let image = scheduled(&bytes, &s, &[3, 5], IN_ORDER);
             let c: Counters = image.counters;
             let what = format!("{name}, {strategy}: {c:?}");
@@ -261,7 +262,9 @@ fn counters_add_up() {
             assert_eq!(c.trace.lanes, c.camera_rays + c.scatter_rays, "{what}");
             assert_eq!(c.occlude.lanes, c.shadow_rays, "{what}");
             assert_eq!(c.scatter.lanes, c.vertex_samples, "{what}");
-            assert!(c.shadow_rays <= c.vertex_samples && c.scatter_rays <= c.vertex_samples, "{what}");
+            assert!(c.shadow_rays + c.shadow_kills + c.light_kills <= c.vertex_samples, "{what}");
+            assert_eq!(c.light_kills > 0 && c.shadow_kills > 0, strategy == "ears", "{what}");
+            assert!(c.scatter_rays <= c.vertex_samples, "{what}");
             assert!(c.surface.lanes <= c.trace.lanes && c.surface.packets <= c.trace.packets, "{what}");
             assert!(c.ring_peak > 0 && c.ring_peak <= 200, "{what}");
             assert_eq!((c.non_finite, c.first_non_finite), (0, 0), "{what}");

@@ -2,6 +2,7 @@
 
 use croupier::rrs::{COMB_ONE, Learned8, MAX_FACTOR, MIN_FACTOR, Norm, Strategy, Vertices8, comb};
 use croupier::simd::{F32x8, U32x8, Vec3x8};
+use croupier_tests::stats::SplitMix;
 
 /// Mean of n over all u on a grid of `m` equally spaced values that includes 0: exact for a comb in fixed point whose
 /// prefix sums are multiples of 2^32 / m.
@@ -145,6 +146,7 @@ fn learned(mean: f32, moment: f32, variance: f32, cost: f32) -> Vertices8 {
         moment: grey(moment),
         variance: grey(variance),
         cost: F32x8::splat(cost),
+        light_share: F32x8::ONE,
         count: F32x8::splat(1e12),
     };
     Vertices8 { beta: grey(1.0), albedo: grey(0.5), learned, ..vertices(1.0, 0.5, 1) }
@@ -273,6 +275,71 @@ fn roulette_does_not_raise_throughput_above_ten() {
             assert!((s / expected - 1.0).abs() < 1e-3, "{strategy}, throughput {beta}: {s} for {expected}");
         }
     }
+}
+
+/// The chances of light samples are those of eq. 32 for what they give and the cost of a shadow ray, against f64.
+/// Killed by: a share or visibility that is squared or left out, weights that are not, the cost of whole samples.
+#[test]
+fn light_samples_play_by_the_rule() {
+    let mut rng = SplitMix(3);
+    let (mut kept, mut sure, mut least) = (0, 0, 0);
+    for _ in 0..2000 {
+        let mut random = |lo: f64, hi: f64| rng.range(lo.ln(), hi.ln()).exp() as f32;
+        let rgb = |x: [f32; 3]| Vec3x8::splat(x[0], x[1], x[2]);
+        let (beta, moment, importance) = (
+            [(); 3].map(|()| random(1e-1, 2.0)),
+            [(); 3].map(|()| random(1e-2, 1.0)),
+            [(); 3].map(|()| random(1e-1, 10.0)),
+        );
+        let (share, ratio) = (random(1e-3, 1.0), random(1e-2, 10.0));
+        let mut l = learned(0.1, 1.0, 1.0, 7.0).learned;
+        (l.moment, l.importance) = (rgb(moment), rgb(importance));
+        (l.light_share, l.cost_over_variance) = (F32x8::splat(share), F32x8::splat(ratio));
+        let chance = |square: &dyn Fn(usize) -> f64, factor: f64| {
+            let mean = (0..3).map(|c| square(c) * f64::from(importance[c])).sum::<f64>() / 3.0;
+            (mean * factor * f64::from(ratio) / 0.5).sqrt()
+        };
+        let square = |x: f32| f64::from(x) * f64::from(x);
+        let expected = chance(&|c| square(beta[c]) * f64::from(moment[c]), f64::from(share)).clamp(0.05, 1.0);
+        let drawn = f64::from(l.drawn(rgb(beta), Vec3x8::ZERO).lane(2));
+        assert!((drawn / expected - 1.0).abs() < 1e-4, "drawn with {drawn} for {expected}");
+        let expected = (chance(&|c| square(beta[c]), 1.0) * f64::from(share)).clamp(0.05, 1.0);
+        let traced = f64::from(l.traced(rgb(beta), F32x8::splat(share)).lane(5));
+        assert!((traced / expected - 1.0).abs() < 1e-4, "traced with {traced} for {expected}");
+        kept += u32::from(drawn > 0.06 && drawn < 0.99);
+        sure += u32::from(drawn == 1.0);
+        least += u32::from(drawn < 0.051);
+    }
+    assert!(kept > 500 && sure > 20 && least > 500, "{kept} {sure} {least}");
+}
+
+/// Where nothing is known all light samples are drawn and traced; few samples are trusted little; what is worth little
+/// still keeps the throughput below 10. Killed by: an empty bin that spares its light samples, a limit left out, a NaN
+/// that becomes the least chance.
+#[test]
+fn light_samples_are_drawn_where_nothing_is_known() {
+    let grey = |x: f32| Vec3x8::splat(x, x, x);
+    let with = |beta: f32, f: &dyn Fn(&mut Learned8)| {
+        let mut l = learned(0.5, 1e-6, 1e-6, 1.0).learned;
+        f(&mut l);
+        l.drawn(grey(beta), grey(0.5)).lane(1)
+    };
+    assert_eq!(with(0.5, &|_| ()), MIN_FACTOR);
+    assert_eq!(with(0.5, &|l| l.count = F32x8::ZERO), 1.0);
+    assert_eq!(with(0.5, &|l| l.cost_over_variance = F32x8::ZERO), 1.0);
+    for bad in [f32::NAN, f32::INFINITY] {
+        assert_eq!(with(0.5, &|l| l.light_share = F32x8::splat(bad)), 1.0);
+        assert_eq!(with(0.5, &|l| l.moment = grey(bad)), 1.0);
+    }
+    let half = with(0.5, &|l| l.count = F32x8::splat(256.0));
+    assert!((half - 0.5).abs() < 0.01, "{half}");
+    for (beta, expected) in [(4.0, 0.2), (16.0, 0.8), (400.0, 1.0)] {
+        assert!((with(beta, &|_| ()) - expected).abs() < 1e-5, "throughput {beta}");
+    }
+    let unknown = Learned8::NONE.traced(grey(1e-9), F32x8::ONE).lane(0);
+    let broken =
+        Learned8 { cost_over_variance: F32x8::ONE, ..Learned8::NONE }.traced(grey(f32::NAN), F32x8::ONE).lane(0);
+    assert_eq!([unknown, broken], [1.0; 2]);
 }
 
 /// Expected contributions are brought into [1/3, 5/3] of the pixel. Killed by: a factor that aims at the middle of the

@@ -92,9 +92,9 @@ enum Trial {
     Ledger,
     /// A cache of little more than its roots.
     Cache,
-    /// All of that, with blocks for the denoiser, roulette for shadow rays and a cached constant.
+    /// All of that, with blocks for the denoiser, roulette for light samples and a cached constant.
     Small,
-    /// Roulette for shadow rays.
+    /// Roulette for light samples and their rays.
     Shadow,
     /// Samples where the error is.
     Adaptive,
@@ -144,7 +144,7 @@ impl Trial {
         match self {
             Self::None | Self::Cache | Self::Adaptive | Self::Reloaded => true,
             Self::Ring => c.ring_capped > 0,
-            Self::Shadow => c.shadow_kills > c.shadow_rays / 50,
+            Self::Shadow => c.shadow_kills > c.shadow_rays / 50 && c.light_kills > c.vertex_samples / 100,
             Self::Ledger | Self::Small => c.ledger_full > c.samples_logged,
             Self::Poisoned => c.roulette_kills > c.camera_samples / 20 && c.splits > c.camera_samples / 20,
             Self::Budget => c.budget_capped > 0,

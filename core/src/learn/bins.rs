@@ -48,10 +48,12 @@ impl Record {
         true
     }
 
-    /// Adds the square of a light sample.
-    pub(super) fn add_light(&mut self, square: f32) {
+    /// Adds the square of a finite light sample, times `drawn`.
+    pub(super) fn add_light(&mut self, x: [f32; 3], drawn: f32) {
         if self.count != BIN_LIMIT {
-            self.light += square.clamp(0.0, MAX_SQUARE);
+            let square: f32 = x.map(|x| x.clamp(0.0, MAX_VALUE)).map(|x| x * x).iter().sum();
+            // more of them may come than samples, whose records are full or spoiled
+            self.light = (self.light + drawn.clamp(0.0, 1.0) * square).min(f32::MAX);
         }
     }
 
@@ -242,7 +244,7 @@ impl Frozen {
         }
         let ([a, b, c], [d, e, g], [h, i, j]) = (mean, moment, variance);
         let squares: f64 = s.sqr.iter().sum();
-        f.light_share = if squares > 0.0 { saturate(s.light / squares, 1.0) } else { 1.0 };
+        f.light_share = saturate(s.light / squares.max(f64::MIN_POSITIVE), 1.0);
         f.colors = [a | b << 16, c | d << 16, e | g << 16, h | i << 16, j];
         f
     }

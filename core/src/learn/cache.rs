@@ -4,7 +4,7 @@
 //! *values* of samples (reflected radiance over albedo, linear rgb) that were drawn at vertices in it, and of their
 //! counted cost. Sums also exist of half the squared difference of two samples of the same vertex: their mean is the
 //! variance at a point, whereas `moment - mean^2` has the spread of the mean over the cell in it as well. And it keeps
-//! how many shadow rays from the leaf towards its directions met nothing.
+//! how many shadow rays from the leaf towards its directions met nothing, and the squared sums of light samples alone.
 //!
 //! There are several octrees, for kinds of vertices that should not be mixed, and the direction is the caller's choice:
 //! see [`Kind`]. Shards look up in what [`Cache::freeze`] computed and log into their own [`Training`]; between
@@ -49,7 +49,7 @@ impl CacheSize {
     pub const SMALLEST: Self = Self { splits: 0 };
 
     /// The largest cache whose shared side and `shards` training sides fit in `bytes` together; `None` if none does.
-    /// The smallest, four leaves that never split, takes 9.2 KiB and 3.25 KiB more for each shard.
+    /// The smallest, four leaves that never split, takes 9.7 KiB and 3.25 KiB more for each shard.
     pub fn within(bytes: usize, shards: u32) -> Option<Self> {
         let fits = |splits: u32| Self { splits }.bytes(shards).is_some_and(|b| b <= bytes);
         if !fits(0) {

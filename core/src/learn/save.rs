@@ -4,7 +4,7 @@
 //! |---|---|
 //! | 64 | [`Header`] |
 //! | nodes, padded to a multiple of 8 | shape: a byte per node, 1 inner, 0 leaf; parents first, children in order |
-//! | 1792 per leaf | sums of the leaves in the order of the shape |
+//! | 1920 per leaf | sums of the leaves in the order of the shape |
 //!
 //! All numbers are little-endian. The header says what the sums hang on: the bounds, which place the cells, and the
 //! objective, because values of [first vertices](super::cache::Kind::FirstMatte) are in units of their pixel under the

@@ -53,20 +53,21 @@ impl<'m> Training<'m> {
         finite && self.used_mut().get_mut(bin as usize).is_some_and(|r| r.add(x, cost))
     }
 
-    /// Adds half the squared difference of two samples of one vertex, per channel; an unbiased estimate of the variance
-    /// there. Limits as in [`Self::log`].
+    /// Adds half the squared difference of two samples of one vertex, per channel: of two that both drew a light sample
+    /// or both did not, an unbiased estimate of what varies if their numbers do not. Limits as in [`Self::log`].
     #[inline]
     pub fn log_pair(&mut self, bin: u32, half_squared_difference: [f32; 3]) -> bool {
         let finite = half_squared_difference.iter().all(|x| x.is_finite());
         finite && self.used_mut().get_mut(bin as usize).is_some_and(|r| r.add_pair(half_squared_difference))
     }
 
-    /// Adds what the light sample of a sample of `bin` gave: the sum over the channels of its square. Of samples that
-    /// draw none by chance the others must make up for it.
+    /// Adds what the light sample of a sample of `bin` gave, divided by the chance `drawn` that it was drawn; limits as
+    /// in [`Self::log`]. Its square counts `drawn` times, as if every sample had drawn one and none were divided.
     #[inline]
-    pub fn log_light(&mut self, bin: u32, square: f32) {
-        if let Some(r) = self.used_mut().get_mut(bin as usize).filter(|_| square.is_finite()) {
-            r.add_light(square);
+    pub fn log_light(&mut self, bin: u32, x: [f32; 3], drawn: f32) {
+        let finite = x.iter().all(|x| x.is_finite()) && drawn.is_finite();
+        if let Some(r) = self.used_mut().get_mut(bin as usize).filter(|_| finite) {
+            r.add_light(x, drawn);
         }
     }
 

@@ -74,8 +74,8 @@ pub trait RrsStrategy {
     /// Does it read `shininess`?
     const NEEDS_SHININESS: bool = false;
 
-    /// Is its factor the most efficient one (EARS, eq. 32), the rule of shadow roulette
-    /// ([`crate::Settings::shadow_roulette`])?
+    /// Is its factor the most efficient one (EARS, eq. 32), the rule of roulette for light
+    /// samples ([`crate::Settings::shadow_roulette`])?
     const EFFICIENCY_AWARE: bool = false;
 
     /// Does it read the picture's part of `learned`?

@@ -1,10 +1,11 @@
 //! What each sample gave: a fixed slab with one record per unfinished sample, nested like the samples themselves.
 //!
-//! A record belongs to one sample of a vertex (one light sample and one bounce) or to a camera sample. It gathers the
-//! sample's own estimate of reflected radiance, without any weight of the path before it, and its cost. The bounce ends
-//! at one vertex at most; what the samples of that vertex give comes back times `inner` (bounce weight over the
-//! vertex's factor). When the last of them is closed the sample is finished: it is logged to the bin of *its* vertex,
-//! which its parent record holds, and folded into the parent (EARS, SIGGRAPH 2022, algorithm 2, without the recursion).
+//! A record belongs to one sample of a vertex (one bounce and at most one light sample) or to a camera sample. It
+//! gathers the sample's own estimate of reflected radiance, without any weight of the path before it, and its cost. The
+//! bounce ends at one vertex at most; what the samples of that vertex give comes back times `inner` (bounce weight over
+//! the vertex's factor). When the last of them is closed the sample is finished: it is logged to the bin of *its*
+//! vertex, which its parent record holds, and folded into the parent (EARS, SIGGRAPH 2022, algorithm 2, without the
+//! recursion).
 //!
 //! When the slab is full a sample gets no record: it and what follows are not learned from, and the samples that
 //! contain it are incomplete, so they are not logged either. Nothing else changes; the image never passes through here.
@@ -23,8 +24,12 @@ pub(crate) const NO_BIN: u32 = u32::MAX;
 const INCOMPLETE: u32 = 1 << 31;
 /// `last` holds a finished sample of the vertex.
 const HAS_LAST: u32 = 1 << 30;
+/// The sample draws a light sample.
+const LIT: u32 = 1 << 29;
+/// That in `last` drew one.
+const LAST_LIT: u32 = 1 << 28;
 /// Bits of `open` that count.
-const OPEN: u32 = HAS_LAST - 1;
+const OPEN: u32 = LAST_LIT - 1;
 
 /// One unfinished sample, 64 bytes.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -57,7 +62,9 @@ pub(crate) struct Finished {
     pub value: [f32; 3],
     /// Counted cost.
     pub cost: f32,
-    /// Half the squared difference from the sample of the same vertex that finished before it.
+    /// Half the squared difference from the sample of the same vertex that finished before it, if light samples were
+    /// drawn for both or for neither. How many are drawn hardly varies, so the difference between those with and those
+    /// without is no noise.
     pub pair: Option<[f32; 3]>,
 }
 
@@ -87,10 +94,11 @@ impl<'m> Ledger<'m> {
         !self.records.is_empty()
     }
 
-    /// A record for a sample with one open lane; [`NO_RECORD`] if the slab is full.
-    pub(crate) fn open(&mut self, parent: u32) -> u32 {
+    /// A record for a sample with one open lane, `lit` if it draws a light sample; [`NO_RECORD`] if the slab is full.
+    pub(crate) fn open(&mut self, parent: u32, lit: bool) -> u32 {
         let Some(slot) = self.free.take() else { return NO_RECORD };
-        self.records[slot as usize] = Record { parent, open: 1, ..Zeroable::zeroed() };
+        let open = if lit { 1 | LIT } else { 1 };
+        self.records[slot as usize] = Record { parent, open, ..Zeroable::zeroed() };
         slot
     }
 
@@ -160,14 +168,16 @@ impl<'m> Ledger<'m> {
                 p.open |= INCOMPLETE;
             } else {
                 let value: [f32; 3] = core::array::from_fn(|c| done.radiance[c] * p.scale[c]);
-                let pair = (p.open & HAS_LAST != 0).then(|| {
+                let lit = done.open & LIT != 0;
+                let alike = p.open & HAS_LAST != 0 && lit == (p.open & LAST_LIT != 0);
+                let pair = alike.then(|| {
                     core::array::from_fn(|c| {
                         let d = value[c] - p.last[c];
                         0.5 * d * d
                     })
                 });
                 p.last = value;
-                p.open |= HAS_LAST;
+                p.open = p.open & !LAST_LIT | HAS_LAST | if lit { LAST_LIT } else { 0 };
                 for c in 0..3 {
                     p.radiance[c] += p.inner[c] * done.radiance[c];
                 }
@@ -218,6 +228,7 @@ mod tests {
         /// Children that have not ended.
         left: usize,
         recorded: bool,
+        lit: bool,
     }
 
     /// A logged sample of a vertex: value, rays, half squared difference.
@@ -235,8 +246,8 @@ mod tests {
             let me = self.samples.len();
             let found = [(); 2].map(|()| [(); 3].map(|()| r.below(16) as f32 / 8.0));
             let (rays, inner, scale) = (1 + r.below(2), r.power(), r.power());
-            let (children, left, recorded) = (Vec::new(), 0, false);
-            self.samples.push(Sample { parent, children, found, rays, inner, scale, left, recorded });
+            let (children, left, recorded, lit) = (Vec::new(), 0, false, r.below(2) == 0);
+            self.samples.push(Sample { parent, children, found, rays, inner, scale, left, recorded, lit });
             self.ended.push(Vec::new());
             let n = if depth < 5 { r.below(5) } else { 0 };
             let children: Vec<usize> = (0..n).map(|_| self.grow(Some(me), depth + 1, r)).collect();
@@ -275,13 +286,15 @@ mod tests {
 
         /// What must be logged of the vertex that `s` led to.
         fn expected(&self, s: usize) -> Vec<Logged> {
-            let mut last: Option<[f64; 3]> = None;
+            let mut last: Option<(bool, [f64; 3])> = None;
             let complete = self.ended[s].iter().copied().filter(|&c| self.complete(c));
             let log = complete.map(|child| {
                 let (x, rays) = self.worth(child);
                 let x = [0, 1, 2].map(|c| x[c] * f64::from(self.samples[s].scale[c]));
-                let pair = last.map(|l| [0, 1, 2].map(|c| (0.5 * (x[c] - l[c]) * (x[c] - l[c])) as f32));
-                last = Some(x);
+                let lit = self.samples[child].lit;
+                let alike = last.filter(|l| l.0 == lit);
+                let pair = alike.map(|(_, l)| [0, 1, 2].map(|c| (0.5 * (x[c] - l[c]) * (x[c] - l[c])) as f32));
+                last = Some((lit, x));
                 (x.map(|x| x as f32), rays as f32, pair)
             });
             log.collect()
@@ -302,7 +315,7 @@ mod tests {
         let mut log = |f: Finished| logged[f.bin as usize].push((f.value, f.cost, f.pair));
         let (mut work, mut refused) = (Vec::new(), 0);
         for &root in roots {
-            let slot = ledger.open(NO_RECORD);
+            let slot = ledger.open(NO_RECORD, false);
             forest.samples[root].recorded = slot != NO_RECORD;
             work.push(Work::Lane(root, slot));
         }
@@ -330,7 +343,8 @@ mod tests {
                     ledger.draw(slot, m as u32, first + m == all);
                     for k in first..first + m {
                         let child = forest.samples[s].children[k];
-                        let record = if slot == NO_RECORD { NO_RECORD } else { ledger.open(slot) };
+                        let lit = forest.samples[child].lit;
+                        let record = if slot == NO_RECORD { NO_RECORD } else { ledger.open(slot, lit) };
                         if slot != NO_RECORD && record == NO_RECORD {
                             refused += 1;
                             ledger.spoil(slot);
@@ -350,9 +364,9 @@ mod tests {
 
     /// Random trees, several at a time, in random order, through slabs that suffice and slabs that do not: what is
     /// logged is what recursion gives, for complete samples and for no others, and every slot comes back. Killed by:
-    /// values times the child's own scale, `inner` left out or applied twice, rays that stay with the child, a pair
-    /// with a sample of another vertex, a spoiled sample whose parents are not, a drained vertex that counts on, a slot
-    /// not given back.
+    /// values times the child's own scale, pairs of a sample with light and one without, `inner` left out or applied
+    /// twice, rays that stay with the child, a pair with a sample of another vertex, a spoiled sample whose parents are
+    /// not, a drained vertex that counts on, a slot not given back.
     #[test]
     fn what_is_logged_is_what_recursion_gives() {
         let mut r = Random(5);

@@ -1,5 +1,5 @@
-//! The packet machine. One turn takes eight samples from waiting vertices of one class (or eight camera samples)
-//! through the stages, each its own file:
+//! The packet machine. One turn takes eight samples from waiting vertices of one class, all with a light sample or all
+//! without (or eight camera samples), through the stages, each its own file:
 //!
 //! `refill` -> `scatter` -> `occlude` -> `trace` -> `surface` -> `roulette` -> `settle`
 //!
@@ -31,7 +31,7 @@ use crate::settings::Settings;
 use crate::tiles::{TILE_PIXELS, Tiles};
 
 /// Bytes of a waiting vertex, its slots in the rings and its root: the state per path.
-pub const BYTES_PER_PATH: usize = size_of::<vertex::Vertex>() + 4 * (vertex::CLASSES + 1) + size_of::<root::Root>() + 4;
+pub const BYTES_PER_PATH: usize = size_of::<vertex::Vertex>() + 4 * (vertex::RINGS + 1) + size_of::<root::Root>() + 4;
 
 /// Camera samples in flight: every waiting vertex may have its own, and so may the lanes of a packet.
 fn roots_capacity(settings: &Settings) -> usize {

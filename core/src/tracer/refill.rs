@@ -96,7 +96,7 @@ impl Shard<'_> {
             root[lanes] = r;
             weight[lanes] = importance;
             if self.ledger.is_on() && s < settings.learning.samples {
-                ledger[lanes] = self.ledger.open(NO_RECORD);
+                ledger[lanes] = self.ledger.open(NO_RECORD, false);
                 self.counters.ledger_full += u64::from(ledger[lanes] == NO_RECORD);
             }
             lanes += 1;

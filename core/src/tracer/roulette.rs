@@ -1,11 +1,11 @@
 //! Stage `roulette`: how many samples each arrived vertex gets. The masks n = 0 (the path ends) and n >= 1 (it waits
-//! with n samples) are the packet's roulette masks; one comb rounds the whole packet.
+//! with n samples) are the packet's roulette masks; one comb rounds the whole packet, another deals out light samples.
 
 use super::ledger::{NO_BIN, NO_RECORD};
 use super::place::{Place8, place};
 use super::settle::Found8;
 use super::shard::Shard;
-use super::vertex::{RESERVE, Vertex8, samples};
+use super::vertex::{RESERVE, Vertex8, pack_samples};
 use crate::accel::Intersector;
 use crate::bsdf;
 use crate::light::LightSelector;
@@ -102,7 +102,7 @@ impl Shard<'_> {
         a.vertex.beta = beta;
         a.vertex.drawn = drawn;
         a.vertex.albedo_product *= a.albedo.mean();
-        a.vertex.samples = U32x8::from_fn(|i| samples(n[i], lit[i]));
+        a.vertex.samples = U32x8::from_fn(|i| pack_samples(n[i], lit[i]));
         a.vertex.bin = logged.map_or(U32x8::splat(NO_BIN), |p| p.bin);
         let records = a.vertex.records();
         for i in a.active.lanes() {
@@ -122,7 +122,7 @@ impl Shard<'_> {
     }
 
     /// How many of the `n` samples of each vertex draw a light sample, if each does with the chance `drawn`: one more
-    /// comb. Vertices that nothing draws one for keep theirs, so that they all wait in one ring.
+    /// comb. Delta vertices, which draw none anyway, keep n, so that all wait in one ring.
     fn lit(&mut self, n: [u32; 8], drawn: F32x8, a: &Arrival8<'_>) -> [u32; 8] {
         let delta = (0..8).fold(0, |m, i| m | (bsdf::delta_kinds() >> a.kind[i] & 1) << i);
         let play = (a.active & drawn.lt(F32x8::ONE)).and_not(Mask8::from_bits(delta));

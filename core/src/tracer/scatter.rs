@@ -1,5 +1,5 @@
-//! Stage `scatter`: eight samples of vertices of one class. Each sample is one light sample and one scattered ray
-//! (EARS' atomic sample), combined by multiple importance sampling.
+//! Stage `scatter`: eight samples of vertices of one class. Each sample is one scattered ray and, unless roulette
+//! spares it, one light sample (EARS' atomic sample), combined by multiple importance sampling.
 
 use super::flight::Flight8;
 use super::ledger::{NO_BIN, NO_RECORD};
@@ -67,7 +67,7 @@ impl<'s> Visitor<'s> for Scatter<'_, 's> {
 }
 
 impl Shard<'_> {
-    /// Scatters a packet of the fullest class, or of the next from which a sample fits.
+    /// Scatters a packet of the fullest ring, or of the next from which a sample fits.
     pub(super) fn scatter<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
         session: &Session<'_, '_, P, I, L>,
@@ -85,28 +85,29 @@ impl Shard<'_> {
         self.counters.scatter.count(batch.lanes as u32);
         self.counters.vertex_samples += batch.lanes as u64;
 
-        let ledger = self.open_records(&batch);
+        let lit = ring < CLASSES;
+        let ledger = self.open_records(&batch, lit);
         let key = v.key.child(batch.sample);
         let [u0, u1, u2, _] = key.uniforms(SCATTER_BLOCK);
-        let lit = active & v.depth.lt(U32x8::splat(session.max_depth()));
+        let going = active & v.depth.lt(U32x8::splat(session.max_depth()));
         let delta = bsdf::delta_kinds() >> kind as u32 & 1 == 1;
-        let light = if ring >= CLASSES || delta || lit.none() || scene.lights.is_empty() {
+        let light = if !lit || delta || going.none() || scene.lights.is_empty() {
             None
         } else {
-            Some(sample_lights::<P>(scene, session, v, key, lit))
+            Some(sample_lights::<P>(scene, session, v, key, going))
         };
         let kernel = Scatter { scene, vertex: v, active, light: light.map(|l| l.wi), u: [u0, u1, u2] };
         let out = bsdf::dispatch_in(P::EFFECTS, kind, kernel)?;
         if let Some(l) = light {
-            self.counters.distances_clamped += u64::from((lit & l.clamped).count());
-            self.light_contribution(session, &LitSamples { vertex: v, ledger, key }, &l, &out.light, lit & l.valid);
+            self.counters.distances_clamped += u64::from((going & l.clamped).count());
+            self.light_contribution(session, &LitSamples { vertex: v, ledger, key }, &l, &out.light, going & l.valid);
         }
 
         let s = &out.sample;
         let wi = out.frame.to_world(s.wi);
         let beta = v.beta * s.weight;
-        let flying = lit & s.valid & beta.any_positive();
-        let broken = lit & s.valid & !beta.is_finite();
+        let flying = going & s.valid & beta.any_positive();
+        let broken = going & s.valid & !beta.is_finite();
         let root = v.root.to_array();
         for i in broken.lanes() {
             self.count_non_finite(root[i]);
@@ -132,8 +133,8 @@ impl Shard<'_> {
         })
     }
 
-    /// Takes samples of a class and books them on their roots and ledger records: a lane each, less the vertex if it is
-    /// drained.
+    /// Takes samples from a ring and books them on their roots and ledger records: a lane each, less the vertex if it
+    /// is drained.
     fn take(&mut self, ring: usize) -> Option<Batch> {
         let (roots, ledger) = (&mut self.roots, &mut self.ledger);
         self.pool.take(ring, |v, lanes, drained| {
@@ -143,7 +144,7 @@ impl Shard<'_> {
     }
 
     /// A ledger record for each sample of a packet, as long as there are any.
-    fn open_records(&mut self, batch: &Batch) -> U32x8 {
+    fn open_records(&mut self, batch: &Batch, lit: bool) -> U32x8 {
         let mut out = [NO_RECORD; 8];
         if self.ledger.is_on() {
             let parents = batch.vertex.ledger.to_array();
@@ -151,7 +152,7 @@ impl Shard<'_> {
                 if parent == NO_RECORD {
                     continue;
                 }
-                *record = self.ledger.open(parent);
+                *record = self.ledger.open(parent, lit);
                 if *record == NO_RECORD {
                     self.counters.ledger_full += 1;
                     self.ledger.spoil(parent);
@@ -176,18 +177,19 @@ impl Shard<'_> {
         let radiance = v.beta * f.f * l.radiance * weight;
         let mut found = Found8 { pixel: radiance, local: f.f * l.radiance * weight };
         let mut mask = mask & (radiance.any_positive() | !radiance.is_finite());
-        let mut bin = None;
-        if mask.any() && self.plan.settings().shadow_roulette {
+        let towards = if mask.any() && self.plan.settings().shadow_roulette {
             let towards = session.knowledge().bins_towards(v.bin, l.wi, mask);
             mask = self.shadow_roulette(session, s, towards, &mut found, mask);
-            bin = Some(towards);
-        }
+            towards
+        } else {
+            U32x8::splat(NO_BIN)
+        };
         if mask.none() {
             return;
         }
         let clear = self.occlude(session, s, l, mask);
-        if let Some(bin) = bin {
-            self.learn_light(s, bin, mask, clear, &found);
+        if self.training.is_some() {
+            self.learn_light(s, towards, mask, clear, &found);
         }
         self.gather(clear, v.root, s.ledger, &found);
     }
@@ -211,22 +213,23 @@ impl Shard<'_> {
         on
     }
 
-    /// Tells the statistics what came of the shadow rays of `traced` in directions of the bins `bin`: those of `clear`
-    /// met nothing, and found what they say.
-    fn learn_light(&mut self, s: &LitSamples<'_>, bin: U32x8, traced: Mask8, clear: Mask8, found: &Found8) {
-        let Some(training) = &mut self.training else { return };
+    /// Tells the statistics what came of the shadow rays of `traced`: those of `clear` met nothing, and found what they
+    /// say. With roulette for light samples, `towards` are the bins of their directions.
+    fn learn_light(&mut self, s: &LitSamples<'_>, towards: U32x8, traced: Mask8, clear: Mask8, found: &Found8) {
         let v = s.vertex;
-        let known = bin.lt(U32x8::splat(NO_BIN)).and_not(s.ledger.eq(U32x8::splat(NO_RECORD)));
-        for i in (traced & known).lanes() {
-            let taken = training.log_shadow(bin.lane(i), clear.lane(i));
+        let logged = traced.and_not(s.ledger.eq(U32x8::splat(NO_RECORD)));
+        if logged.none() {
+            return;
+        }
+        let local = found.local * self.tamed(clear & logged, found.pixel, v.root);
+        let Some(training) = &mut self.training else { return };
+        for i in (logged & towards.lt(U32x8::splat(NO_BIN))).lanes() {
+            let taken = training.log_shadow(towards.lane(i), clear.lane(i));
             self.counters.shadows_refused += u64::from(!taken);
         }
-        let local = found.local * self.tamed(clear & known, found.pixel, v.root);
-        let Some(training) = &mut self.training else { return };
-        for i in (clear & known).lanes() {
+        for i in (clear & logged).lanes() {
             let (x, scale) = (local.lane(i), self.ledger.scale(v.ledger.lane(i)));
-            let square: f32 = x.iter().zip(scale).map(|(x, s)| (x * s) * (x * s)).sum();
-            training.log_light(v.bin.lane(i), square * v.drawn.lane(i));
+            training.log_light(v.bin.lane(i), [0, 1, 2].map(|c| x[c] * scale[c]), v.drawn.lane(i));
         }
     }
 }

@@ -77,7 +77,7 @@ pub struct Shard<'m> {
     pub(super) aovs: &'m mut [PixelAov],
     /// Error of a sample beyond which it is an outlier to the statistics.
     pub(super) outlier: f32,
-    /// Numbers of the combs, one per packet.
+    /// Numbers of the combs.
     comb: Pcg32,
     pub(super) counters: Counters,
 }

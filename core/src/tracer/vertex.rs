@@ -49,7 +49,7 @@ pub(crate) struct Vertex8 {
     pub albedo_product: F32x8,
     /// Ledger record of the sample that led here.
     pub ledger: U32x8,
-    /// Samples left, the number of the next one, and how many of those left draw a light sample: see [`samples`].
+    /// Samples left, the number of the next one, and how many of those left draw a light sample: see [`pack_samples`].
     pub samples: U32x8,
     /// Chance of a sample to draw a light sample ([`crate::rrs::Learned8::drawn`]).
     pub drawn: F32x8,
@@ -66,7 +66,7 @@ const SAMPLES: (usize, usize) = (3, 2);
 
 /// The word of a vertex with `count` samples to draw, the first `lit` of them with a light sample. A byte each: no
 /// factor is larger than [`crate::rrs::MAX_FACTOR`].
-pub(crate) fn samples(count: u32, lit: u32) -> u32 {
+pub(crate) fn pack_samples(count: u32, lit: u32) -> u32 {
     debug_assert!(count < 256 && lit <= count);
     count | lit << 16
 }
@@ -217,7 +217,7 @@ pub(crate) struct Batch {
     pub lanes: usize,
 }
 
-/// All waiting vertices of a shard: a slab of records, a list of free slots and one ring per class.
+/// All waiting vertices of a shard: a slab of records, a list of free slots and two rings per class.
 #[derive(Debug)]
 pub(crate) struct Pool<'m> {
     records: &'m mut [Vertex],
@@ -286,7 +286,8 @@ impl<'m> Pool<'m> {
     }
 
     /// Takes up to eight samples from a ring, newest vertices first, so that even if every one of them goes on there is
-    /// a slot for each. A vertex that has no light samples left goes over to the other ring of its class. Calls `taken(vertex, lanes, drained)` per vertex. `None` if no sample fits.
+    /// a slot for each. A vertex that has no light samples left goes over to the other ring of its class. Calls
+    /// `taken(vertex, lanes, drained)` per vertex. `None` if no sample fits.
     pub(crate) fn take(&mut self, ring: usize, mut taken: impl FnMut(&Vertex, u32, bool)) -> Option<Batch> {
         let mut slot = [0u32; 8];
         let mut sample = [0u32; 8];
@@ -345,7 +346,7 @@ mod tests {
 
     fn vertex(count: u32, lit: u32) -> Vertex {
         let mut v: Vertex = Zeroable::zeroed();
-        v.rows[SAMPLES.0][SAMPLES.1] = f32::from_bits(samples(count, lit));
+        v.rows[SAMPLES.0][SAMPLES.1] = f32::from_bits(pack_samples(count, lit));
         v
     }
 

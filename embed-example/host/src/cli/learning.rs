@@ -16,7 +16,7 @@ pub struct LearningFlags {
     /// More samples for pixels with much error, fewer for others
     #[arg(long)]
     adaptive: bool,
-    /// Roulette for shadow rays too [default: true with ear and ears]
+    /// Roulette for light samples and their shadow rays too [default: true with ear and ears]
     #[arg(long, value_name = "true|false", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     shadow_roulette: Option<bool>,
     /// What stands in for samples that roulette skips: off, cached (the learned mean) or a radiance
