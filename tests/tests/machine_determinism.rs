@@ -79,7 +79,7 @@ fn schedules_do_not_change_what_is_learned() {
             let (_, reference, learned) = &seen[0];
             let c = reference.counters;
             assert!(c.samples_logged > 1000 && c.roulette_kills > 100 && c.splits > 100, "{c:?}");
-            assert!(learned[2].1[0].variance > 0.0 && (!all || c.shadow_kills > 100 && c.light_kills > 100));
+            assert!(learned[2].1[0].variance > 0.0 && (!all || c.shadow_kills > 100 && c.light_kills > 10), "{c:?}");
             for (schedule, image, other) in &seen[1..] {
                 let what = format!("{name}, everything on {all}, {schedule:?}");
                 assert!(other == learned, "{what}: other statistics");
