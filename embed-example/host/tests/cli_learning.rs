@@ -253,7 +253,7 @@ fn everything_at_once() {
         assert!(words.contains(part), "{words}");
     }
     let crowded =
-        ["--rrs", "ears", "--spp", "200", "--learn-samples", "64", "--stats", "--cache-bytes", "16KiB", "-o", "w.exr"];
+        ["--rrs", "ears", "--spp", "200", "--learn-samples", "64", "--stats", "--cache-bytes", "17KiB", "-o", "w.exr"];
     let words = text(&render(dir, &crowded).stdout);
     assert!(words.contains(" splits refused so far for lack of room"), "{words}");
 }
@@ -272,7 +272,7 @@ fn every_flag_changes_the_picture() {
         &["--objective", "absolute"],
         &["--norm", "luminance"],
         &["--norm", "max"],
-        &["--cache-bytes", "16KiB"],
+        &["--cache-bytes", "17KiB"],
         &["--ring", "16"],
         &["--split-budget", "0"],
         &["--ledger", "16"],
