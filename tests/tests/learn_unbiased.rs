@@ -222,10 +222,10 @@ fn choices_do_not_bias() {
     check("adaptive", "ears", &|s| s.adaptive = true);
     check("adaptive", "none", &|s| s.adaptive = true);
     let c = check("shadow roulette", "ears", &|s| s.shadow_roulette = true);
-    assert!(c.shadow_kills > c.shadow_rays / 50 && c.light_kills > c.vertex_samples / 50, "{c:?}");
+    assert!(c.shadow_kills > c.shadow_rays / 50 && c.light_kills > 5000, "{c:?}");
     check("shadow roulette", "classic", &|s| s.shadow_roulette = true);
     let c = check("shadow roulette", "bolin-meyer", &|s| s.shadow_roulette = true);
-    assert!(c.light_kills > c.vertex_samples / 100, "{c:?}");
+    assert!(c.light_kills > 1000, "{c:?}");
     check("cached constant", "ears", &|s| s.constant = Constant::Cached);
     check("cached constant", "ear:plain", &|s| s.constant = Constant::Cached);
     check("constant of 0.3", "fixed:0.7", &|s| s.constant = Constant::Number(0.3));
