@@ -98,7 +98,7 @@ impl Shard<'_> {
         let beta = v.beta / s;
         let plays = settings.shadow_roulette && logged.is_some();
         let drawn = if plays { learned.drawn(beta, a.albedo) } else { F32x8::ONE };
-        let lit = self.lit(n, drawn, &a);
+        let lit = if plays { self.lit(n, drawn, &a) } else { n };
         a.vertex.beta = beta;
         a.vertex.drawn = drawn;
         a.vertex.albedo_product *= a.albedo.mean();

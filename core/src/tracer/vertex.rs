@@ -374,8 +374,8 @@ mod tests {
                     started += 8;
                     8
                 } else {
-                    let rings = [pool.fullest().0].into_iter().chain(0..RINGS);
-                    let batch = rings.into_iter().find_map(|r| Some((r, pool.take(r, |_, _, _| ())?)));
+                    let mut rings = [pool.fullest().0].into_iter().chain(0..RINGS);
+                    let batch = rings.find_map(|r| Some((r, pool.take(r, |_, _, _| ())?)));
                     let (ring, batch) = batch.expect("some ring must always have a sample that fits");
                     waiting_lit -= if ring < CLASSES { batch.lanes as u64 } else { 0 };
                     assert!(pool.free() >= batch.lanes, "a lane has no slot to go on to");
