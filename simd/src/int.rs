@@ -110,6 +110,13 @@ impl U32x8 {
         (self >> 8).to_i32().to_f32() * (1.0 / 16_777_216.0)
     }
 
+    /// Smallest lane.
+    #[inline(always)]
+    pub fn min_lane(self) -> u32 {
+        let a = self.to_array();
+        a[0].min(a[4]).min(a[2].min(a[6])).min(a[1].min(a[5]).min(a[3].min(a[7])))
+    }
+
     /// The same bits as signed numbers.
     #[inline(always)]
     pub fn to_i32(self) -> I32x8 {

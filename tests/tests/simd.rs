@@ -159,6 +159,8 @@ fn lanes_move_and_sum_in_the_documented_order() {
         order_matters |= a.iter().sum::<f32>() != want;
         assert_eq!(v.min_lane(), a.into_iter().fold(f32::INFINITY, f32::min));
         assert_eq!(v.max_lane(), a.into_iter().fold(f32::NEG_INFINITY, f32::max));
+        let bits = a.map(|x| x.to_bits() << 1);
+        assert_eq!(U32x8::new(bits).min_lane(), bits.into_iter().min().unwrap());
     }
     assert!(order_matters, "the sums must be able to tell the order");
 }

@@ -157,20 +157,22 @@ impl Set {
     }
 }
 
-/// Primary rays in blocks of 4 x 2 pixels.
+/// Primary rays in the order in which a render traces them: tiles of 8 x 8 pixels, in each the Morton order, so that
+/// eight rays are a block of 4 x 2.
 fn primary(camera: &Camera, width: usize) -> Vec<One> {
-    let width = width.next_multiple_of(4);
-    let height = ((width as f32 / camera.aspect) as usize).next_multiple_of(2);
+    let width = width.next_multiple_of(8);
+    let height = ((width as f32 / camera.aspect) as usize).next_multiple_of(8);
     let forward = (camera.target - camera.origin).normalize();
     let right = forward.cross(camera.up).normalize();
     let up = right.cross(forward);
     let h = (camera.vfov.to_radians() * 0.5).tan();
     let mut out = Vec::with_capacity(width * height);
-    for y in (0..height).step_by(2) {
-        for x in (0..width).step_by(4) {
-            for i in 0..8 {
-                let sx = 2.0 * ((x + i % 4) as f32 + 0.5) / width as f32 - 1.0;
-                let sy = 1.0 - 2.0 * ((y + i / 4) as f32 + 0.5) / height as f32;
+    let even_bits = |x: usize| x & 1 | x >> 1 & 2 | x >> 2 & 4;
+    for y in (0..height).step_by(8) {
+        for x in (0..width).step_by(8) {
+            for i in 0..64 {
+                let sx = 2.0 * ((x + even_bits(i)) as f32 + 0.5) / width as f32 - 1.0;
+                let sy = 1.0 - 2.0 * ((y + even_bits(i >> 1)) as f32 + 0.5) / height as f32;
                 let d = forward + right * (sx * h * camera.aspect) + up * (sy * h);
                 out.push(One { o: camera.origin, d: d.normalize(), tmax: f32::INFINITY });
             }

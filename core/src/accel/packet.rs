@@ -141,7 +141,11 @@ pub(super) fn walk_packet<const ANY: bool>(
                 let met = enter.le(leave);
                 let enter = enter.to_array();
                 let start = sp;
-                for i in met.lanes() {
+                let mut left = met.bits();
+                // any hit: the first slot on top
+                while left != 0 {
+                    let i = left.ilog2() as usize & 7;
+                    left ^= 1 << i;
                     let key = u64::from(enter[i].to_bits()) << 32 | u64::from(child << 3 | i as u32);
                     let mut p = sp;
                     while !ANY && p > start && keys[(p - 1) & (STACK - 1)] < key {
@@ -157,7 +161,7 @@ pub(super) fn walk_packet<const ANY: bool>(
             if n < triangles {
                 for i in Mask8::from_bits(rays).lanes() {
                     let mut h = b.lane(i);
-                    if test_leaf::<ANY>(leaf, s, i, entry.lane(i), &mut h) {
+                    if test_leaf::<ANY, true>(leaf, s, i, entry.lane(i), &mut h) {
                         changed = true;
                         if ANY {
                             occluded |= 1 << i;
@@ -170,7 +174,7 @@ pub(super) fn walk_packet<const ANY: bool>(
             } else {
                 for i in 0..triangles as usize {
                     let p = each(|v| each(|k| F32x8::splat(leaf.p[3 * v + axes[k]][i])));
-                    let Some(c) = intersect::<ANY>(&p, &line, b.t) else { continue };
+                    let Some(c) = intersect::<ANY, true>(&p, &line, b.t) else { continue };
                     // rays that miss the leaf's box miss its triangles, also when they go alone
                     let mask = c.mask & inside;
                     if ANY {

@@ -55,9 +55,14 @@ pub(super) struct Line<'a> {
 }
 
 /// Lanes with `tmin < t <= limit` inside the triangle; `ANY`: for rays that end at `limit`, others treat it as the
-/// closest hit so far. Degenerate triangles (no area seen along the ray) are missed.
+/// closest hit so far. Degenerate triangles (no area seen along the ray) are missed. `EARLY`: returns as soon as no lane
+/// is left; else no branch depends on the edges.
 #[inline(always)]
-pub(super) fn intersect<const ANY: bool>(p: &Vertices, r: &Line<'_>, limit: F32x8) -> Option<Candidates> {
+pub(super) fn intersect<const ANY: bool, const EARLY: bool>(
+    p: &Vertices,
+    r: &Line<'_>,
+    limit: F32x8,
+) -> Option<Candidates> {
     let shear = |p: &[F32x8; 3]| {
         let z = p[2] - r.o[2];
         [(p[0] - r.o[0]) - r.shear[0] * z, (p[1] - r.o[1]) - r.shear[1] * z, z]
@@ -68,14 +73,14 @@ pub(super) fn intersect<const ANY: bool>(p: &Vertices, r: &Line<'_>, limit: F32x
     let zero = F32x8::ZERO;
     // both sides hold where all three are 0 (no area seen, unused slots): exclusive or drops those
     let inside = u.min(v).min(w).ge(zero) ^ u.max(v).max(w).le(zero);
-    if inside.none() {
+    if EARLY && inside.none() {
         return None;
     }
     let scale = F32x8::ONE / (u + v + w);
     // NaN from garbage fails here
     let t = (u * a[2] + v * b[2] + w * c[2]) * scale * r.shear[2];
     let mut mask = inside & t.gt(r.tmin) & t.le(limit);
-    if mask.none() {
+    if EARLY && mask.none() {
         return None;
     }
     let behind = (a[2] * r.shear[2]).min(b[2] * r.shear[2]).min(c[2] * r.shear[2]).lt(zero);

@@ -133,11 +133,15 @@ impl Writer<'_> {
         }
         node.child = [NONE; 8];
         self.out.nodes.push(node);
-        for (slot, source) in self.children(source, level).into_iter().enumerate() {
-            let (bounds, leaf) = match &source {
-                Source::Binary(i) => (self.tree[*i].bounds, self.plans[*i].leaf),
-                Source::Median(ids) => (self.bounds(ids), ids.len() <= WIDTH),
-            };
+        let about = |source| match source {
+            Source::Binary(i) => (self.tree[i].bounds, self.plans[i].leaf, source),
+            Source::Median(ids) => (self.bounds(&ids), ids.len() <= WIDTH, Source::Median(ids)),
+        };
+        let mut children: Vec<_> = self.children(source, level).into_iter().map(about).collect();
+        // rays that look for any hit go through the slots in this order: most hits for the least work
+        children
+            .sort_by(|(a, a_leaf, _), (b, b_leaf, _)| b_leaf.cmp(a_leaf).then(b.half_area().total_cmp(&a.half_area())));
+        for (slot, (bounds, leaf, source)) in children.into_iter().enumerate() {
             let child = if leaf { self.leaf(source) } else { self.node(source, level + 1) };
             let node = &mut self.out.nodes[me];
             node.child[slot] = child;
