@@ -38,6 +38,10 @@ struct Args {
     /// Only sets whose name contains this.
     #[arg(long, default_value = "")]
     only: String,
+    /// Instead of the table: nanoseconds per ray when windows of this many packets are traced again and again, which
+    /// tells what waiting for memory and unpredictable branches cost.
+    #[arg(long, value_name = "PACKETS", conflicts_with = "json")]
+    window: Option<std::num::NonZeroUsize>,
     /// One line of JSON instead of the table.
     #[arg(long)]
     json: bool,
@@ -227,22 +231,32 @@ struct Kernels<'a> {
 const NAMES: [&str; 3] = ["croupier", "obvhs Bvh2", "obvhs CwBvh"];
 
 impl Kernels<'_> {
+    /// Runs the built-in traversal; returns hits and a checksum.
+    fn packets(&self, packets: &[(Ray8, Mask8)], any: bool) -> (usize, f64) {
+        let (mut n, mut sum) = (0, 0.0);
+        for (ray, active) in packets {
+            if any {
+                n += self.wide.occluded(ray, *active).count() as usize;
+            } else {
+                let h: Hit8 = self.wide.closest(ray, *active);
+                n += h.hit.count() as usize;
+                sum += f64::from(h.hit.zero_unless(h.t).sum());
+            }
+        }
+        (n, sum)
+    }
+
+    /// Seconds of the built-in traversal over the set: windows of `size` packets, each traced `times` in a row.
+    fn windows(&self, set: &Set, size: usize, times: usize) -> f64 {
+        let again = |w| (0..times).map(|_| black_box(self.packets(black_box(w), set.any)).0).sum::<usize>();
+        timed(|| set.packets.chunks(size).map(again).sum::<usize>()).1
+    }
+
     /// Runs kernel `k` over the set; returns hits and a checksum.
     fn run(&self, k: usize, set: &Set) -> (usize, f64) {
         let (mut n, mut sum) = (0, 0.0);
         match (k, set.any) {
-            (0, false) => {
-                for (ray, active) in &set.packets {
-                    let h: Hit8 = self.wide.closest(ray, *active);
-                    n += h.hit.count() as usize;
-                    sum += f64::from(h.hit.zero_unless(h.t).sum());
-                }
-            }
-            (0, true) => {
-                for (ray, active) in &set.packets {
-                    n += self.wide.occluded(ray, *active).count() as usize;
-                }
-            }
+            (0, _) => (n, sum) = self.packets(&set.packets, set.any),
             (_, false) => {
                 for ray in &set.single {
                     let mut h = RayHit::none();
@@ -350,6 +364,21 @@ fn main() {
     ];
 
     let sets: Vec<Set> = sets.into_iter().filter(|s| s.name.contains(&args.only)).collect();
+    if let Some(size) = args.window {
+        println!("nanoseconds per ray, windows of {size} packets: the first time, again");
+        for set in &sets {
+            let mut rounds = vec![Vec::new(); 2];
+            for _ in 0..args.rounds.max(1) {
+                let once = kernels.windows(set, size.get(), 1);
+                let again = (kernels.windows(set, size.get(), 4) - once) / 3.0;
+                rounds[0].push(once);
+                rounds[1].push(again);
+            }
+            let [once, again] = [0, 1].map(|i| 1e9 * median(rounds[i].clone()).0 / set.single.len() as f64);
+            println!("{:<10}{once:>8.1}{again:>8.1}", set.name);
+        }
+        return;
+    }
     // enough passes per measurement to average over what else the machine does
     let mut passes = vec![[1u32; 3]; sets.len()];
     for (set, passes) in sets.iter().zip(&mut passes) {
