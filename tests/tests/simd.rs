@@ -140,7 +140,8 @@ fn integers_wrap_and_unit_floats_stay_below_one() {
     }
 }
 
-// Killed by: a reduction from left to right; two rows exchanged in transpose; lane numbers not masked.
+// Killed by: a reduction from left to right; two rows exchanged in transpose; lane numbers not masked; a minimum of
+// signed numbers.
 #[test]
 fn lanes_move_and_sum_in_the_documented_order() {
     let rows: [F32x8; 8] = std::array::from_fn(|r| F32x8::from_fn(|c| (10 * r + c) as f32));

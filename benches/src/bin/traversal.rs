@@ -3,7 +3,7 @@
 //! Sets: primary rays, first and third diffuse bounce, shadow rays from primary and from first-bounce hits towards a
 //! square lamp below the top of the scene. Kernels take turns inside each round; the table shows medians over the
 //! rounds, the spread between the quartiles, and the ratio to Bvh2. Times are CPU times of this thread where the system
-//! tells them. Answers are checked against each other first.
+//! tells them. Answers are checked against each other first (not with `--window`).
 //!
 //! Beware: `glam` with `scalar-math` anywhere in the same build turns obvhs's own vectors scalar, which about halves
 //! its Bvh2 on closest hits. The first line of the output says which it is.
@@ -161,8 +161,8 @@ impl Set {
     }
 }
 
-/// Primary rays in the order in which a render traces them: tiles of 8 x 8 pixels, in each the Morton order, so that
-/// eight rays are a block of 4 x 2.
+/// Primary rays in the order of a render with one sample per pixel: tiles of 8 x 8 pixels, in each the Morton order, so
+/// that eight rays are a block of 4 x 2.
 fn primary(camera: &Camera, width: usize) -> Vec<One> {
     let width = width.next_multiple_of(8);
     let height = ((width as f32 / camera.aspect) as usize).next_multiple_of(8);

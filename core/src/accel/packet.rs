@@ -10,6 +10,7 @@
 //! 1. The eight children are tested at once against intervals of the packet's origins and inverse directions, then
 //!    eight rays at once against each survivor. Every step is monotone (see `setup`): the intervals never reject a
 //!    child that one of the rays enters.
+//!    Rays that look for any hit take the children in the order of their slots instead.
 //! 2. A leaf costs one test per triangle (eight rays each) or one per ray (eight triangles each), whichever is fewer.
 //! 3. The stack holds the interval's entry and where the child's box is, eight bytes. The rays are tested against the
 //!    box when it is popped: fewer tests, as some are behind a hit by then, and a fifth of the memory of keeping their

@@ -55,8 +55,8 @@ pub(super) struct Line<'a> {
 }
 
 /// Lanes with `tmin < t <= limit` inside the triangle; `ANY`: for rays that end at `limit`, others treat it as the
-/// closest hit so far. Degenerate triangles (no area seen along the ray) are missed. `EARLY`: returns as soon as no lane
-/// is left; else no branch depends on the edges.
+/// closest hit so far. Degenerate triangles (no area seen along the ray) are missed. `EARLY`: returns as soon as no
+/// lane is left; else only doubtful hits are a branch.
 #[inline(always)]
 pub(super) fn intersect<const ANY: bool, const EARLY: bool>(
     p: &Vertices,

@@ -195,8 +195,8 @@ pub struct SceneInfo {
     pub dropped_triangles: u32,
 }
 
-/// Eight child boxes and references. Unused slots hold an empty box (+inf, -inf) and [`NONE`]. Any order is right; rays
-/// that look for any hit try the first slot first, so leaves and large boxes belong there.
+/// Eight child boxes and references. Unused slots hold an empty box (+inf, -inf) and [`NONE`]. Any slots are right;
+/// rays that look for any hit try the first ones first, so leaves and large boxes belong there.
 ///
 /// Nodes and leaves are numbered depth-first in preorder, children in slot order: walking the tree from node 0 that way
 /// meets nodes 0, 1, 2 ... and, counted apart, leaves 0, 1, 2 ... Each triangle is in exactly one leaf, every vertex
