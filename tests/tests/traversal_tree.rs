@@ -135,11 +135,11 @@ fn leaf(triangles: &[(u32, f32)]) -> Leaf {
     leaf
 }
 
-/// A node whose eight boxes are all the same cube around the origin.
+/// A node whose children's boxes are all the same cube around the origin.
 fn cubes(child: [u32; 8]) -> Node {
-    let mut node = Node { bounds: [[-10.0; 8]; 6], child, reserved: [0; 8] };
-    node.bounds[3..].fill([10.0; 8]);
-    node
+    let row = |used, unused| child.map(|c| if c == NONE { unused } else { used });
+    let (low, high) = (row(-10.0, f32::INFINITY), row(10.0, f32::NEG_INFINITY));
+    Node { bounds: [low, low, low, high, high, high], child, reserved: [0; 8] }
 }
 
 /// Eight rays from the origin, mostly along z; the bits of `octants` in a lane's number make a component negative.
@@ -202,13 +202,6 @@ fn chain(first: usize, inner: usize, height: impl Fn(u32) -> f32) -> (Vec<Node>,
         }
         nodes.push(cubes(child));
     }
-    for node in &mut nodes {
-        for slot in (0..8).filter(|s| node.child[*s] == NONE) {
-            for k in 0..3 {
-                (node.bounds[k][slot], node.bounds[k + 3][slot]) = (f32::INFINITY, f32::NEG_INFINITY);
-            }
-        }
-    }
     (nodes, leaves)
 }
 
@@ -248,9 +241,6 @@ fn full_stacks_do_not_spill_into_their_neighbours() {
     (nodes[0].bounds[2][0], nodes[0].bounds[5][1]) = (0.1, -0.1);
     nodes.extend((1..8).map(|i| cubes([i + 1, far, far, far, far, far, far, far])));
     nodes.extend([cubes([far; 8]), cubes([far; 8])]);
-    for slot in [6, 7] {
-        (0..6).for_each(|row| nodes[0].bounds[row][slot] = if row < 3 { f32::INFINITY } else { f32::NEG_INFINITY });
-    }
     let bvh = WideBvh::from_parts(&nodes, &leaves);
     assert_eq!(bvh.occluded(&rays(7, 1.5), Mask8::all_lanes()), Mask8::all_lanes());
     assert!(bvh.closest(&rays(7, 1.5), Mask8::all_lanes()).t.to_array().iter().all(|t| *t == 1.0));
@@ -270,12 +260,13 @@ fn trees_of_garbage_do_no_harm() {
         let mut nodes = Vec::new();
         for level in 0..levels {
             // a node's index is above that of its parent, so that walks end
-            let mut node = cubes([(); 8].map(|()| match r.below(4) {
+            let mut node = cubes([0; 8]);
+            node.child = [(); 8].map(|()| match r.below(4) {
                 0 => LEAF_BIT | r.bits(),
                 1 => LEAF_BIT | (r.below(16) as u32) << 27 | r.below(4) as u32,
                 2 => levels + r.bits() % 1000,
                 _ => NONE,
-            }));
+            });
             node.child[r.below(8)] = level + 1;
             for _ in 0..r.below(20) {
                 node.bounds[r.below(6)][r.below(8)] = numbers[r.below(10)];

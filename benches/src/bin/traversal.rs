@@ -3,7 +3,7 @@
 //! Sets: primary rays, first and third diffuse bounce, shadow rays from primary and from first-bounce hits towards a
 //! square lamp below the top of the scene. Kernels take turns inside each round; the table shows medians over the
 //! rounds, the spread between the quartiles, and the ratio to Bvh2. Times are CPU times of this thread where the system
-//! tells them. Answers are checked against each other first (not with `--window`).
+//! tells them. Answers are checked against each other first.
 //!
 //! Beware: `glam` with `scalar-math` anywhere in the same build turns obvhs's own vectors scalar, which about halves
 //! its Bvh2 on closest hits. The first line of the output says which it is.
@@ -246,10 +246,22 @@ impl Kernels<'_> {
         (n, sum)
     }
 
-    /// Seconds of the built-in traversal over the set: windows of `size` packets, each traced `times` in a row.
-    fn windows(&self, set: &Set, size: usize, times: usize) -> f64 {
-        let again = |w| (0..times).map(|_| black_box(self.packets(black_box(w), set.any)).0).sum::<usize>();
-        timed(|| set.packets.chunks(size).map(again).sum::<usize>()).1
+    /// Prints what a ray takes in the built-in traversal when windows of `size` packets are traced once, and what when
+    /// they are traced again, three times.
+    fn windows(&self, sets: &[Set], size: usize, rounds: usize) {
+        println!("nanoseconds per ray, windows of {size} packets: the first time, again");
+        for set in sets {
+            let repeat = |times: usize| {
+                let window = |w| (0..times).map(|_| self.packets(black_box(w), set.any).0).sum::<usize>();
+                let (hits, seconds) = timed(|| set.packets.chunks(size).map(window).sum::<usize>());
+                assert_eq!(hits, times * self.packets(&set.packets, set.any).0, "{}", set.name);
+                seconds
+            };
+            let (once, again) =
+                (0..rounds.max(1)).map(|_| (repeat(1), repeat(4))).map(|(a, b)| (a, (b - a) / 3.0)).unzip();
+            let [once, again] = [once, again].map(|t| 1e9 * median(t).0 / set.single.len() as f64);
+            println!("{:<10}{once:>8.1}{again:>8.1}", set.name);
+        }
     }
 
     /// Runs kernel `k` over the set; returns hits and a checksum.
@@ -364,21 +376,6 @@ fn main() {
     ];
 
     let sets: Vec<Set> = sets.into_iter().filter(|s| s.name.contains(&args.only)).collect();
-    if let Some(size) = args.window {
-        println!("nanoseconds per ray, windows of {size} packets: the first time, again");
-        for set in &sets {
-            let mut rounds = vec![Vec::new(); 2];
-            for _ in 0..args.rounds.max(1) {
-                let once = kernels.windows(set, size.get(), 1);
-                let again = (kernels.windows(set, size.get(), 4) - once) / 3.0;
-                rounds[0].push(once);
-                rounds[1].push(again);
-            }
-            let [once, again] = [0, 1].map(|i| 1e9 * median(rounds[i].clone()).0 / set.single.len() as f64);
-            println!("{:<10}{once:>8.1}{again:>8.1}", set.name);
-        }
-        return;
-    }
     // enough passes per measurement to average over what else the machine does
     let mut passes = vec![[1u32; 3]; sets.len()];
     for (set, passes) in sets.iter().zip(&mut passes) {
@@ -398,6 +395,9 @@ fn main() {
                 hits.abs_diff(a.0) as f64 <= few * hits.max(1000) as f64 && (sum - a.1).abs() <= 2.0 * few * sum;
             assert!(close, "{}: {} says {a:?}, {} says {:?}", set.name, NAMES[k], NAMES[0], answers[0]);
         }
+    }
+    if let Some(size) = args.window {
+        return kernels.windows(&sets, size.get(), args.rounds);
     }
 
     let mut times = vec![vec![Vec::new(); 3]; sets.len()];

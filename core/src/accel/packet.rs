@@ -9,15 +9,14 @@
 //!
 //! 1. The eight children are tested at once against intervals of the packet's origins and inverse directions, then
 //!    eight rays at once against each survivor. Every step is monotone (see `setup`): the intervals never reject a
-//!    child that one of the rays enters.
-//!    Rays that look for any hit take the children in the order of their slots instead.
+//!    child that one of the rays enters. Rays that look for any hit take the children in the order of their slots.
 //! 2. A leaf costs one test per triangle (eight rays each) or one per ray (eight triangles each), whichever is fewer.
 //! 3. The stack holds the interval's entry and where the child's box is, eight bytes. The rays are tested against the
 //!    box when it is popped: fewer tests, as some are behind a hit by then, and a fifth of the memory of keeping their
 //!    entries.
 
 use super::setup::{Setup, each};
-use super::single::{Hit1, Hits, Keys, STACK, test_leaf, walk};
+use super::single::{Hit1, Hits, Keys, STACK, key, test_leaf, walk};
 use super::triangle::{Line, intersect};
 use crate::scene::blob::{CHILD_INDEX, LEAF_BIT, Leaf, Node};
 use croupier_simd::{F32x8, Mask8, U32x8};
@@ -147,7 +146,7 @@ pub(super) fn walk_packet<const ANY: bool>(
                 while left != 0 {
                     let i = left.ilog2() as usize & 7;
                     left ^= 1 << i;
-                    let key = u64::from(enter[i].to_bits()) << 32 | u64::from(child << 3 | i as u32);
+                    let key = key(enter[i], child << 3 | i as u32);
                     let mut p = sp;
                     while !ANY && p > start && keys[(p - 1) & (STACK - 1)] < key {
                         keys[p & (STACK - 1)] = keys[(p - 1) & (STACK - 1)];
