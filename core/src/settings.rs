@@ -2,7 +2,7 @@
 
 use crate::film::{PixelAov, PixelStats};
 use crate::learn::cache::CacheSize;
-use crate::learn::{Constant, Knowledge, Learning};
+use crate::learn::{ControlVariate, LearnedState, Learning};
 use crate::memory::{Layout, Measure};
 use crate::rrs::{MAX_FACTOR, MIN_FACTOR, Space, Strategy};
 use crate::scene::Scene;
@@ -11,7 +11,7 @@ use crate::tracer::shard_measure;
 use core::fmt;
 
 /// Paths end after this many segments whatever the settings say.
-pub const HARD_STOP: u32 = 200;
+pub const MAX_PATH_LENGTH: u32 = 200;
 
 /// Fewest waiting vertices a shard can work with: two packets.
 pub const MIN_RING: u32 = 16;
@@ -25,7 +25,7 @@ pub struct Settings {
     pub seed: u64,
     /// Units of parallel work. The picture depends on it (rounding and the comb), never on threads.
     pub shards: u32,
-    /// Path segments from the camera: 1 sees emitters only, 2 direct light. At most [`HARD_STOP`].
+    /// Path segments from the camera: 1 sees emitters only, 2 direct light. At most [`MAX_PATH_LENGTH`].
     pub max_depth: u32,
     /// Roulette and splitting.
     pub strategy: Strategy,
@@ -45,7 +45,7 @@ pub struct Settings {
     /// [`crate::rrs::Ears`], whose rule it is.
     pub shadow_roulette: bool,
     /// What stands in for samples that roulette skips.
-    pub constant: Constant,
+    pub control_variate: ControlVariate,
     /// Choices of the strategies that learn.
     pub learning: Learning,
 }
@@ -64,7 +64,7 @@ impl Settings {
             aovs: false,
             adaptive: false,
             shadow_roulette: false,
-            constant: Constant::Off,
+            control_variate: ControlVariate::Off,
             learning: Learning::default(),
         }
     }
@@ -91,7 +91,7 @@ pub enum SettingsError {
     },
     /// The constant is not a finite number, is for `threshold`, or is to be the cached mean with a strategy that learns
     /// nothing of the scene.
-    Constant,
+    ControlVariate,
     /// A choice of [`Learning`] is out of range.
     Learning,
     /// A parameter of the strategy or a choice of [`Learning`] is NaN.
@@ -108,8 +108,8 @@ impl fmt::Display for SettingsError {
             Self::Depth(n) => write!(f, "max_depth {n}: need at least 1"),
             Self::Ring(n) => write!(f, "ring of {n} vertices: need {MIN_RING} to 2^24"),
             Self::Cache { needed, given } => write!(f, "cache of {given} bytes: with so many shards it needs {needed}"),
-            Self::Constant => f.write_str("the constant of roulette must be finite and cannot serve threshold; the cached mean needs ear, ears, adrr or adrrs"),
-            Self::Learning => f.write_str("learning: need a ledger of 1 to 2^24 records, at least 1 sample to learn from, a split count above 0, a carry of 0 to 1, factors around 1 in 0.05 to 20"),
+            Self::ControlVariate => f.write_str("the constant of roulette must be finite and cannot serve threshold; the cached mean needs ear, ears, adrr or adrrs"),
+            Self::Learning => f.write_str("learning: need a ledger of 1 to 2^24 records, at least 1 sample to learn from, a split count above 0, a decay of 0 to 1, factors around 1 in 0.05 to 20"),
             Self::NotANumber => f.write_str("a parameter of the strategy, or of learning, is not a number"),
             Self::Memory => f.write_str("these settings need more memory than can be addressed"),
         }
@@ -154,7 +154,7 @@ impl Plan {
         let pixels = pixels as usize;
         let cache = cache_size(&s)?;
         let session = Measure::new().add::<PixelStats>(pixels).add::<PixelAov>(if s.aovs { pixels } else { 0 });
-        let session = Knowledge::measure(session, &s, cache);
+        let session = LearnedState::measure(session, &s, cache);
         let shard = shard_measure(&s, cache, &tiles);
         Ok(Self {
             settings: s,
@@ -183,13 +183,13 @@ impl Plan {
 
 /// Checks what is to be learned and how; the size of its statistics.
 fn cache_size(s: &Settings) -> Result<Option<CacheSize>, SettingsError> {
-    let fits = match s.constant {
-        Constant::Off => true,
-        Constant::Cached => s.strategy.space() == Some(Space::Scene),
-        Constant::Number(x) => x.is_finite() && !s.strategy.is_biased(),
+    let fits = match s.control_variate {
+        ControlVariate::Off => true,
+        ControlVariate::Cached => s.strategy.space() == Some(Space::Scene),
+        ControlVariate::Number(x) => x.is_finite() && !s.strategy.is_biased(),
     };
     if !fits {
-        return Err(SettingsError::Constant);
+        return Err(SettingsError::ControlVariate);
     }
     let l = &s.learning;
     let [least, most] = l.factors;
@@ -197,8 +197,8 @@ fn cache_size(s: &Settings) -> Result<Option<CacheSize>, SettingsError> {
         && (1.0..=MAX_FACTOR).contains(&most)
         && (1..=1 << 24).contains(&l.ledger)
         && l.samples > 0
-        && l.split_count > 0.0
-        && (0.0..=1.0).contains(&l.carry);
+        && l.subdivide_count > 0.0
+        && (0.0..=1.0).contains(&l.decay);
     if !fits {
         return Err(SettingsError::Learning);
     }

@@ -10,17 +10,17 @@ mod adaptive;
 mod bins;
 pub mod cache;
 mod estimate;
-mod knowledge;
+mod learned_state;
 mod picture;
 mod save;
 mod settings;
 mod training;
 mod tree;
 
-pub use estimate::Estimate;
-pub(crate) use knowledge::Knowledge;
+pub use estimate::PixelEstimator;
+pub(crate) use learned_state::LearnedState;
 pub use picture::PictureStatistics;
-pub use settings::{Constant, Learning, Objective};
+pub use settings::{ControlVariate, Learning, Objective};
 
 /// Relative cost of a camera ray. Costs are counted, never measured: the picture must not depend on a clock.
 pub const COST_CAMERA: f32 = 1.0;

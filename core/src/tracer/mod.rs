@@ -22,7 +22,7 @@ mod trace;
 mod vertex;
 
 pub use counters::{Counters, Utilisation};
-pub use shard::{Budget, Progress, Shard, ShardError};
+pub use shard::{Budget, Shard, ShardError, StepResult};
 
 use crate::film::{PixelAov, PixelSums};
 use crate::learn::cache::{CacheSize, Training};

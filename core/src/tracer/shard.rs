@@ -28,7 +28,7 @@ pub struct Budget {
 
 /// What to do after a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Progress {
+pub enum StepResult {
     /// Step again.
     More,
     /// This shard has finished the iteration.
@@ -119,7 +119,7 @@ impl<'m> Shard<'m> {
         &self.counters
     }
 
-    /// Starts no further camera samples in the iteration of its last step; stepping on to [`Progress::Done`] finishes
+    /// Starts no further camera samples in the iteration of its last step; stepping on to [`StepResult::Done`] finishes
     /// those in flight, so that what was rendered stays unbiased. A shard that has not stepped in this iteration yet
     /// joins it with a step of 0 rays first.
     pub fn stop(&mut self) {
@@ -132,17 +132,17 @@ impl<'m> Shard<'m> {
         &mut self,
         session: &Session<'_, '_, P, I, L>,
         budget: Budget,
-    ) -> Progress {
+    ) -> StepResult {
         if self.joined != session.identity() {
             self.begin(session);
         }
         let start = self.counters.rays();
         while self.counters.rays() - start < budget.rays {
             if !self.turn(session) {
-                return Progress::Done;
+                return StepResult::Done;
             }
         }
-        Progress::More
+        StepResult::More
     }
 
     fn begin<P: Profile, I: Intersector, L: LightSelector>(&mut self, session: &Session<'_, '_, P, I, L>) {
@@ -155,9 +155,9 @@ impl<'m> Shard<'m> {
         self.cursor = Cursor::new(&self.plan.tiles, self.index, iteration.samples);
         self.counters = Counters::default();
         self.pixels.fill(PixelSums::default());
-        self.outlier = session.knowledge().outlier();
+        self.outlier = session.learned().outlier();
         if let Some(t) = &mut self.training {
-            t.clear(session.knowledge().used_bins());
+            t.clear(session.learned().used_bins());
         }
         self.aovs.fill(PixelAov::default());
         let seed = self.plan.settings().seed
