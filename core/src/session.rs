@@ -1,15 +1,17 @@
 //! What all shards share: frozen while they work, changed between iterations.
 
 use crate::accel::Intersector;
+use crate::counters::Counters;
 use crate::film::{Film, PixelSums};
 use crate::learn::cache::Cache;
 use crate::learn::{LearnedState, PictureStatistics};
 use crate::light::{LightSelector, PowerSelector};
 use crate::memory::{Carver, MemoryError};
+use crate::plan::Plan;
 use crate::profile::Profile;
 use crate::scene::{Effects, Scene};
-use crate::settings::{MAX_PATH_LENGTH, Plan};
-use crate::tracer::{Counters, Shard};
+use crate::settings::MAX_PATH_LENGTH;
+use crate::tracer::Shard;
 use core::fmt;
 use core::marker::PhantomData;
 
@@ -143,7 +145,7 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
                 c.take(if s.aovs { pixels } else { 0 }).map_err(SessionError::Memory)?,
             ),
             counters: Counters::default(),
-            learned: LearnedState::carve(&mut c, s, plan.cache, &scene).map_err(SessionError::Memory)?,
+            learned: LearnedState::carve(&mut c, &s.needs(plan.job.cache), &scene).map_err(SessionError::Memory)?,
             iteration: Iteration::default(),
             running: false,
             max_depth: s.max_depth.min(MAX_PATH_LENGTH),

@@ -8,7 +8,7 @@
 use crate::cache::Sums;
 use croupier::accel::{Intersector, Ray8, WideBvh, offset, shadow_ray, surface_point};
 use croupier::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
-use croupier::learn::COST_SHADOW;
+use croupier::cost::COST_SHADOW;
 use croupier::learn::cache::{Cache, Kind};
 use croupier::light::{LightSample8, PowerSelector, area_pdf, area_radiance, power_heuristic, sample};
 use croupier::rng::Key8;

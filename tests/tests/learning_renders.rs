@@ -1,8 +1,9 @@
 //! What renders that learn take and give: saved statistics, denoised pictures, figures.
 
+use croupier::cost::COST_SHADOW;
 use croupier::denoise::{Planes, scratch_len};
 use croupier::learn::cache::CacheSize;
-use croupier::learn::{COST_SHADOW, ControlVariate, Learning, Objective};
+use croupier::learn::{ControlVariate, Learning, Objective};
 use croupier::rrs::Norm;
 use croupier::{Scene, Settings};
 use croupier_host::bake::{BakeOptions, bake};

@@ -282,7 +282,7 @@ pub struct Local8 {
     pub moment: Vec3x8,
     /// Their variance at a point, without the spread of the mean over the cell as far as pairs tell; at most `moment`.
     pub variance: Vec3x8,
-    /// Mean counted cost of a sample ([`crate::learn::COST_BOUNCE`] and its like).
+    /// Mean counted cost of a sample ([`crate::cost::COST_BOUNCE`] and its like).
     pub cost: F32x8,
     /// Mean square of their light samples over `moment`, over all channels, at most 1.
     pub nee_share: F32x8,

@@ -1,17 +1,17 @@
 //! The session's side of learning: everything learned, frozen while an iteration runs.
 
-use super::COST_BOUNCE;
 use super::adaptive::SampleAllocation;
-use super::cache::{Cache, CacheSize, Training};
-use super::estimate::{PixelEstimator, Pixels};
+use super::cache::{Cache, Training};
+use super::estimate::Pixels;
 use super::picture::{Picture, PictureStatistics, Visit};
-use super::settings::{Learning, Objective};
+use super::settings::{Learning, Needs, Objective};
+use crate::cost::COST_BOUNCE;
+use crate::counters::Counters;
 use crate::film::Film;
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::rrs::{Learned8, Space};
 use crate::scene::Scene;
-use crate::settings::Settings;
-use crate::tracer::Counters;
+
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Bins of path lengths per block of pixels, for statistics over the picture.
@@ -32,45 +32,35 @@ pub(crate) struct LearnedState<'m> {
     needed: bool,
 }
 
-/// How the pixels are estimated, if anything needs that.
-fn estimate(s: &Settings) -> Option<PixelEstimator> {
-    let needed = s.strategy.needs_image() || s.shadow_roulette || s.adaptive;
-    needed.then_some(s.learning.estimate)
-}
-
 impl<'m> LearnedState<'m> {
-    pub(crate) fn measure(m: Measure, s: &Settings, cache: Option<CacheSize>) -> Measure {
-        let m = cache.map_or(m, |size| Cache::measure(m, size));
-        let m = Pixels::measure(m, s.size, s.aovs, estimate(s));
-        SampleAllocation::measure(m, s.size, s.adaptive)
+    pub(crate) fn measure(m: Measure, needs: &Needs) -> Measure {
+        let m = needs.cache.map_or(m, |size| Cache::measure(m, size));
+        let m = Pixels::measure(m, needs.size, needs.features, needs.pixels);
+        SampleAllocation::measure(m, needs.size, needs.adaptive)
     }
 
-    pub(crate) fn carve(
-        c: &mut Carver<'m>,
-        s: &Settings,
-        cache: Option<CacheSize>,
-        scene: &Scene<'_>,
-    ) -> Result<Self, MemoryError> {
+    pub(crate) fn carve(c: &mut Carver<'m>, needs: &Needs, scene: &Scene<'_>) -> Result<Self, MemoryError> {
+        let n = *needs;
         let info = scene.info;
         let bounds = [info.bounds_min, info.bounds_max];
-        let mut cache = cache.map(|size| Cache::carve(c, size, bounds, s.learning.objective)).transpose()?;
+        let mut cache = n.cache.map(|size| Cache::carve(c, size, bounds, n.learning.objective)).transpose()?;
         let mut block = 1;
-        if let Some(cache) = cache.as_mut().filter(|_| s.strategy.space() == Some(Space::Image)) {
-            let blocks = |side: u32| s.size.map(|n| u64::from(n.div_ceil(side))).iter().product::<u64>();
+        if let Some(cache) = cache.as_mut().filter(|_| n.space == Some(Space::Image)) {
+            let blocks = |side: u32| n.size.map(|n| u64::from(n.div_ceil(side))).iter().product::<u64>();
             while blocks(block) > u64::from(cache.size().leaves()) {
                 block += 1;
             }
             cache.flatten(blocks(block) as u32);
         }
         Ok(Self {
-            learning: s.learning,
-            size: s.size,
+            learning: n.learning,
+            size: n.size,
             cache,
             block,
-            pixels: Pixels::carve(c, s.size, s.aovs, estimate(s), &s.learning)?,
-            allocation: SampleAllocation::carve(c, s.size, s.adaptive)?,
+            pixels: Pixels::carve(c, n.size, n.features, n.pixels, &n.learning)?,
+            allocation: SampleAllocation::carve(c, n.size, n.adaptive)?,
             picture: Picture::default(),
-            needed: estimate(s).is_some(),
+            needed: n.pixels.is_some(),
         })
     }
 

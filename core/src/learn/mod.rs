@@ -20,11 +20,5 @@ mod tree;
 pub use estimate::PixelEstimator;
 pub(crate) use learned_state::LearnedState;
 pub use picture::PictureStatistics;
+pub(crate) use settings::Needs;
 pub use settings::{ControlVariate, Learning, Objective};
-
-/// Relative cost of a camera ray. Costs are counted, never measured: the picture must not depend on a clock.
-pub const COST_CAMERA: f32 = 1.0;
-/// Relative cost of a scattered ray and the shading around it.
-pub const COST_BOUNCE: f32 = 1.0;
-/// Relative cost of a shadow ray: it is over at the first hit, and no vertex waits at its end.
-pub const COST_SHADOW: f32 = 0.5;

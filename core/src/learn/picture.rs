@@ -3,9 +3,9 @@
 use super::adaptive::SampleAllocation;
 use super::estimate::Pixels;
 use super::settings::Learning;
+use crate::counters::Counters;
 use crate::film::{PixelSums, trimmed};
 use crate::rrs::Norm;
-use crate::tracer::Counters;
 
 /// Share of the pixels whose variance is left out of the picture's. A single outlier would decide all factors: with the
 /// 0.001 % of EARS (section 5.2), none in a small picture, one bright sample made all vertices look worthless, and

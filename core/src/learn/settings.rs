@@ -1,7 +1,8 @@
 //! What the caller chooses about learning.
 
+use super::cache::CacheSize;
 use super::estimate::PixelEstimator;
-use crate::rrs::{Learned8, MAX_FACTOR, MIN_FACTOR, Norm};
+use crate::rrs::{Learned8, MAX_FACTOR, MIN_FACTOR, Norm, Space};
 use core::fmt;
 use croupier_simd::{F32x8, Vec3x8};
 
@@ -96,4 +97,23 @@ impl Default for Learning {
             factors: [MIN_FACTOR, MAX_FACTOR],
         }
     }
+}
+
+/// What a render learns, and how.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Needs {
+    /// Columns and rows of the picture.
+    pub size: [u32; 2],
+    /// The film holds albedos and normals, which the denoiser looks at.
+    pub features: bool,
+    /// Over what local statistics are kept, if at all.
+    pub space: Option<Space>,
+    /// Room for local statistics, if there are any.
+    pub cache: Option<CacheSize>,
+    /// How the pixels are estimated, if anything needs that.
+    pub pixels: Option<PixelEstimator>,
+    /// Pixels get samples by their error.
+    pub adaptive: bool,
+    /// The caller's choices.
+    pub learning: Learning,
 }

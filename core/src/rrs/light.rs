@@ -8,7 +8,7 @@
 
 use super::ears::{TRUST_MOMENT, least_throughput};
 use super::{Learned8, MIN_FACTOR};
-use crate::learn::COST_SHADOW;
+use crate::cost::COST_SHADOW;
 use croupier_simd::{F32x8, Vec3x8};
 
 impl Learned8 {

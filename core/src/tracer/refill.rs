@@ -73,12 +73,12 @@ impl Shard<'_> {
     ) -> Option<RayState8> {
         let iteration = session.iteration();
         // numbers of one pixel must not come back in another iteration, however many samples it had
-        let settings = self.plan.settings();
+        let settings = &self.job.settings;
         let (seed, first_sample) = match settings.adaptive {
             true => (settings.seed ^ iteration.number.wrapping_mul(0x9e37_79b9_7f4a_7c15), 0),
             false => (settings.seed, iteration.first_sample),
         };
-        let tiles = self.plan.tiles;
+        let tiles = self.job.tiles;
         let (mut x, mut y, mut pixel, mut sample, mut root) = ([0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8]);
         let (mut ledger, mut weight) = ([NO_RECORD; 8], [[1.0; 3]; 8]);
         let mut lanes = 0;
@@ -109,7 +109,7 @@ impl Shard<'_> {
         let px = F32x8::from_fn(|i| x[i] as f32) + u0;
         let py = F32x8::from_fn(|i| y[i] as f32) + u1;
         let lens = if P::EFFECTS.contains(Effects::LENS) { [u2, u3] } else { [F32x8::ZERO; 2] };
-        let (o, d) = camera::generate(session.scene().camera, self.plan.settings().size, px, py, lens);
+        let (o, d) = camera::generate(session.scene().camera, self.job.settings.size, px, py, lens);
         let active = Mask8::first(lanes);
         self.counters.camera_rays += lanes as u64;
         Some(RayState8 {

@@ -55,7 +55,7 @@ impl Shard<'_> {
         session: &Session<'_, '_, P, I, L>,
         a: Arrival8<'_>,
     ) {
-        let settings = *self.plan.settings();
+        let settings = self.job.settings;
         let strategy = settings.strategy;
         let state = session.learned();
         let v = &*a.vertex;
@@ -155,7 +155,7 @@ impl Shard<'_> {
             cut = splitting;
             self.counters.splits_limited_by_ring += u64::from(splitting.count());
         } else {
-            let budget = self.plan.settings().split_budget;
+            let budget = self.job.settings.split_budget;
             let root = root.to_array();
             let bits =
                 splitting.lanes().filter(|&i| self.roots.get(root[i]).splits >= budget).fold(0, |m, i| m | 1 << i);

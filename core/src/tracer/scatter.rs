@@ -177,7 +177,7 @@ impl Shard<'_> {
         let radiance = v.beta * f.f * l.radiance * weight;
         let mut found = Found8 { pixel: radiance, local: f.f * l.radiance * weight };
         let mut mask = mask & (radiance.any_positive() | !radiance.is_finite());
-        let towards = if mask.any() && self.plan.settings().shadow_roulette {
+        let towards = if mask.any() && self.job.settings.shadow_roulette {
             let towards = session.learned().bins_towards(v.bin, l.wi, mask);
             mask = self.shadow_roulette(session, s, towards, &mut found, mask);
             towards

@@ -59,7 +59,7 @@ impl Shard<'_> {
         if (mask & most.gt(limit)).none() {
             return F32x8::ONE;
         }
-        let error = self.plan.settings().learning.norm.of(square * self.roots.targets(root, mask).error_weight);
+        let error = self.job.settings.learning.norm.of(square * self.roots.targets(root, mask).error_weight);
         error.gt(limit).select((limit / error).sqrt(), F32x8::ONE)
     }
 

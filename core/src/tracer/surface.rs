@@ -59,7 +59,7 @@ impl Shard<'_> {
             self.emission(session, f, hit, point.ng);
         }
         let ends = U32x8::splat(session.max_depth());
-        if self.plan.settings().max_depth > MAX_PATH_LENGTH {
+        if self.job.settings.max_depth > MAX_PATH_LENGTH {
             self.counters.max_length_reached += u64::from(mask.and_not(f.depth.lt(ends)).count());
         }
         let first = mask & f.depth.eq(U32x8::splat(1));
@@ -90,7 +90,7 @@ impl Shard<'_> {
         };
         going &= s.scatters;
         let lanes_if = |wanted: bool, lanes: Mask8| if wanted { lanes } else { Mask8::NONE };
-        let needs_albedo = self.plan.settings().strategy.needs_albedo();
+        let needs_albedo = self.job.settings.strategy.needs_albedo();
         let wanted = lanes_if(wants_aov, first & s.scatters) | lanes_if(needs_albedo, going);
         let albedo = albedo::<P>(scene, &vertex, &s.kind, wanted);
         if wants_aov {

@@ -3,7 +3,7 @@
 use super::flight::RayState8;
 use super::shard::Shard;
 use crate::accel::{Hit8, Intersector};
-use crate::learn::COST_BOUNCE;
+use crate::cost::COST_BOUNCE;
 use crate::light::LightSelector;
 use crate::profile::Profile;
 use crate::session::Session;

@@ -1,6 +1,6 @@
 //! What happened: work, lane utilisation and every event in which a bound was met.
 
-use crate::learn::{COST_BOUNCE, COST_CAMERA, COST_SHADOW};
+use crate::cost::{COST_BOUNCE, COST_CAMERA, COST_SHADOW};
 
 /// Lanes used of lanes offered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -97,7 +97,7 @@ impl Counters {
         self.camera_rays + self.scatter_rays + self.shadow_rays
     }
 
-    /// What efficiency is reckoned with: rays, each times its relative cost ([`crate::learn::COST_SHADOW`] and its
+    /// What efficiency is reckoned with: rays, each times its relative cost ([`crate::cost::COST_SHADOW`] and its
     /// like).
     pub fn cost(&self) -> f64 {
         let parts =
