@@ -18,7 +18,7 @@ mod training;
 mod tree;
 
 pub use estimate::PixelEstimator;
-pub(crate) use learned_state::LearnedState;
+pub use learned_state::LearnedState;
 pub use picture::PictureStatistics;
 pub(crate) use settings::Needs;
 pub use settings::{ControlVariate, Learning, Objective};
