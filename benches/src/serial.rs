@@ -5,8 +5,8 @@
 
 use crate::clock::Clock;
 use croupier::accel::WideBvh;
-use croupier::profile::{AnyProfile, Full, Matte, Profile};
-use croupier::{Budget, Counters, Plan, Progress, Scene, Session, SessionError, Shard};
+use croupier::profile::{AnyProfile, DiffuseOnly, Full, Profile};
+use croupier::{Budget, Counters, Plan, Scene, Session, SessionError, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
 use std::error::Error;
 
@@ -21,7 +21,7 @@ type Tracer<'s, 'm, P> = Session<'s, 'm, P, WideBvh<'s>>;
 /// iterations.
 pub fn render(scene: Scene<'_>, plan: &Plan, iterations: &[u32]) -> Result<(Counters, f64), Box<dyn Error>> {
     match AnyProfile::smallest(scene.effects) {
-        AnyProfile::Matte => render_with::<Matte>(scene, plan, iterations),
+        AnyProfile::DiffuseOnly => render_with::<DiffuseOnly>(scene, plan, iterations),
         AnyProfile::Full => render_with::<Full>(scene, plan, iterations),
     }
 }
@@ -49,7 +49,7 @@ fn render_with<P: Profile>(
 #[inline(never)]
 fn bench_step_shards<P: Profile>(session: &Tracer<'_, '_, P>, shards: &mut [Shard<'_>]) {
     for shard in shards {
-        while shard.step(session, Budget { rays: u64::MAX }) == Progress::More {}
+        while shard.step(session, Budget { rays: u64::MAX }) == StepResult::More {}
     }
 }
 

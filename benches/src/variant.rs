@@ -1,6 +1,6 @@
 //! What a row of a table renders with: a roulette strategy, and perhaps other choices.
 
-use croupier::learn::{Constant, Estimate, Learning};
+use croupier::learn::{ControlVariate, Learning, PixelEstimator};
 use croupier::{Settings, Strategy};
 
 /// Other choices by name, and what they are.
@@ -53,14 +53,15 @@ impl Variant {
         s.adaptive |= self.has("adaptive");
         s.shadow_roulette |= self.has("shadow");
         if self.has("constant") {
-            s.constant = Constant::Cached;
+            s.control_variate = ControlVariate::Cached;
         }
         if self.has("idle") {
             s.learning.factors = [1.0, 1.0];
         }
         if self.has("small") {
             (s.shards, s.ring) = (1, 128);
-            s.learning = Learning { cache_bytes: 152 << 10, ledger: 256, estimate: Estimate::Blocks, ..s.learning };
+            s.learning =
+                Learning { cache_bytes: 152 << 10, ledger: 256, estimate: PixelEstimator::Blocks, ..s.learning };
         }
         s
     }

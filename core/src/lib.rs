@@ -18,7 +18,7 @@
 //! A host asks how much memory is needed, hands it over, and steps the shards from as many threads as it likes:
 //!
 //! ```
-//! use croupier::{Budget, Plan, Progress, Scene, Session, Settings, Shard, accel::WideBvh, profile::Full};
+//! use croupier::{Budget, Plan, StepResult, Scene, Session, Settings, Shard, accel::WideBvh, profile::Full};
 //!
 //! /// Renders 16 samples per pixel and returns the estimated relMSE.
 //! fn render(blob: &[u8], shared: &mut [u8], block: &mut [u8]) -> Result<f64, Box<dyn core::error::Error>> {
@@ -28,7 +28,7 @@
 //!     let mut session = Session::<Full, _>::new(scene, WideBvh::new(&scene), &plan, shared)?;
 //!     let mut shard = Shard::new(&plan, 0, block)?;
 //!     session.begin_iteration(16);
-//!     while shard.step(&session, Budget { rays: 10_000 }) == Progress::More {}
+//!     while shard.step(&session, Budget { rays: 10_000 }) == StepResult::More {}
 //!     session.end_iteration([&shard])?;
 //!     Ok(session.film().error_estimate().rel_mse)
 //! }
@@ -47,11 +47,14 @@
 pub mod accel;
 pub mod bsdf;
 pub mod camera;
+pub mod cost;
+mod counters;
 pub mod denoise;
 pub mod film;
 pub mod learn;
 pub mod light;
 mod memory;
+mod plan;
 pub mod profile;
 pub mod rng;
 pub mod rrs;
@@ -62,11 +65,13 @@ pub mod texture;
 mod tiles;
 mod tracer;
 
+pub use counters::{Counters, Utilisation};
 pub use croupier_simd as simd;
 pub use film::{ErrorEstimate, Film};
 pub use memory::{BLOCK_ALIGN, Layout, MemoryError};
+pub use plan::Plan;
 pub use rrs::Strategy;
 pub use scene::{Effects, Scene, SceneError};
 pub use session::{Iteration, Phase, Session, SessionError};
-pub use settings::{HARD_STOP, MIN_RING, Plan, Settings, SettingsError};
-pub use tracer::{BYTES_PER_PATH, Budget, Counters, Progress, Shard, ShardError, Utilisation};
+pub use settings::{MAX_PATH_LENGTH, MIN_RING, Settings, SettingsError};
+pub use tracer::{BYTES_PER_PATH, Budget, Shard, ShardError, StepResult};

@@ -13,19 +13,19 @@ pub trait Profile {
 
 /// Diffuse surfaces under area lights or a constant sky.
 #[derive(Clone, Copy, Debug)]
-pub struct Matte;
+pub struct DiffuseOnly;
 
 /// Everything.
 #[derive(Clone, Copy, Debug)]
 pub struct Full;
 
-impl Profile for Matte {
+impl Profile for DiffuseOnly {
     const EFFECTS: Effects = Effects::DIFFUSE
         .with(Effects::AREA_LIGHTS)
         .with(Effects::CONSTANT)
         .with(Effects::SMOOTH_NORMALS)
         .with(Effects::TEXTURES);
-    const NAME: &'static str = "matte";
+    const NAME: &'static str = "diffuse";
 }
 
 impl Profile for Full {
@@ -36,8 +36,8 @@ impl Profile for Full {
 /// The closed set, for hosts that load arbitrary scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AnyProfile {
-    /// [`Matte`].
-    Matte,
+    /// [`DiffuseOnly`].
+    DiffuseOnly,
     /// [`Full`].
     Full,
 }
@@ -45,13 +45,13 @@ pub enum AnyProfile {
 impl AnyProfile {
     /// The smallest of the set that holds `effects`.
     pub const fn smallest(effects: Effects) -> Self {
-        if Matte::EFFECTS.contains(effects) { Self::Matte } else { Self::Full }
+        if DiffuseOnly::EFFECTS.contains(effects) { Self::DiffuseOnly } else { Self::Full }
     }
 
     /// Its name.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Matte => Matte::NAME,
+            Self::DiffuseOnly => DiffuseOnly::NAME,
             Self::Full => Full::NAME,
         }
     }

@@ -1,15 +1,17 @@
 //! What all shards share: frozen while they work, changed between iterations.
 
 use crate::accel::Intersector;
+use crate::counters::Counters;
 use crate::film::{Film, PixelSums};
 use crate::learn::cache::Cache;
-use crate::learn::{Knowledge, PictureStatistics};
+use crate::learn::{LearnedState, PictureStatistics};
 use crate::light::{LightSelector, PowerSelector};
 use crate::memory::{Carver, MemoryError};
+use crate::plan::Plan;
 use crate::profile::Profile;
 use crate::scene::{Effects, Scene};
-use crate::settings::{HARD_STOP, Plan};
-use crate::tracer::{Counters, Shard};
+use crate::settings::MAX_PATH_LENGTH;
+use crate::tracer::Shard;
 use core::fmt;
 use core::marker::PhantomData;
 
@@ -103,7 +105,7 @@ pub struct Session<'s, 'm, P: Profile, I: Intersector, L: LightSelector = PowerS
     selector: L,
     film: Film<'m>,
     counters: Counters,
-    knowledge: Knowledge<'m>,
+    learned: LearnedState<'m>,
     iteration: Iteration,
     running: bool,
     max_depth: u32,
@@ -143,10 +145,10 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
                 c.take(if s.aovs { pixels } else { 0 }).map_err(SessionError::Memory)?,
             ),
             counters: Counters::default(),
-            knowledge: Knowledge::carve(&mut c, s, plan.cache, &scene).map_err(SessionError::Memory)?,
+            learned: LearnedState::carve(&mut c, &s.needs(plan.job.cache), &scene).map_err(SessionError::Memory)?,
             iteration: Iteration::default(),
             running: false,
-            max_depth: s.max_depth.min(HARD_STOP),
+            max_depth: s.max_depth.min(MAX_PATH_LENGTH),
             profile: PhantomData,
         })
     }
@@ -156,7 +158,7 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
         let i = self.iteration;
         self.iteration =
             Iteration { number: i.number + 1, first_sample: i.first_sample.wrapping_add(i.samples), samples };
-        self.knowledge.begin(samples, &self.film);
+        self.learned.begin(samples, &self.film);
         self.running = true;
     }
 
@@ -200,19 +202,19 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
         let visit = |show: &mut dyn FnMut(usize, &PixelSums)| {
             shards.clone().into_iter().for_each(|s| s.for_each_pixel(|i, sums, _| show(i, sums)));
         };
-        self.knowledge.measure_picture(&counters, visit);
+        self.learned.measure_picture(&counters, visit);
         for s in shards.clone() {
             s.for_each_pixel(|i, sums, aov| {
-                let w = self.knowledge.weight_of(i);
+                let w = self.learned.weight_of(i);
                 self.film.merge(i, sums, aov, w);
             });
         }
         self.film.end_iteration();
         self.counters.merge(&counters);
         passed(Phase::Merged);
-        self.knowledge.learn_picture(&self.film, &counters, visit);
+        self.learned.learn_picture(&self.film, &counters, visit);
         passed(Phase::Estimated);
-        self.knowledge.learn_scene(shards.into_iter().filter_map(|s| s.training.as_ref()));
+        self.learned.learn_scene(shards.into_iter().filter_map(|s| s.training.as_ref()));
         passed(Phase::Learned);
         self.running = false;
         Ok(())
@@ -226,24 +228,24 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
     /// Variance and cost per camera sample: of the last iteration, and blended over the iterations as factors use them.
     /// All 0 unless the strategy learns.
     pub fn picture_statistics(&self) -> [PictureStatistics; 2] {
-        self.knowledge.statistics()
+        self.learned.statistics()
     }
 
     /// The statistics of the scene, if the strategy learns them (`bolin-meyer` learns of the picture): to be saved, or
     /// loaded before the first iteration.
     pub fn cache(&self) -> Option<&Cache<'m>> {
-        self.knowledge.cache()
+        self.learned.cache()
     }
 
     /// See [`Self::cache`]. Whatever is loaded changes efficiency only. Not while an iteration runs: `None` then.
     pub fn cache_mut(&mut self) -> Option<&mut Cache<'m>> {
-        if self.running { None } else { self.knowledge.cache_mut() }
+        if self.running { None } else { self.learned.cache_mut() }
     }
 
     /// The estimate of the pixels that the strategy works with, rgb planes; `None` if it needs none, or before the end
     /// of the first iteration.
     pub fn estimate(&self) -> Option<[&[f32]; 3]> {
-        self.knowledge.estimate()
+        self.learned.estimate()
     }
 
     /// Replaces the built-in estimate of the pixels by the host's, row by row, for good. It changes efficiency only.
@@ -252,14 +254,14 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
     /// [`SessionError::Estimate`] if there is not one value per pixel, the settings have no estimate per pixel, or an
     /// iteration runs.
     pub fn give_estimate(&mut self, rgb: &[[f32; 3]]) -> Result<(), SessionError> {
-        if self.running || !self.knowledge.give_estimate(rgb) {
+        if self.running || !self.learned.give_estimate(rgb) {
             return Err(SessionError::Estimate { given: rgb.len() });
         }
         Ok(())
     }
 
-    pub(crate) fn knowledge(&self) -> &Knowledge<'m> {
-        &self.knowledge
+    pub(crate) fn learned(&self) -> &LearnedState<'m> {
+        &self.learned
     }
 
     /// Counts of all finished iterations.

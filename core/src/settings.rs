@@ -1,17 +1,13 @@
-//! What the caller chooses, and how much memory it costs.
+//! What the caller chooses.
 
-use crate::film::{PixelAov, PixelStats};
 use crate::learn::cache::CacheSize;
-use crate::learn::{Constant, Knowledge, Learning};
-use crate::memory::{Layout, Measure};
+use crate::learn::{ControlVariate, Learning, Needs};
 use crate::rrs::{MAX_FACTOR, MIN_FACTOR, Space, Strategy};
 use crate::scene::Scene;
-use crate::tiles::Tiles;
-use crate::tracer::shard_measure;
 use core::fmt;
 
 /// Paths end after this many segments whatever the settings say.
-pub const HARD_STOP: u32 = 200;
+pub const MAX_PATH_LENGTH: u32 = 200;
 
 /// Fewest waiting vertices a shard can work with: two packets.
 pub const MIN_RING: u32 = 16;
@@ -25,7 +21,7 @@ pub struct Settings {
     pub seed: u64,
     /// Units of parallel work. The picture depends on it (rounding and the comb), never on threads.
     pub shards: u32,
-    /// Path segments from the camera: 1 sees emitters only, 2 direct light. At most [`HARD_STOP`].
+    /// Path segments from the camera: 1 sees emitters only, 2 direct light. At most [`MAX_PATH_LENGTH`].
     pub max_depth: u32,
     /// Roulette and splitting.
     pub strategy: Strategy,
@@ -45,7 +41,7 @@ pub struct Settings {
     /// [`crate::rrs::Ears`], whose rule it is.
     pub shadow_roulette: bool,
     /// What stands in for samples that roulette skips.
-    pub constant: Constant,
+    pub control_variate: ControlVariate,
     /// Choices of the strategies that learn.
     pub learning: Learning,
 }
@@ -64,8 +60,71 @@ impl Settings {
             aovs: false,
             adaptive: false,
             shadow_roulette: false,
-            constant: Constant::Off,
+            control_variate: ControlVariate::Off,
             learning: Learning::default(),
+        }
+    }
+    /// Checks every setting; the room for statistics of the scene, if they are wanted.
+    pub(crate) fn check(&self) -> Result<Option<CacheSize>, SettingsError> {
+        #[expect(clippy::eq_op, reason = "equal to itself unless a number in it is NaN")]
+        if self != self {
+            return Err(SettingsError::NotANumber);
+        }
+        let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
+        if pixels == 0 || pixels > 1 << 31 {
+            return Err(SettingsError::Size(self.size));
+        }
+        if self.shards == 0 || self.shards > 65_536 {
+            return Err(SettingsError::Shards(self.shards));
+        }
+        if self.max_depth == 0 {
+            return Err(SettingsError::Depth(self.max_depth));
+        }
+        if self.ring < MIN_RING || self.ring > 1 << 24 {
+            return Err(SettingsError::Ring(self.ring));
+        }
+        self.check_control_variate()?;
+        self.check_learning()?;
+        if self.strategy.space().is_none() {
+            return Ok(None);
+        }
+        let needed = CacheSize::SMALLEST.bytes(self.shards).ok_or(SettingsError::Memory)?;
+        let given = self.learning.cache_bytes;
+        CacheSize::within(given, self.shards).map(Some).ok_or(SettingsError::Cache { needed, given })
+    }
+
+    fn check_control_variate(&self) -> Result<(), SettingsError> {
+        let fits = match self.control_variate {
+            ControlVariate::Off => true,
+            ControlVariate::Cached => self.strategy.space() == Some(Space::Scene),
+            ControlVariate::Number(x) => x.is_finite() && !self.strategy.is_biased(),
+        };
+        if fits { Ok(()) } else { Err(SettingsError::ControlVariate) }
+    }
+
+    fn check_learning(&self) -> Result<(), SettingsError> {
+        let l = &self.learning;
+        let [least, most] = l.factors;
+        let fits = (MIN_FACTOR..=1.0).contains(&least)
+            && (1.0..=MAX_FACTOR).contains(&most)
+            && (1..=1 << 24).contains(&l.ledger)
+            && l.samples > 0
+            && l.subdivide_count > 0.0
+            && (0.0..=1.0).contains(&l.decay);
+        if fits { Ok(()) } else { Err(SettingsError::Learning) }
+    }
+
+    /// What these settings have the render learn, with room for `cache`.
+    pub(crate) fn needs(&self, cache: Option<CacheSize>) -> Needs {
+        let pixels = self.strategy.needs_image() || self.shadow_roulette || self.adaptive;
+        Needs {
+            size: self.size,
+            features: self.aovs,
+            space: self.strategy.space(),
+            cache,
+            pixels: pixels.then_some(self.learning.estimate),
+            adaptive: self.adaptive,
+            learning: self.learning,
         }
     }
 }
@@ -91,7 +150,7 @@ pub enum SettingsError {
     },
     /// The constant is not a finite number, is for `threshold`, or is to be the cached mean with a strategy that learns
     /// nothing of the scene.
-    Constant,
+    ControlVariate,
     /// A choice of [`Learning`] is out of range.
     Learning,
     /// A parameter of the strategy or a choice of [`Learning`] is NaN.
@@ -108,8 +167,8 @@ impl fmt::Display for SettingsError {
             Self::Depth(n) => write!(f, "max_depth {n}: need at least 1"),
             Self::Ring(n) => write!(f, "ring of {n} vertices: need {MIN_RING} to 2^24"),
             Self::Cache { needed, given } => write!(f, "cache of {given} bytes: with so many shards it needs {needed}"),
-            Self::Constant => f.write_str("the constant of roulette must be finite and cannot serve threshold; the cached mean needs ear, ears, adrr or adrrs"),
-            Self::Learning => f.write_str("learning: need a ledger of 1 to 2^24 records, at least 1 sample to learn from, a split count above 0, a carry of 0 to 1, factors around 1 in 0.05 to 20"),
+            Self::ControlVariate => f.write_str("the constant of roulette must be finite and cannot serve threshold; the cached mean needs ear, ears, adrr or adrrs"),
+            Self::Learning => f.write_str("learning: need a ledger of 1 to 2^24 records, at least 1 sample to learn from, a split count above 0, a decay of 0 to 1, factors around 1 in 0.05 to 20"),
             Self::NotANumber => f.write_str("a parameter of the strategy, or of learning, is not a number"),
             Self::Memory => f.write_str("these settings need more memory than can be addressed"),
         }
@@ -117,94 +176,3 @@ impl fmt::Display for SettingsError {
 }
 
 impl core::error::Error for SettingsError {}
-
-/// How many bytes a render needs.
-#[derive(Clone, Copy, Debug)]
-pub struct Plan {
-    pub(crate) settings: Settings,
-    pub(crate) tiles: Tiles,
-    /// Room for statistics of the scene, if they are wanted.
-    pub(crate) cache: Option<CacheSize>,
-    session: Layout,
-    shard: Layout,
-}
-
-impl Plan {
-    /// Checks the settings and measures the blocks.
-    pub fn new(settings: &Settings) -> Result<Self, SettingsError> {
-        let s = *settings;
-        #[expect(clippy::eq_op, reason = "equal to itself unless a number in it is NaN")]
-        if s != s {
-            return Err(SettingsError::NotANumber);
-        }
-        let pixels = u64::from(s.size[0]) * u64::from(s.size[1]);
-        if pixels == 0 || pixels > 1 << 31 {
-            return Err(SettingsError::Size(s.size));
-        }
-        if s.shards == 0 || s.shards > 65_536 {
-            return Err(SettingsError::Shards(s.shards));
-        }
-        if s.max_depth == 0 {
-            return Err(SettingsError::Depth(s.max_depth));
-        }
-        if s.ring < MIN_RING || s.ring > 1 << 24 {
-            return Err(SettingsError::Ring(s.ring));
-        }
-        let tiles = Tiles::new(s.size, s.shards);
-        let pixels = pixels as usize;
-        let cache = cache_size(&s)?;
-        let session = Measure::new().add::<PixelStats>(pixels).add::<PixelAov>(if s.aovs { pixels } else { 0 });
-        let session = Knowledge::measure(session, &s, cache);
-        let shard = shard_measure(&s, cache, &tiles);
-        Ok(Self {
-            settings: s,
-            tiles,
-            cache,
-            session: session.layout().ok_or(SettingsError::Memory)?,
-            shard: shard.layout().ok_or(SettingsError::Memory)?,
-        })
-    }
-
-    /// The shared block.
-    pub fn session(&self) -> Layout {
-        self.session
-    }
-
-    /// The block of each shard.
-    pub fn shard(&self) -> Layout {
-        self.shard
-    }
-
-    /// The settings it was made for.
-    pub fn settings(&self) -> &Settings {
-        &self.settings
-    }
-}
-
-/// Checks what is to be learned and how; the size of its statistics.
-fn cache_size(s: &Settings) -> Result<Option<CacheSize>, SettingsError> {
-    let fits = match s.constant {
-        Constant::Off => true,
-        Constant::Cached => s.strategy.space() == Some(Space::Scene),
-        Constant::Number(x) => x.is_finite() && !s.strategy.is_biased(),
-    };
-    if !fits {
-        return Err(SettingsError::Constant);
-    }
-    let l = &s.learning;
-    let [least, most] = l.factors;
-    let fits = (MIN_FACTOR..=1.0).contains(&least)
-        && (1.0..=MAX_FACTOR).contains(&most)
-        && (1..=1 << 24).contains(&l.ledger)
-        && l.samples > 0
-        && l.split_count > 0.0
-        && (0.0..=1.0).contains(&l.carry);
-    if !fits {
-        return Err(SettingsError::Learning);
-    }
-    if s.strategy.space().is_none() {
-        return Ok(None);
-    }
-    let needed = CacheSize::SMALLEST.bytes(s.shards).ok_or(SettingsError::Memory)?;
-    CacheSize::within(l.cache_bytes, s.shards).map(Some).ok_or(SettingsError::Cache { needed, given: l.cache_bytes })
-}

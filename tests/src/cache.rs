@@ -70,7 +70,7 @@ pub fn locals(cache: &Cache<'_>) -> impl Iterator<Item = Local8> {
 
 /// Panics unless all of `l` is as documented.
 pub fn assert_sane(l: &Local8) {
-    let share = l.light_share.ge(F32x8::ZERO) & l.light_share.le(F32x8::ONE);
+    let share = l.nee_share.ge(F32x8::ZERO) & l.nee_share.le(F32x8::ONE);
     let mut ok = share & l.cost.is_finite() & l.cost.ge(F32x8::ZERO) & l.count.is_finite() & l.count.ge(F32x8::ZERO);
     for (m, q, v) in [
         (l.mean.x, l.moment.x, l.variance.x),

@@ -8,7 +8,7 @@
 use crate::cache::Sums;
 use croupier::accel::{Intersector, Ray8, WideBvh, offset, shadow_ray, surface_point};
 use croupier::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
-use croupier::learn::COST_SHADOW;
+use croupier::cost::COST_SHADOW;
 use croupier::learn::cache::{Cache, Kind};
 use croupier::light::{LightSample8, PowerSelector, area_pdf, area_radiance, power_heuristic, sample};
 use croupier::rng::Key8;
@@ -165,10 +165,10 @@ impl Replay<'_, '_> {
             _ => v.ns * (v.ns.dot(v.wo) * F32x8::splat(2.0)) - v.wo,
         };
         let kind = match (depth, v.kind) {
-            (1, MaterialKind::Diffuse) => Kind::FirstMatte,
-            (1, _) => Kind::FirstShiny,
-            (_, MaterialKind::Diffuse) => Kind::Matte,
-            _ => Kind::Shiny,
+            (1, MaterialKind::Diffuse) => Kind::FirstDiffuse,
+            (1, _) => Kind::FirstGlossy,
+            (_, MaterialKind::Diffuse) => Kind::Diffuse,
+            _ => Kind::Glossy,
         };
         let kind = U32x8::splat(kind as u32);
         let bin = self.cache.find(kind, v.p, dir, one()).lane(0) as usize;

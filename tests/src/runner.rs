@@ -4,9 +4,9 @@ use croupier::accel::{Intersector, WideBvh};
 use croupier::film::{PixelAov, PixelStats};
 use croupier::learn::PictureStatistics;
 use croupier::learn::cache::CacheError;
-use croupier::profile::{Full, Matte, Profile};
+use croupier::profile::{DiffuseOnly, Full, Profile};
 use croupier::{
-    Budget, Counters, ErrorEstimate, Plan, Progress, Scene, Session, SessionError, Settings, Shard, Strategy,
+    Budget, Counters, ErrorEstimate, Plan, Scene, Session, SessionError, Settings, Shard, StepResult, Strategy,
 };
 use croupier_host::blob::AlignedBytes;
 
@@ -87,8 +87,8 @@ pub fn render(scene: &[u8], settings: &Settings, spp: u32) -> Image {
 pub fn scheduled(scene: &[u8], settings: &Settings, iterations: &[u32], schedule: Schedule) -> Image {
     let scene = Scene::from_bytes(scene).expect("a valid scene");
     let bvh = WideBvh::new(&scene);
-    if Matte::EFFECTS.contains(scene.effects) {
-        render_with::<Matte, _>(scene, bvh, settings, iterations, schedule)
+    if DiffuseOnly::EFFECTS.contains(scene.effects) {
+        render_with::<DiffuseOnly, _>(scene, bvh, settings, iterations, schedule)
     } else {
         render_with::<Full, _>(scene, bvh, settings, iterations, schedule)
     }
@@ -104,8 +104,8 @@ pub fn learning(
 ) -> Image {
     let scene = Scene::from_bytes(scene).expect("a valid scene");
     let bvh = WideBvh::new(&scene);
-    if Matte::EFFECTS.contains(scene.effects) {
-        learning_with::<Matte, _>(scene, bvh, settings, iterations, schedule, before)
+    if DiffuseOnly::EFFECTS.contains(scene.effects) {
+        learning_with::<DiffuseOnly, _>(scene, bvh, settings, iterations, schedule, before)
     } else {
         learning_with::<Full, _>(scene, bvh, settings, iterations, schedule, before)
     }
@@ -218,7 +218,7 @@ fn used_memory(bytes: usize) -> AlignedBytes {
 
 /// Steps a shard until it is done.
 pub fn finish<P: Profile, I: Intersector>(session: &Session<'_, '_, P, I>, shard: &mut Shard<'_>, rays: u64) {
-    while shard.step(session, Budget { rays }) == Progress::More {}
+    while shard.step(session, Budget { rays }) == StepResult::More {}
 }
 
 fn run<P: Profile + Sync, I: Intersector + Sync>(
@@ -234,7 +234,7 @@ fn run<P: Profile + Sync, I: Intersector + Sync>(
             while more {
                 more = false;
                 for s in shards.iter_mut() {
-                    more |= s.step(session, Budget { rays }) == Progress::More;
+                    more |= s.step(session, Budget { rays }) == StepResult::More;
                 }
             }
         }
@@ -243,7 +243,7 @@ fn run<P: Profile + Sync, I: Intersector + Sync>(
             let mut left: Vec<&mut Shard<'_>> = shards.iter_mut().collect();
             while !left.is_empty() {
                 let i = (rng.bits() % left.len() as u64) as usize;
-                if left[i].step(session, Budget { rays: 1 + rng.bits() % rays }) == Progress::Done {
+                if left[i].step(session, Budget { rays: 1 + rng.bits() % rays }) == StepResult::Done {
                     left.swap_remove(i);
                 }
             }

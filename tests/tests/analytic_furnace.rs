@@ -270,7 +270,7 @@ fn white_boxes_end_at_the_hard_stop() {
         let c = render(&scene, &Settings { max_depth, ..settings(&scene, strategy) }, 4).counters;
         assert_eq!((c.camera_samples, c.camera_rays), (64, 64));
         assert_eq!((c.scatter_rays, c.shadow_rays), (64 * 199, 0), "{strategy}");
-        assert_eq!(c.hard_stopped, if max_depth > 200 { 64 } else { 0 }, "{strategy}, {max_depth}");
+        assert_eq!(c.max_length_reached, if max_depth > 200 { 64 } else { 0 }, "{strategy}, {max_depth}");
     }
     // splitting spends its budget and then ends as well
     let settings = Settings { max_depth: u32::MAX, split_budget: 64, ..settings(&scene, "fixed:20") };

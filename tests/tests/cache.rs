@@ -278,7 +278,7 @@ fn children_inherit_their_parents_sums() {
     // 1000 a root: 125 a child, 16 a grandchild
     cache.freeze(100.0);
     assert_eq!((cache.leaves(), cache.nodes()), (256, 292));
-    assert_eq!(cache.splits_refused(), 0);
+    assert_eq!(cache.subdivisions_refused(), 0);
     let after = Oracle::new(&saved(&cache));
     for (i, leaf) in after.leaves.iter().enumerate() {
         for (b, p) in leaf.iter().zip(&before.leaves[i / 64]) {
@@ -305,7 +305,7 @@ fn a_full_arena_refuses_and_counts() {
         iterate(&mut cache, &mut shards, 40_000, 50.0, &mut rng);
     }
     let room = cache.size().leaves();
-    assert!(room > 50 && cache.splits_refused() > 0, "{room}");
+    assert!(room > 50 && cache.subdivisions_refused() > 0, "{room}");
     assert_eq!(cache.leaves(), room);
     let oracle = Oracle::new(&saved(&cache));
     assert_eq!((oracle.total(0), oracle.total(1)), (160_000.0, 160_000.0));
@@ -313,10 +313,10 @@ fn a_full_arena_refuses_and_counts() {
     // Both trees got half of the samples, so no leaf keeps those of a whole root.
     assert!(counts.fold(0.0, f64::max) < 40_000.0);
     locals(&cache).for_each(|l| assert_sane(&l));
-    let refused = cache.splits_refused();
+    let refused = cache.subdivisions_refused();
     cache.freeze(f64::INFINITY);
     cache.freeze(f64::NAN);
-    assert_eq!(cache.splits_refused(), refused);
+    assert_eq!(cache.subdivisions_refused(), refused);
 }
 
 /// A cell that has met nothing bright leans on its surroundings, which have; the more samples it has, the less. Killed
@@ -436,7 +436,7 @@ fn light_shares_are_of_all_squares() {
     cache.begin_merge(1.0);
     cache.absorb(t);
     cache.freeze(f64::INFINITY);
-    let share = |bin: u32| f64::from(cache.local(U32x8::splat(bin), ALL()).light_share.lane(3));
+    let share = |bin: u32| f64::from(cache.local(U32x8::splat(bin), ALL()).nee_share.lane(3));
     // the bin, four samples of its leaf
     let expected = (10.0 * 1000.0 + 4.0 * 7.5) / (29.0 * 1000.0 + 4.0 * 15.0);
     assert!((share(0) - expected).abs() < 1e-6, "{} for {expected}", share(0));

@@ -36,7 +36,7 @@ fn a_saved_cache_comes_back_bit_for_bit() {
             let bin = croupier::simd::U32x8::splat(find(c, 0, p, d));
             let l = c.local(bin, croupier::simd::Mask8::first(1));
             let others = [l.cost.lane(0), l.count.lane(0), c.visibility_root(bin).lane(0)];
-            ([l.mean.lane(0), l.moment.lane(0), l.variance.lane(0), others], l.light_share.lane(0))
+            ([l.mean.lane(0), l.moment.lane(0), l.variance.lane(0), others], l.nee_share.lane(0))
         });
         assert_eq!(a, b);
     }
@@ -80,7 +80,7 @@ fn merging_trees_that_differ() {
         let (mut cache, _) = blocks.carve(LO, HI);
         files.iter().for_each(|f| cache.merge(f).unwrap());
         locals(&cache).for_each(|l| assert_sane(&l));
-        (saved(&cache), cache.splits_refused())
+        (saved(&cache), cache.subdivisions_refused())
     };
     let (bytes, refused) = merge(600, [&fine, &coarse]);
     assert_eq!(merge(600, [&coarse, &fine]).0, bytes);
@@ -134,10 +134,13 @@ fn damage_is_named() {
         assert_eq!(e, CacheError::Objective { expected: Objective::Relative, found: found.into() });
         assert!(format!("{e}").ends_with(said), "{e}");
     }
-    assert!(matches!(try_load(&|b| b[65] = 2, true), CacheError::Node { index: 1, found: 2, depth: 1 }));
+    assert!(matches!(try_load(&|b| b[65] = 2, true), CacheError::OctreeNode { index: 1, found: 2, depth: 1 }));
     assert!(matches!(try_load(&|b| b[64] = 0, true), CacheError::Shape { .. }));
     // as many bytes as before, all inner: too deep
-    assert!(matches!(try_load(&|b| b[64..sums].fill(1), true), CacheError::Node { index: 16, found: 1, depth: 16 }));
+    assert!(matches!(
+        try_load(&|b| b[64..sums].fill(1), true),
+        CacheError::OctreeNode { index: 16, found: 1, depth: 16 }
+    ));
     assert!(matches!(try_load(&|b| b[64..sums].fill(0), true), CacheError::Shape { found: [4, 4], .. }));
     for x in [-1.0, f64::NAN, f64::INFINITY, 1e101, -1e-300] {
         let edit =

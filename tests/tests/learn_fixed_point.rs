@@ -18,7 +18,7 @@ struct Example {
     mean: [[f64; 3]; 8],
     variance: [[f64; 3]; 8],
     cost: [f64; 8],
-    importance: [f64; 3],
+    error_weight: [f64; 3],
     /// Cost of a sample of x.
     prefix: f64,
 }
@@ -33,16 +33,16 @@ impl Example {
         let g = [(); 8].map(|()| rgb(0.1, 1.0));
         let mean = [(); 8].map(|()| rgb(0.1, 2.0));
         let variance = [(); 8].map(|()| rgb(0.01, 30.0));
-        let importance = if coloured { rgb(0.5, 2.0) } else { [1.0; 3] };
+        let error_weight = if coloured { rgb(0.5, 2.0) } else { [1.0; 3] };
         let weight = [(); 8].map(|()| log(0.2, 1.0));
         let sum: f64 = weight.iter().sum();
         let cost = [(); 8].map(|()| log(1.0, 8.0));
-        Self { probability: weight.map(|w| w / sum), g, mean, variance, cost, importance, prefix: log(1.0, 3.0) }
+        Self { probability: weight.map(|w| w / sum), g, mean, variance, cost, error_weight, prefix: log(1.0, 3.0) }
     }
 
-    /// Mean over the colours of g^2 x importance x what.
+    /// Mean over the colours of g^2 x error weight x what.
     fn weighted(&self, k: usize, what: impl Fn(usize) -> f64) -> f64 {
-        (0..3).map(|c| self.g[k][c].powi(2) * self.importance[c] * what(c)).sum::<f64>() / 3.0
+        (0..3).map(|c| self.g[k][c].powi(2) * self.error_weight[c] * what(c)).sum::<f64>() / 3.0
     }
 
     /// Variance of the exact suffixes: eq. (17).
@@ -82,14 +82,14 @@ impl Example {
                 depth: U32x8::splat(1),
                 shininess: F32x8::ZERO,
                 learned: Learned8 {
-                    importance: rgb(&|_, c| self.importance[c]),
+                    error_weight: rgb(&|_, c| self.error_weight[c]),
                     norm: Norm::Mean,
                     cost_over_variance: F32x8::splat((self.cost(&s) / self.variance(&s)) as f32),
                     mean: rgb(&|k, c| self.mean[k][c]),
                     moment: rgb(&|k, c| self.variance[k][c] + self.mean[k][c].powi(2)),
                     variance: rgb(&|k, c| self.variance[k][c]),
                     cost: F32x8::from_fn(|k| self.cost[k] as f32),
-                    light_share: F32x8::ONE,
+                    nee_share: F32x8::ONE,
                     count: F32x8::splat(1e6),
                 },
             });
@@ -133,7 +133,7 @@ fn the_fixed_point_is_the_numerical_minimum() {
 fn factors_settle_in_the_machine() {
     let scene = blob(&cornell([24, 24]));
     let s = settings(&scene, "ears:plain");
-    let learning_ = Learning { carry: 0.0, cache_bytes: 1 << 20, split_count: 4000.0, samples: 48, ..s.learning };
+    let learning_ = Learning { decay: 0.0, cache_bytes: 1 << 20, subdivide_count: 4000.0, samples: 48, ..s.learning };
     let s = Settings { max_depth: 12, seed: 17, learning: learning_, ..s };
     let mut seen = Vec::new();
     learning(&scene, &s, &[48; 46], Schedule::InOrder(1 << 20), &mut |i, l: &mut dyn Learned| {

@@ -3,7 +3,7 @@
 
 use croupier::accel::WideBvh;
 use croupier::learn::cache::{Cache, CacheSize, Kind};
-use croupier::learn::{Estimate, Learning, Objective};
+use croupier::learn::{Learning, Objective, PixelEstimator};
 use croupier::{Counters, Scene, Settings};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::description::{Model, Reflectance, SceneDescription};
@@ -21,7 +21,7 @@ fn whole_leaves(scene: &[u8], max_depth: u32) -> Settings {
     let learning = Learning {
         cache_bytes: 16_000,
         ledger: 1 << 14,
-        estimate: Estimate::Blocks,
+        estimate: PixelEstimator::Blocks,
         objective: Objective::Absolute,
         samples: u32::MAX,
         ..s.learning
@@ -70,7 +70,11 @@ fn both(description: &SceneDescription, max_depth: u32, iterations: &[u32]) -> B
     });
     let (mut machine, new_pixels, new) = states.pop().unwrap();
     let (_, old_pixels, old) = states.pop().unwrap();
-    assert_eq!((new.ledger_full, new.samples_refused, new.ring_capped, new.budget_capped), (0, 0, 0, 0), "{new:?}");
+    assert_eq!(
+        (new.ledger_full, new.samples_refused, new.splits_limited_by_ring, new.splits_limited_by_budget),
+        (0, 0, 0, 0),
+        "{new:?}"
+    );
 
     let size = CacheSize::within(s.learning.cache_bytes, 1).unwrap();
     assert_eq!(size.leaves(), 4);
@@ -188,7 +192,7 @@ fn faces_and_materials_in_one_cell_stay_apart() {
     let cases = [(Objective::Absolute, [0.2, 0.8], [0.5]), (Objective::Relative, [0.8944, 0.9923], [0.9806])];
     for (objective, faces, shown) in cases {
         let mut s = whole_leaves(&scene, 2);
-        (s.learning.objective, s.learning.carry) = (objective, 0.0);
+        (s.learning.objective, s.learning.decay) = (objective, 0.0);
         let mut found = Vec::new();
         learning(&scene, &s, &[16, 16, 0], IN_ORDER, &mut |_, l: &mut dyn Learned| found = bins(l));
         assert_eq!(found.len(), 64, "one leaf for each kind");
@@ -201,9 +205,9 @@ fn faces_and_materials_in_one_cell_stay_apart() {
         let close = |found: &[f64], expected: &[f64]| {
             found.len() == expected.len() && found.iter().zip(expected).all(|(f, e)| (f / e - 1.0).abs() < 0.05)
         };
-        let (matte, shiny) = (of(Kind::FirstMatte), of(Kind::FirstShiny));
+        let (matte, shiny) = (of(Kind::FirstDiffuse), of(Kind::FirstGlossy));
         assert!(close(&matte, &faces) && close(&shiny, &shown), "{objective}: {matte:?} and {shiny:?}");
-        assert!(of(Kind::Matte).is_empty() && of(Kind::Shiny).is_empty(), "paths have one vertex");
+        assert!(of(Kind::Diffuse).is_empty() && of(Kind::Glossy).is_empty(), "paths have one vertex");
     }
 }
 
@@ -244,7 +248,7 @@ fn shadow_roulette_does_not_change_what_is_logged() {
     let scene = blob(&cornell([16, 16]));
     let mean = |shadow_roulette: bool| {
         let mut s = Settings { size: [16, 16], shadow_roulette, ..whole_leaves(&scene, 6) };
-        (s.learning.carry, s.learning.factors) = (0.0, [1.0, 1.0]);
+        (s.learning.decay, s.learning.factors) = (0.0, [1.0, 1.0]);
         let mut sums = [0.0; FIELDS];
         let image = learning(&scene, &s, &[16, 512, 0], IN_ORDER, &mut |i, l: &mut dyn Learned| {
             if i == 2 {
@@ -255,8 +259,8 @@ fn shadow_roulette_does_not_change_what_is_logged() {
     };
     let ((without, none), (with, c)) = (mean(false), mean(true));
     println!("{with} for {without}, {c:?}");
-    assert!(none.shadow_kills == 0 && none.light_kills == 0);
-    assert!(c.shadow_kills > c.shadow_rays / 10 && c.light_kills > c.vertex_samples / 10);
+    assert!(none.shadow_rays_terminated == 0 && none.light_samples_skipped == 0);
+    assert!(c.shadow_rays_terminated > c.shadow_rays / 10 && c.light_samples_skipped > c.vertex_samples / 10);
     assert!((with / without - 1.0).abs() < 0.01, "{with} for {without}");
 }
 
@@ -266,7 +270,7 @@ fn shadow_roulette_does_not_change_what_is_logged() {
 fn spared_light_samples_are_made_up_for() {
     let scene = blob(&lamp_box());
     let mut s = Settings { size: [16, 16], shadow_roulette: true, ..whole_leaves(&scene, 3) };
-    (s.learning.carry, s.learning.factors) = (0.0, [1.0, 1.0]);
+    (s.learning.decay, s.learning.factors) = (0.0, [1.0, 1.0]);
     // squares a sample in the iteration of 2,048 samples, which all draw in the first one
     let squares = |iterations: &[u32]| {
         let (mut sums, mut counters) = ([0.0; FIELDS], Vec::new());
@@ -286,7 +290,10 @@ fn spared_light_samples_are_made_up_for() {
         });
         let [before, after] = [counters.len() - 2, counters.len() - 1].map(|k| counters[k]);
         let of = |f: fn(&Counters) -> u64| (f(&after) - f(&before)) as f64;
-        let spared = [of(|c| c.light_kills) / of(|c| c.vertex_samples), of(|c| c.shadow_kills) / of(|c| c.shadow_rays)];
+        let spared = [
+            of(|c| c.light_samples_skipped) / of(|c| c.vertex_samples),
+            of(|c| c.shadow_rays_terminated) / of(|c| c.shadow_rays),
+        ];
         (sums[14] / sums[0], spared)
     };
     let (all, none) = squares(&[2048, 0]);

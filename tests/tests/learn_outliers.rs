@@ -81,8 +81,12 @@ fn moments_leave_fireflies_out() {
     s.environment = Some(Environment::Constant { radiance: [30.0; 3] });
     let scene = blob(&s);
     let s = settings(&scene, "ears");
-    let s =
-        Settings { max_depth: 2, seed: 3, learning: Learning { carry: 1.0, split_count: f32::MAX, ..s.learning }, ..s };
+    let s = Settings {
+        max_depth: 2,
+        seed: 3,
+        learning: Learning { decay: 1.0, subdivide_count: f32::MAX, ..s.learning },
+        ..s
+    };
     let mut sums = [0.0; FIELDS];
     let image =
         learning(&scene, &s, &[[1].as_slice(), &[4; 40], &[0]].concat(), IN_ORDER, &mut |_, l: &mut dyn Learned| {

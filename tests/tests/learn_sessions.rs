@@ -3,7 +3,7 @@
 
 use croupier::film::PixelStats;
 use croupier::learn::cache::{BIN_LIMIT, CacheError, CacheSize};
-use croupier::learn::{Constant, Estimate, Learning, Objective};
+use croupier::learn::{ControlVariate, Learning, Objective, PixelEstimator};
 use croupier::rrs::Norm;
 use croupier::{Counters, Plan, Settings, SettingsError, Strategy};
 use croupier_host::description::*;
@@ -16,7 +16,7 @@ const IN_ORDER: Schedule = Schedule::InOrder(1 << 20);
 
 fn learns(scene: &[u8], strategy: &str, max_depth: u32) -> Settings {
     let s = settings(scene, strategy);
-    let learning = Learning { cache_bytes: 1 << 20, split_count: 500.0, ..s.learning };
+    let learning = Learning { cache_bytes: 1 << 20, subdivide_count: 500.0, ..s.learning };
     Settings { max_depth, learning, ..s }
 }
 
@@ -73,15 +73,15 @@ fn loaded_statistics_are_used() {
     assert!(without.bits() != with.bits());
 }
 
-/// Counts of the cache are those of the counters, and an iteration hands on what `carry` says. Killed by: samples that
+/// Counts of the cache are those of the counters, and an iteration hands on what `decay` says. Killed by: samples that
 /// are counted and not logged, shards left out, statistics that decay once per shard.
 #[test]
 fn counts_agree_and_decay() {
     let scene = blob(&cornell([16, 16]));
     for shards in [1, 3] {
-        let carry = 0.75;
+        let decay = 0.75;
         let mut s = Settings { shards, ..learns(&scene, "ears", 6) };
-        s.learning.carry = carry as f32;
+        s.learning.decay = decay as f32;
         let mut seen = Vec::new();
         learning(&scene, &s, &[8, 4, 16, 0, 0], IN_ORDER, &mut |_, l: &mut dyn Learned| {
             let c = l.counters();
@@ -90,7 +90,7 @@ fn counts_agree_and_decay() {
         let (mut expected, mut before) = (0.0, 0);
         for (i, (count, logged)) in seen.into_iter().enumerate() {
             if i > 0 {
-                expected = carry * expected + (logged - before) as f64;
+                expected = decay * expected + (logged - before) as f64;
             }
             before = logged;
             assert!((count - expected).abs() <= 1e-9 * expected, "after {i} iterations: {count} for {expected}");
@@ -172,8 +172,8 @@ fn lamps_behind_walls_get_few_shadow_rays() {
         assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
         let of = |f: fn(&Counters) -> u64| (f(&seen[3]) - f(&seen[1])) as f64;
         [
-            of(|c| c.shadow_rays) / of(|c| c.shadow_rays + c.shadow_kills),
-            of(|c| c.light_kills) / of(|c| c.vertex_samples),
+            of(|c| c.shadow_rays) / of(|c| c.shadow_rays + c.shadow_rays_terminated),
+            of(|c| c.light_samples_skipped) / of(|c| c.vertex_samples),
         ]
     });
     println!("behind the wall {hidden:?}, in front of the box {open:?} of shadow rays traced, of light samples spared");
@@ -199,7 +199,7 @@ fn light_samples_are_learned_from_in_any_case() {
             }
         });
         let of = |f: fn(&Counters) -> u64| (f(&seen[2]) - f(&seen[1])) as f64;
-        of(|c| c.light_kills) / of(|c| c.vertex_samples)
+        of(|c| c.light_samples_skipped) / of(|c| c.vertex_samples)
     };
     let (off, on) = (spared(false), spared(true));
     println!("{off} and {on} of the light samples spared");
@@ -279,9 +279,10 @@ fn overflowing_radiance_is_not_learned() {
     place(&mut s, scale, 0.0);
     s.emitters.push(Emitter::Point { position: [0.0, 0.6 * scale, -0.8 * scale], intensity: [1e18, 1.0, 0.0] });
     let scene = blob(&s);
-    for (strategy, constant) in [("ears", Constant::Cached), ("ears:plain", Constant::Off), ("adrrs", Constant::Cached)]
+    for (strategy, control_variate) in
+        [("ears", ControlVariate::Cached), ("ears:plain", ControlVariate::Off), ("adrrs", ControlVariate::Cached)]
     {
-        let s = Settings { constant, shadow_roulette: true, adaptive: true, ..learns(&scene, strategy, 3) };
+        let s = Settings { control_variate, shadow_roulette: true, adaptive: true, ..learns(&scene, strategy, 3) };
         let mut last = None;
         let image = learning(&scene, &s, &[16, 16, 16, 0], IN_ORDER, &mut |_, l: &mut dyn Learned| {
             let bytes = l.saved().unwrap();
@@ -307,8 +308,8 @@ fn extreme_statistics_do_no_harm() {
     bright[12] = 1e-300;
     let lit = only(&[0, 3, 6, 14], 1e100);
     for sums in [[1e100; FIELDS], [0.0; FIELDS], [1e-300; FIELDS], only(&[0, 3, 6], 1e100), hidden, bright, lit] {
-        for constant in [Constant::Off, Constant::Cached] {
-            let s = Settings { constant, shadow_roulette: true, ..learns(&scene, "ears:plain", 4) };
+        for control_variate in [ControlVariate::Off, ControlVariate::Cached] {
+            let s = Settings { control_variate, shadow_roulette: true, ..learns(&scene, "ears:plain", 4) };
             let image = learning(&scene, &s, &[1, 1, 1], IN_ORDER, &mut |_, l: &mut dyn Learned| {
                 let mut bytes = l.saved().unwrap();
                 overwrite(&mut bytes, || sums);
@@ -316,8 +317,8 @@ fn extreme_statistics_do_no_harm() {
             });
             assert_eq!(image.counters.camera_samples, 3 * 16 * 12);
             assert!(image.mean().is_finite() && image.mean() > 0.05, "{sums:?}: {}", image.mean());
-            // a constant of 1e16 is a factor's worth of noise, not an infinity
-            assert!(constant == Constant::Cached || image.counters.non_finite == 0, "{sums:?}");
+            // a control variate of 1e16 is a factor's worth of noise, not an infinity
+            assert!(control_variate == ControlVariate::Cached || image.counters.non_finite == 0, "{sums:?}");
         }
     }
 }
@@ -328,8 +329,8 @@ fn extreme_statistics_do_no_harm() {
 fn everything_fits_in_little_memory() {
     let scene = blob(&cornell([32, 32]));
     let mut s = learns(&scene, "ears", 6);
-    (s.adaptive, s.shadow_roulette, s.constant, s.ring) = (true, true, Constant::Cached, 128);
-    let small = Learning { cache_bytes: 96 << 10, ledger: 256, estimate: Estimate::Blocks, ..s.learning };
+    (s.adaptive, s.shadow_roulette, s.control_variate, s.ring) = (true, true, ControlVariate::Cached, 128);
+    let small = Learning { cache_bytes: 96 << 10, ledger: 256, estimate: PixelEstimator::Blocks, ..s.learning };
     let s = Settings { learning: small, ..s };
     let plan = Plan::new(&s).unwrap();
     let pixels = 32 * 32;
@@ -390,9 +391,9 @@ fn choices_that_make_no_sense_are_refused() {
         Learning { ledger: 0, ..Learning::default() },
         Learning { samples: 0, ..Learning::default() },
         Learning { ledger: (1 << 24) + 1, ..Learning::default() },
-        Learning { split_count: 0.0, ..Learning::default() },
-        Learning { carry: -0.1, ..Learning::default() },
-        Learning { carry: 1.1, ..Learning::default() },
+        Learning { subdivide_count: 0.0, ..Learning::default() },
+        Learning { decay: -0.1, ..Learning::default() },
+        Learning { decay: 1.1, ..Learning::default() },
         Learning { factors: [0.04, 20.0], ..Learning::default() },
         Learning { factors: [0.05, 21.0], ..Learning::default() },
         Learning { factors: [1.1, 2.0], ..Learning::default() },
@@ -403,8 +404,8 @@ fn choices_that_make_no_sense_are_refused() {
         }
     }
     let not_numbers = [
-        Learning { split_count: f32::NAN, ..Learning::default() },
-        Learning { carry: f32::NAN, ..Learning::default() },
+        Learning { subdivide_count: f32::NAN, ..Learning::default() },
+        Learning { decay: f32::NAN, ..Learning::default() },
         Learning { factors: [f32::NAN, 1.0], ..Learning::default() },
     ];
     for learning in not_numbers {
@@ -419,9 +420,19 @@ fn choices_that_make_no_sense_are_refused() {
     assert_eq!(with("ears", &|s| s.learning.cache_bytes = needed), None);
     assert_eq!(with("classic", &|s| s.learning.cache_bytes = 0), None);
     for strategy in ["classic", "bolin-meyer", "fixed:2"] {
-        assert_eq!(with(strategy, &|s| s.constant = Constant::Cached), Some(SettingsError::Constant), "{strategy}");
-        assert_eq!(with(strategy, &|s| s.constant = Constant::Number(-1.0)), None);
+        assert_eq!(
+            with(strategy, &|s| s.control_variate = ControlVariate::Cached),
+            Some(SettingsError::ControlVariate),
+            "{strategy}"
+        );
+        assert_eq!(with(strategy, &|s| s.control_variate = ControlVariate::Number(-1.0)), None);
     }
-    assert_eq!(with("ears", &|s| s.constant = Constant::Number(f32::INFINITY)), Some(SettingsError::Constant));
-    assert_eq!(with("ears", &|s| s.constant = Constant::Number(f32::NAN)), Some(SettingsError::NotANumber));
+    assert_eq!(
+        with("ears", &|s| s.control_variate = ControlVariate::Number(f32::INFINITY)),
+        Some(SettingsError::ControlVariate)
+    );
+    assert_eq!(
+        with("ears", &|s| s.control_variate = ControlVariate::Number(f32::NAN)),
+        Some(SettingsError::NotANumber)
+    );
 }

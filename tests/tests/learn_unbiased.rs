@@ -7,7 +7,7 @@
 //! with different seeds.
 
 use croupier::film::{PixelAov, PixelStats};
-use croupier::learn::{Constant, Estimate, Learning, Objective};
+use croupier::learn::{ControlVariate, Learning, Objective, PixelEstimator};
 use croupier::rrs::Norm;
 use croupier::{Settings, Strategy};
 use croupier_host::builtin;
@@ -55,7 +55,7 @@ fn assert_equivalent(what: &str, a: Known, b: Known) {
 /// Statistics of a size that suits small pictures.
 fn learns(scene: &[u8], strategy: &str, max_depth: u32) -> Settings {
     let s = settings(scene, strategy);
-    let learning = Learning { cache_bytes: 1 << 20, split_count: 2000.0, ..s.learning };
+    let learning = Learning { cache_bytes: 1 << 20, subdivide_count: 2000.0, ..s.learning };
     Settings { max_depth, learning, ..s }
 }
 
@@ -178,7 +178,7 @@ fn mirrors_and_glass_play_learned_roulette() {
             let sum = |of: fn(&PixelAov) -> f64| image.aovs.iter().map(of).sum::<f64>();
             let vertices = sum(|a| a.vertices[1]);
             let [first, delta] = [sum(|a| a.factor[0]) / sum(|a| a.vertices[0]), sum(|a| a.factor[1]) / vertices];
-            let killed = image.counters.roulette_kills as f64 / vertices;
+            let killed = image.counters.paths_terminated as f64 / vertices;
             println!(
                 "{what}, {strategy}: factors {first:.3} and {delta:.3}, {killed:.3} of the second vertices killed"
             );
@@ -197,7 +197,7 @@ fn soft(mut s: SceneDescription) -> SceneDescription {
 }
 
 /// Every choice there is. Killed by: an adaptive pixel whose weight follows its own noise, shadow roulette that divides
-/// one of two sums, a constant that is added without what was rounded away, a bound that lowers n and not s.
+/// one of two sums, a control variate that is added without what was rounded away, a bound that lowers n and not s.
 #[test]
 fn choices_do_not_bias() {
     let scene = blob(&cornell([16, 16]));
@@ -210,33 +210,34 @@ fn choices_do_not_bias() {
         image.counters
     };
     let c = check("ring of 16", "ears:plain", &|s| s.ring = 16);
-    assert!(c.ring_capped > 0);
+    assert!(c.splits_limited_by_ring > 0);
     let c = check("ledger of 4", "ears", &|s| s.learning.ledger = 4);
     assert!(c.ledger_full > c.samples_logged, "{c:?}");
     check("cache of 32 KiB", "ears", &|s| s.learning.cache_bytes = 32 << 10);
     check("no split budget", "ears:plain", &|s| s.split_budget = 0);
     check("everything small", "ears", &|s| {
-        (s.ring, s.learning.ledger, s.learning.cache_bytes, s.learning.estimate) = (16, 4, 16 << 10, Estimate::Blocks);
-        (s.adaptive, s.shadow_roulette, s.constant) = (true, true, Constant::Cached);
+        (s.ring, s.learning.ledger, s.learning.cache_bytes, s.learning.estimate) =
+            (16, 4, 16 << 10, PixelEstimator::Blocks);
+        (s.adaptive, s.shadow_roulette, s.control_variate) = (true, true, ControlVariate::Cached);
     });
     check("adaptive", "ears", &|s| s.adaptive = true);
     check("adaptive", "none", &|s| s.adaptive = true);
     let c = check("shadow roulette", "ears", &|s| s.shadow_roulette = true);
-    assert!(c.shadow_kills > c.shadow_rays / 50 && c.light_kills > 5000, "{c:?}");
+    assert!(c.shadow_rays_terminated > c.shadow_rays / 50 && c.light_samples_skipped > 5000, "{c:?}");
     check("shadow roulette", "classic", &|s| s.shadow_roulette = true);
     let c = check("shadow roulette", "bolin-meyer", &|s| s.shadow_roulette = true);
-    assert!(c.light_kills > 1000, "{c:?}");
-    check("cached constant", "ears", &|s| s.constant = Constant::Cached);
-    check("cached constant", "ear:plain", &|s| s.constant = Constant::Cached);
-    check("constant of 0.3", "fixed:0.7", &|s| s.constant = Constant::Number(0.3));
-    check("constant of -0.2", "ears", &|s| s.constant = Constant::Number(-0.2));
+    assert!(c.light_samples_skipped > 1000, "{c:?}");
+    check("cached control_variate", "ears", &|s| s.control_variate = ControlVariate::Cached);
+    check("cached control_variate", "ear:plain", &|s| s.control_variate = ControlVariate::Cached);
+    check("control_variate of 0.3", "fixed:0.7", &|s| s.control_variate = ControlVariate::Number(0.3));
+    check("control_variate of -0.2", "ears", &|s| s.control_variate = ControlVariate::Number(-0.2));
     check("absolute error", "ears", &|s| s.learning.objective = Objective::Absolute);
-    check("blocks", "ears:plain", &|s| s.learning.estimate = Estimate::Blocks);
+    check("blocks", "ears:plain", &|s| s.learning.estimate = PixelEstimator::Blocks);
     for norm in [Norm::Max, Norm::Luminance] {
         check(&format!("{norm:?}"), "ears:plain", &|s| s.learning.norm = norm);
     }
-    check("nothing carried", "ears", &|s| s.learning.carry = 0.0);
-    check("all carried", "ears", &|s| s.learning.carry = 1.0);
+    check("nothing carried", "ears", &|s| s.learning.decay = 0.0);
+    check("all carried", "ears", &|s| s.learning.decay = 1.0);
 }
 
 /// Renders of a few samples in several iterations, many of them with different seeds: what hangs on an iteration's own
@@ -295,20 +296,20 @@ fn weights_of_iterations_do_not_follow_their_light() {
 
 /// Renders of four samples whose statistics are replaced by random ones before the second iteration, and again before
 /// the third: factors of any size next to each other. Killed by: any use of what was learned but as a factor or a
-/// constant.
+/// control variate.
 #[test]
 fn random_statistics_do_not_bias() {
     let scene = blob(&cornell([16, 16]));
     let none = Known::of(&render(&scene, &Settings { seed: 8, ..learns(&scene, "none", 3) }, 60_000));
-    for (strategy, constant, renders) in [
-        ("ears:plain", Constant::Off, 900),
-        ("ears", Constant::Cached, 1000),
-        ("ear:plain", Constant::Off, 1500),
-        ("adrrs", Constant::Cached, 1700),
+    for (strategy, control_variate, renders) in [
+        ("ears:plain", ControlVariate::Off, 900),
+        ("ears", ControlVariate::Cached, 1000),
+        ("ear:plain", ControlVariate::Off, 1500),
+        ("adrrs", ControlVariate::Cached, 1700),
     ] {
         let (mut spread, mut count) = ([0u64; 2], 0);
         let one = |seed: u64| {
-            let mut s = Settings { seed, constant, ..learns(&scene, strategy, 3) };
+            let mut s = Settings { seed, control_variate, ..learns(&scene, strategy, 3) };
             s.learning.cache_bytes = 32 << 10;
             let mut rng = SplitMix(seed);
             let image = learning(&scene, &s, &[1, 1, 2], IN_ORDER, &mut |i, l: &mut dyn Learned| {
@@ -318,7 +319,7 @@ fn random_statistics_do_not_bias() {
             });
             let c = image.counters;
             spread[0] += c.splits;
-            spread[1] += c.roulette_kills;
+            spread[1] += c.paths_terminated;
             count += c.camera_samples;
             image.mean()
         };
@@ -335,7 +336,7 @@ fn random_statistics_do_not_bias() {
 fn random_roulette_of_light_samples_does_not_bias() {
     let scene = blob(&cornell([16, 16]));
     let none = Known::of(&render(&scene, &Settings { seed: 8, ..learns(&scene, "none", 3) }, 60_000));
-    let (mut samples, mut light_kills, mut rays, mut kills) = (0, 0, 0, 0);
+    let (mut samples, mut light_samples_skipped, mut rays, mut kills) = (0, 0, 0, 0);
     let one = |seed: u64| {
         let mut s = Settings { seed, shadow_roulette: true, ..learns(&scene, "ears", 3) };
         (s.learning.cache_bytes, s.learning.factors) = (32 << 10, [1.0, 1.0]);
@@ -346,14 +347,14 @@ fn random_roulette_of_light_samples_does_not_bias() {
             }
         });
         rays += image.counters.shadow_rays;
-        kills += image.counters.shadow_kills;
+        kills += image.counters.shadow_rays_terminated;
         samples += image.counters.vertex_samples;
-        light_kills += image.counters.light_kills;
+        light_samples_skipped += image.counters.light_samples_skipped;
         image.mean()
     };
     let known = Known::over((0..18_000).map(one));
-    println!("{light_kills} of {samples} light samples spared, {rays} shadow rays, {kills} spared");
-    assert!(kills > rays / 4 && light_kills > samples / 10);
+    println!("{light_samples_skipped} of {samples} light samples spared, {rays} shadow rays, {kills} spared");
+    assert!(kills > rays / 4 && light_samples_skipped > samples / 10);
     assert_equivalent("random roulette of light samples", known, none);
 }
 

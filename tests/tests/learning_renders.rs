@@ -1,8 +1,9 @@
 //! What renders that learn take and give: saved statistics, denoised pictures, figures.
 
+use croupier::cost::COST_SHADOW;
 use croupier::denoise::{Planes, scratch_len};
 use croupier::learn::cache::CacheSize;
-use croupier::learn::{COST_SHADOW, Constant, Learning, Objective};
+use croupier::learn::{ControlVariate, Learning, Objective};
 use croupier::rrs::Norm;
 use croupier::{Scene, Settings};
 use croupier_host::bake::{BakeOptions, bake};
@@ -29,7 +30,7 @@ fn options(strategy: &str, spp: u32) -> RenderOptions {
         target: Target::Spp(spp),
         threads: 1,
         shards: 2,
-        learning: Learning { cache_bytes: 1 << 20, split_count: 1000.0, ..Learning::default() },
+        learning: Learning { cache_bytes: 1 << 20, subdivide_count: 1000.0, ..Learning::default() },
         ..RenderOptions::default()
     }
 }
@@ -118,7 +119,7 @@ fn wrong_statistics_are_errors() {
             assert!(matches!(e, DriveError::NoCache(_)) && e.to_string().contains(strategy), "{e}");
         }
     }
-    let e = refused(scene(), &RenderOptions { constant: Constant::Cached, ..options("classic", 2) });
+    let e = refused(scene(), &RenderOptions { control_variate: ControlVariate::Cached, ..options("classic", 2) });
     assert!(matches!(e, DriveError::Settings(_)) && e.to_string().contains("ears"), "{e}");
 }
 
@@ -131,8 +132,8 @@ fn every_option_changes_the_picture() {
         base.clone(),
         RenderOptions { adaptive: true, ..base.clone() },
         RenderOptions { shadow_roulette: Some(false), ..base.clone() },
-        RenderOptions { constant: Constant::Cached, ..base.clone() },
-        RenderOptions { constant: Constant::Number(0.25), ..base.clone() },
+        RenderOptions { control_variate: ControlVariate::Cached, ..base.clone() },
+        RenderOptions { control_variate: ControlVariate::Number(0.25), ..base.clone() },
         RenderOptions { learning: Learning { objective: Objective::Absolute, ..l }, ..base.clone() },
         RenderOptions { learning: Learning { norm: Norm::Max, ..l }, ..base.clone() },
         RenderOptions { learning: Learning { cache_bytes: smallest(), ..l }, ..base },
@@ -226,7 +227,7 @@ fn figures_fit_together() {
         let counter = |name: &str| stats.counters[name];
         assert_eq!(counter("look_ups") > 0, learns);
         if learns {
-            let played = counter("vertex_samples") - counter("splits") + counter("roulette_kills");
+            let played = counter("vertex_samples") - counter("splits") + counter("paths_terminated");
             assert_eq!(counter("look_ups"), played);
             assert!(counter("samples_logged") <= counter("vertex_samples"));
         }

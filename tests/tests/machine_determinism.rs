@@ -2,7 +2,7 @@
 //! which shards are stepped do not matter, nor, in `reproducible` arithmetic, does the instruction set.
 
 use croupier::Settings;
-use croupier::learn::Constant;
+use croupier::learn::ControlVariate;
 use croupier::scene::blob::content_hash;
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::builtin;
@@ -53,11 +53,12 @@ fn schedules_do_not_change_what_is_learned() {
         let scene = blob(&scene);
         for all in [false, true] {
             let mut settings = Settings { shards: 5, aovs: true, seed: 8, max_depth: 6, ..settings(&scene, "ears") };
-            settings.learning.split_count = 500.0;
+            settings.learning.subdivide_count = 500.0;
             // some samples find no record
             settings.learning.ledger = 64;
             if all {
-                (settings.adaptive, settings.shadow_roulette, settings.constant) = (true, true, Constant::Cached);
+                (settings.adaptive, settings.shadow_roulette, settings.control_variate) =
+                    (true, true, ControlVariate::Cached);
             }
             let iterations = [2, 3, 4];
             let mut seen = Vec::new();
@@ -78,8 +79,12 @@ fn schedules_do_not_change_what_is_learned() {
             run(Schedule::Threads(5, 1000));
             let (_, reference, learned) = &seen[0];
             let c = reference.counters;
-            assert!(c.samples_logged > 1000 && c.roulette_kills > 100 && c.splits > 100, "{c:?}");
-            assert!(learned[2].1[0].variance > 0.0 && (!all || c.shadow_kills > 100 && c.light_kills > 10), "{c:?}");
+            assert!(c.samples_logged > 1000 && c.paths_terminated > 100 && c.splits > 100, "{c:?}");
+            assert!(
+                learned[2].1[0].variance > 0.0
+                    && (!all || c.shadow_rays_terminated > 100 && c.light_samples_skipped > 10),
+                "{c:?}"
+            );
             for (schedule, image, other) in &seen[1..] {
                 let what = format!("{name}, everything on {all}, {schedule:?}");
                 assert!(other == learned, "{what}: other statistics");
@@ -192,9 +197,9 @@ fn pictures_have_the_same_bits_on_every_target() {
             add(strategy, Settings { strategy: settings(&scene, strategy).strategy, ..base }, &[1, 3]);
         }
         let mut learns = Settings { strategy: settings(&scene, "ears").strategy, ..base };
-        learns.learning.split_count = 1000.0;
+        learns.learning.subdivide_count = 1000.0;
         add("ears", learns, &[1, 2, 4]);
-        let all = Settings { adaptive: true, shadow_roulette: true, constant: Constant::Cached, ..learns };
+        let all = Settings { adaptive: true, shadow_roulette: true, control_variate: ControlVariate::Cached, ..learns };
         add("ears+adaptive+shadow+constant", all, &[1, 2, 4]);
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("snapshots/hashes.txt");

@@ -6,7 +6,7 @@ use croupier::film::{PixelAov, PixelStats};
 use croupier::profile::Full;
 use croupier::scene::blob::NONE;
 use croupier::simd::{F32x8, Mask8, U32x8};
-use croupier::{Budget, Counters, HARD_STOP, Plan, Progress, Scene, Session, Settings, Shard};
+use croupier::{Budget, Counters, MAX_PATH_LENGTH, Plan, Scene, Session, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::description::*;
 use croupier_tests::runner::{Image, Schedule, render, render_with, scheduled, settings};
@@ -262,8 +262,8 @@ fn counters_add_up() {
             assert_eq!(c.trace.lanes, c.camera_rays + c.scatter_rays, "{what}");
             assert_eq!(c.occlude.lanes, c.shadow_rays, "{what}");
             assert_eq!(c.scatter.lanes, c.vertex_samples, "{what}");
-            assert!(c.shadow_rays + c.shadow_kills + c.light_kills <= c.vertex_samples, "{what}");
-            assert_eq!(c.light_kills > 0 && c.shadow_kills > 0, strategy == "ears", "{what}");
+            assert!(c.shadow_rays + c.shadow_rays_terminated + c.light_samples_skipped <= c.vertex_samples, "{what}");
+            assert_eq!(c.light_samples_skipped > 0 && c.shadow_rays_terminated > 0, strategy == "ears", "{what}");
             assert!(c.scatter_rays <= c.vertex_samples, "{what}");
             assert!(c.surface.lanes <= c.trace.lanes && c.surface.packets <= c.trace.packets, "{what}");
             assert!(c.ring_peak > 0 && c.ring_peak <= 200, "{what}");
@@ -279,15 +279,19 @@ fn counters_add_up() {
             let hits: f64 = image.aovs.iter().map(|a| a.hits).sum();
             match strategy {
                 "none" => {
-                    assert_eq!((c.roulette_kills, c.splits, c.ring_capped, c.budget_capped), (0, 0, 0, 0), "{what}");
+                    assert_eq!(
+                        (c.paths_terminated, c.splits, c.splits_limited_by_ring, c.splits_limited_by_budget),
+                        (0, 0, 0, 0),
+                        "{what}"
+                    );
                     assert_eq!(vertices, c.vertex_samples as f64, "{what}");
                 }
-                "fixed:0.4" => assert!(c.roulette_kills > 0 && c.splits == 0, "{what}"),
-                "fixed:2.5" => assert!(c.splits > c.camera_samples && c.roulette_kills == 0, "{what}"),
-                _ => assert!(c.roulette_kills > 0, "{what}"),
+                "fixed:0.4" => assert!(c.paths_terminated > 0 && c.splits == 0, "{what}"),
+                "fixed:2.5" => assert!(c.splits > c.camera_samples && c.paths_terminated == 0, "{what}"),
+                _ => assert!(c.paths_terminated > 0, "{what}"),
             }
             // samples drawn = vertices - kills + splits
-            assert_eq!(vertices as u64 + c.splits - c.roulette_kills, c.vertex_samples, "{what}");
+            assert_eq!(vertices as u64 + c.splits - c.paths_terminated, c.vertex_samples, "{what}");
             assert!(hits > 0.0 && hits <= c.camera_rays as f64, "{what}");
         }
     }
@@ -310,23 +314,23 @@ fn steps_keep_to_their_budget() {
                 let mut session = Session::<Full, _>::new(scene, bvh, &plan, shared.as_mut()).unwrap();
                 let mut shard = Shard::new(&plan, 0, block.as_mut()).unwrap();
                 session.begin_iteration(1);
-                assert_eq!(shard.step(&session, Budget { rays: 0 }), Progress::More);
+                assert_eq!(shard.step(&session, Budget { rays: 0 }), StepResult::More);
                 assert_eq!(shard.counters().rays(), 0);
                 loop {
                     let before = shard.counters().rays();
                     let progress = shard.step(&session, Budget { rays });
                     let used = shard.counters().rays() - before;
                     assert!(used < rays + 16, "{used} rays in a step of {rays}");
-                    if progress == Progress::Done {
+                    if progress == StepResult::Done {
                         break;
                     }
                     assert!(used >= rays, "{used} rays in a step of {rays} that is not the last");
                 }
                 let done = *shard.counters();
-                assert_eq!(shard.step(&session, Budget { rays }), Progress::Done);
+                assert_eq!(shard.step(&session, Budget { rays }), StepResult::Done);
                 assert_eq!(*shard.counters(), done, "a finished shard does nothing");
             }
         }
     }
-    assert_eq!(HARD_STOP, 200);
+    assert_eq!(MAX_PATH_LENGTH, 200);
 }

@@ -3,7 +3,7 @@
 
 use croupier::accel::WideBvh;
 use croupier::profile::{Full, Profile};
-use croupier::{Budget, Plan, Progress, Scene, Session, Settings, Shard, Strategy};
+use croupier::{Budget, Plan, Scene, Session, Settings, Shard, StepResult, Strategy};
 use croupier_host::blob::AlignedBytes;
 use croupier_tests::scenes::{blob, cornell, everything};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -89,7 +89,7 @@ fn render<P: Profile>(bytes: &[u8], strategy: Strategy) {
             session.begin_iteration(samples);
             assert!(session.end_iteration(&shards).is_err());
             for s in &mut shards {
-                while s.step(&session, Budget { rays: 1000 }) == Progress::More {}
+                while s.step(&session, Budget { rays: 1000 }) == StepResult::More {}
             }
             session.end_iteration(&shards).unwrap();
         }
@@ -97,7 +97,7 @@ fn render<P: Profile>(bytes: &[u8], strategy: Strategy) {
         for s in &mut shards {
             let _ = s.step(&session, Budget { rays: 50 });
             s.stop();
-            while s.step(&session, Budget { rays: 1000 }) == Progress::More {}
+            while s.step(&session, Budget { rays: 1000 }) == StepResult::More {}
         }
         session.end_iteration(&shards).unwrap();
         let estimate = session.film().error_estimate();

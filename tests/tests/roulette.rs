@@ -119,11 +119,11 @@ fn winners_follow_their_rule() {
     assert_eq!(winners(":0:16", 1.0, 1.0), 1.0);
 }
 
-/// Killed by: a relative rule without the root of the importance, one that looks at the wrong option.
+/// Killed by: a relative rule without the root of the error weight, one that looks at the wrong option.
 #[test]
 fn relative_classic_is_over_the_pixel() {
-    // the pixel is 1/4: importance 16
-    let learned = Learned8 { importance: Vec3x8::splat(16.0, 4.0, 1.0), ..Learned8::NONE };
+    // the pixel is 1/4: error weight 16
+    let learned = Learned8 { error_weight: Vec3x8::splat(16.0, 4.0, 1.0), ..Learned8::NONE };
     let at = |text: &str, beta: f32, depth: u32| {
         let v = Vertices8 { learned, ..vertices(beta, 0.5, depth) };
         Strategy::parse(text).unwrap().factor(&v).lane(0)
@@ -139,14 +139,14 @@ fn relative_classic_is_over_the_pixel() {
 fn learned(mean: f32, moment: f32, variance: f32, cost: f32) -> Vertices8 {
     let grey = |x: f32| Vec3x8::splat(x, x, x);
     let learned = Learned8 {
-        importance: Vec3x8::ONE,
+        error_weight: Vec3x8::ONE,
         norm: Norm::Mean,
         cost_over_variance: F32x8::ONE,
         mean: grey(mean),
         moment: grey(moment),
         variance: grey(variance),
         cost: F32x8::splat(cost),
-        light_share: F32x8::ONE,
+        nee_share: F32x8::ONE,
         count: F32x8::splat(1e12),
     };
     Vertices8 { beta: grey(1.0), albedo: grey(0.5), learned, ..vertices(1.0, 0.5, 1) }
@@ -200,8 +200,8 @@ fn moment_and_variance_decide_together() {
     }
 }
 
-/// Eq. 32: s = sqrt(norm(beta^2 x importance x moment) x C / V / c). Killed by: a weight unsquared, the cost upside
-/// down, an importance per colour that is averaged first.
+/// Eq. 32: s = sqrt(norm(beta^2 x error weight x moment) x C / V / c). Killed by: a weight unsquared, the cost upside
+/// down, an error weight per colour that is averaged first.
 #[test]
 fn factors_are_the_most_efficient_ones() {
     let base = learned(0.5, 0.25, 0.25, 1.0);
@@ -214,11 +214,11 @@ fn factors_are_the_most_efficient_ones() {
     assert_eq!(change(&|v| v.beta = v.beta * 0.5), 0.25);
     assert_eq!(change(&|v| v.learned.cost = F32x8::splat(4.0)), 0.25);
     assert_eq!(change(&|v| v.learned.cost_over_variance = F32x8::splat(4.0)), 1.0);
-    assert_eq!(change(&|v| v.learned.importance = v.learned.importance * 4.0), 1.0);
+    assert_eq!(change(&|v| v.learned.error_weight = v.learned.error_weight * 4.0), 1.0);
     // (1 + 4 x 2 + 0) / 3 of a moment of 0.25
     let colours = |v: &mut Vertices8| {
         v.beta = Vec3x8::splat(1.0, 2.0, 0.0);
-        v.learned.importance = Vec3x8::splat(1.0, 2.0, 5.0);
+        v.learned.error_weight = Vec3x8::splat(1.0, 2.0, 5.0);
     };
     assert!((change(&colours) - 0.75f32.sqrt()).abs() < 1e-6);
     let by = |norm: Norm| {
@@ -286,25 +286,25 @@ fn light_samples_play_by_the_rule() {
     for _ in 0..2000 {
         let mut random = |lo: f64, hi: f64| rng.range(lo.ln(), hi.ln()).exp() as f32;
         let rgb = |x: [f32; 3]| Vec3x8::splat(x[0], x[1], x[2]);
-        let (beta, moment, importance) = (
+        let (beta, moment, error_weight) = (
             [(); 3].map(|()| random(1e-1, 2.0)),
             [(); 3].map(|()| random(1e-2, 1.0)),
             [(); 3].map(|()| random(1e-1, 10.0)),
         );
         let (share, ratio) = (random(1e-3, 1.0), random(1e-2, 10.0));
         let mut l = learned(0.1, 1.0, 1.0, 7.0).learned;
-        (l.moment, l.importance) = (rgb(moment), rgb(importance));
-        (l.light_share, l.cost_over_variance) = (F32x8::splat(share), F32x8::splat(ratio));
+        (l.moment, l.error_weight) = (rgb(moment), rgb(error_weight));
+        (l.nee_share, l.cost_over_variance) = (F32x8::splat(share), F32x8::splat(ratio));
         let chance = |square: &dyn Fn(usize) -> f64, factor: f64| {
-            let mean = (0..3).map(|c| square(c) * f64::from(importance[c])).sum::<f64>() / 3.0;
+            let mean = (0..3).map(|c| square(c) * f64::from(error_weight[c])).sum::<f64>() / 3.0;
             (mean * factor * f64::from(ratio) / 0.5).sqrt()
         };
         let square = |x: f32| f64::from(x) * f64::from(x);
         let expected = chance(&|c| square(beta[c]) * f64::from(moment[c]), f64::from(share)).clamp(0.05, 1.0);
-        let drawn = f64::from(l.drawn(rgb(beta), Vec3x8::ZERO).lane(2));
+        let drawn = f64::from(l.nee_probability(rgb(beta), Vec3x8::ZERO).lane(2));
         assert!((drawn / expected - 1.0).abs() < 1e-4, "drawn with {drawn} for {expected}");
         let expected = (chance(&|c| square(beta[c]), 1.0) * f64::from(share)).clamp(0.05, 1.0);
-        let traced = f64::from(l.traced(rgb(beta), F32x8::splat(share)).lane(5));
+        let traced = f64::from(l.shadow_ray_probability(rgb(beta), F32x8::splat(share)).lane(5));
         assert!((traced / expected - 1.0).abs() < 1e-4, "traced with {traced} for {expected}");
         kept += u32::from(drawn > 0.06 && drawn < 0.99);
         sure += u32::from(drawn == 1.0);
@@ -322,13 +322,13 @@ fn light_samples_are_drawn_where_nothing_is_known() {
     let with = |beta: f32, f: &dyn Fn(&mut Learned8)| {
         let mut l = learned(0.5, 1e-6, 1e-6, 1.0).learned;
         f(&mut l);
-        l.drawn(grey(beta), grey(0.5)).lane(1)
+        l.nee_probability(grey(beta), grey(0.5)).lane(1)
     };
     assert_eq!(with(0.5, &|_| ()), MIN_FACTOR);
     assert_eq!(with(0.5, &|l| l.count = F32x8::ZERO), 1.0);
     assert_eq!(with(0.5, &|l| l.cost_over_variance = F32x8::ZERO), 1.0);
     for bad in [f32::NAN, f32::INFINITY] {
-        assert_eq!(with(0.5, &|l| l.light_share = F32x8::splat(bad)), 1.0);
+        assert_eq!(with(0.5, &|l| l.nee_share = F32x8::splat(bad)), 1.0);
         assert_eq!(with(0.5, &|l| l.moment = grey(bad)), 1.0);
     }
     let half = with(0.5, &|l| l.count = F32x8::splat(256.0));
@@ -336,9 +336,10 @@ fn light_samples_are_drawn_where_nothing_is_known() {
     for (beta, expected) in [(4.0, 0.2), (16.0, 0.8), (400.0, 1.0)] {
         assert!((with(beta, &|_| ()) - expected).abs() < 1e-5, "throughput {beta}");
     }
-    let unknown = Learned8::NONE.traced(grey(1e-9), F32x8::ONE).lane(0);
-    let broken =
-        Learned8 { cost_over_variance: F32x8::ONE, ..Learned8::NONE }.traced(grey(f32::NAN), F32x8::ONE).lane(0);
+    let unknown = Learned8::NONE.shadow_ray_probability(grey(1e-9), F32x8::ONE).lane(0);
+    let broken = Learned8 { cost_over_variance: F32x8::ONE, ..Learned8::NONE }
+        .shadow_ray_probability(grey(f32::NAN), F32x8::ONE)
+        .lane(0);
     assert_eq!([unknown, broken], [1.0; 2]);
 }
 
@@ -346,7 +347,7 @@ fn light_samples_are_drawn_where_nothing_is_known() {
 /// window, a pixel that multiplies.
 #[test]
 fn the_window_is_left_alone() {
-    for (mean, importance, adrrs, adrr) in [
+    for (mean, error_weight, adrrs, adrr) in [
         (1.0, 1.0, 1.0, 1.0),
         (0.34, 1.0, 1.0, 1.0),
         (1.66, 1.0, 1.0, 1.0),
@@ -358,10 +359,10 @@ fn the_window_is_left_alone() {
         (0.0, 1.0, MIN_FACTOR, MIN_FACTOR),
     ] {
         let mut v = learned(mean, mean * mean, 0.0, 1.0);
-        v.learned.importance = Vec3x8::splat(importance, importance, importance);
+        v.learned.error_weight = Vec3x8::splat(error_weight, error_weight, error_weight);
         let close = |a: f32, b: f32| (a - b).abs() < 1e-5 * b;
         let (s, r) = (with("adrrs", &v), with("adrr", &v));
-        assert!(close(s, adrrs) && close(r, adrr), "mean {mean}, importance {importance}: {s} and {r}");
+        assert!(close(s, adrrs) && close(r, adrr), "mean {mean}, error_weight {error_weight}: {s} and {r}");
     }
 }
 

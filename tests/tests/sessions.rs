@@ -2,17 +2,17 @@
 
 use croupier::accel::WideBvh;
 use croupier::learn::Learning;
-use croupier::profile::{Full, Matte, Profile};
+use croupier::profile::{DiffuseOnly, Full, Profile};
 use croupier::{
-    BLOCK_ALIGN, Budget, Effects, MemoryError, Plan, Progress, Scene, Session, SessionError, Settings, SettingsError,
-    Shard, ShardError,
+    BLOCK_ALIGN, Budget, Effects, MemoryError, Plan, Scene, Session, SessionError, Settings, SettingsError, Shard,
+    ShardError, StepResult,
 };
 use croupier_host::blob::AlignedBytes;
 use croupier_host::description::{Emitter, Model};
 use croupier_tests::runner::{finish, render, settings};
 use croupier_tests::scenes::{add_quad, blob, cornell, everything, facing_y, spot};
 
-type Start<'s, 'm> = Result<Session<'s, 'm, Matte, WideBvh<'s>>, SessionError>;
+type Start<'s, 'm> = Result<Session<'s, 'm, DiffuseOnly, WideBvh<'s>>, SessionError>;
 
 fn start<'s, 'm>(scene: &Scene<'s>, plan: &Plan, block: &'m mut [u8]) -> Start<'s, 'm> {
     Session::new(*scene, WideBvh::new(scene), plan, block)
@@ -71,7 +71,7 @@ fn blocks_may_hold_garbage() {
     let scene = Scene::from_bytes(&bytes).unwrap();
     for strategy in ["fixed:1.5", "ears", "bolin-meyer"] {
         let s = settings(&bytes, strategy);
-        let learning = Learning { cache_bytes: 1 << 20, split_count: 300.0, ..s.learning };
+        let learning = Learning { cache_bytes: 1 << 20, subdivide_count: 300.0, ..s.learning };
         let learns = strategy != "fixed:1.5";
         let s = Settings { aovs: true, adaptive: strategy == "ears", shadow_roulette: learns, learning, ..s };
         let plan = Plan::new(&s).unwrap();
@@ -174,14 +174,14 @@ fn a_profile_without_an_effect_refuses_the_scene() {
     let bytes = blob(&everything([8, 8]));
     let scene = Scene::from_bytes(&bytes).unwrap();
     let (error, text) = missing(&bytes).expect("an error");
-    assert_eq!(error, SessionError::Profile { missing: Effects(scene.effects.0 & !Matte::EFFECTS.0) });
+    assert_eq!(error, SessionError::Profile { missing: Effects(scene.effects.0 & !DiffuseOnly::EFFECTS.0) });
     for name in ["roughplastic", "dielectric", "environment map", "thin lens", "null"] {
         assert!(text.contains(name), "{text}");
     }
 }
 
 /// The pixels of a session's film as bytes.
-fn film_of(session: &Session<'_, '_, Matte, WideBvh<'_>>) -> Vec<u8> {
+fn film_of(session: &Session<'_, '_, DiffuseOnly, WideBvh<'_>>) -> Vec<u8> {
     let (pixels, aovs) = (session.film().pixels(), session.film().aovs());
     [bytemuck::cast_slice::<_, u8>(pixels), bytemuck::cast_slice(aovs)].concat()
 }
@@ -214,7 +214,7 @@ fn iterations_end_with_every_shard_in_order_or_not_at_all() {
     assert_eq!((session.iteration().number, session.iteration().first_sample), (2, 2));
     finish(&session, &mut shards[0], 500);
     finish(&session, &mut shards[2], 500);
-    assert_eq!(shards[1].step(&session, Budget { rays: 100 }), Progress::More);
+    assert_eq!(shards[1].step(&session, Budget { rays: 100 }), StepResult::More);
     let order = |a: usize, b: usize, c: usize| [&shards[a], &shards[b], &shards[c]];
     let tries: [(Vec<&Shard<'_>>, SessionError); 6] = [
         (vec![], SessionError::Shards { expected: 0 }),
@@ -275,9 +275,9 @@ fn a_shard_can_be_stopped_before_it_starts() {
     let mut shards = blocks.each_mut().map(|b| Shard::new(&plan, i.next().unwrap(), b.as_mut()).unwrap());
     session.begin_iteration(4);
     finish(&session, &mut shards[0], 1000);
-    assert_eq!(shards[1].step(&session, Budget { rays: 0 }), Progress::More);
+    assert_eq!(shards[1].step(&session, Budget { rays: 0 }), StepResult::More);
     shards[1].stop();
-    assert_eq!(shards[1].step(&session, Budget { rays: 1 }), Progress::Done);
+    assert_eq!(shards[1].step(&session, Budget { rays: 1 }), StepResult::Done);
     session.end_iteration(&shards).unwrap();
     let samples: Vec<u64> = session.film().pixels().iter().map(|p| p.samples).collect();
     assert_eq!(samples.iter().filter(|n| **n == 4).count(), 128);
@@ -313,7 +313,7 @@ fn a_stopped_iteration_is_unbiased_and_merges() {
         let mut session = start(&scene, &plan, shared.as_mut()).unwrap();
         let mut shard = Shard::new(&plan, 0, block.as_mut()).unwrap();
         session.begin_iteration(5);
-        if shard.step(&session, Budget { rays: 400 }) == Progress::More {
+        if shard.step(&session, Budget { rays: 400 }) == StepResult::More {
             assert_eq!(session.end_iteration([&shard]), Err(SessionError::Unfinished { shard: 0 }));
             shard.stop();
             finish(&session, &mut shard, 64);
@@ -370,7 +370,7 @@ fn used_shards_begin_anew() {
     let scene = Scene::from_bytes(&bytes).unwrap();
     let plan = Plan::new(&settings(&bytes, "ears")).unwrap();
     let memory = || [plan.session(), plan.shard()].map(|l| AlignedBytes::zeroed(l.size));
-    let rendered = |used: &dyn Fn(&mut Session<'_, '_, Matte, WideBvh<'_>>, &mut Shard<'_>)| {
+    let rendered = |used: &dyn Fn(&mut Session<'_, '_, DiffuseOnly, WideBvh<'_>>, &mut Shard<'_>)| {
         let [mut shared, mut block] = memory();
         let mut session = start(&scene, &plan, shared.as_mut()).unwrap();
         let mut shard = Shard::new(&plan, 0, block.as_mut()).unwrap();
@@ -393,7 +393,7 @@ fn used_shards_begin_anew() {
     for rays in [40, 1000] {
         rendered(&|session, shard| {
             session.begin_iteration(5);
-            assert_eq!(shard.step(session, Budget { rays }), Progress::More);
+            assert_eq!(shard.step(session, Budget { rays }), StepResult::More);
         });
     }
 }

@@ -10,7 +10,7 @@ use croupier::accel::WideBvh;
 use croupier::light::LightSelector;
 use croupier::profile::Full;
 use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
-use croupier::{Budget, Plan, Progress, Scene, Session, Settings, Shard};
+use croupier::{Budget, Plan, Scene, Session, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin;
 use croupier_host::description::Emitter;
@@ -94,12 +94,12 @@ fn full_rings_and_spent_budgets_do_not_bias() {
         let c = image.counters;
         // from the smallest ring a packet of camera rays starts when it is empty, and arrives with it full
         assert!(c.ring_peak <= 16 && c.ring_peak >= 8, "{strategy}: {} vertices waited", c.ring_peak);
-        assert!(c.ring_capped > c.vertex_samples / 20, "{strategy}: {c:?}");
+        assert!(c.splits_limited_by_ring > c.vertex_samples / 20, "{strategy}: {c:?}");
         assert_equivalent(&format!("{strategy} in a ring of 16"), &image, &one);
     }
     for (budget, strategy, spp) in [(0, "fixed:3.3", 6000), (3, "fixed:3.3", 2200), (7, "fixed:20", 800)] {
         let image = case.render(strategy, 13, spp, |s| s.split_budget = budget);
-        assert!(image.counters.budget_capped > image.counters.vertex_samples / 20);
+        assert!(image.counters.splits_limited_by_budget > image.counters.vertex_samples / 20);
         if budget == 0 {
             assert_eq!(image.counters.splits, 0);
         }
@@ -176,7 +176,7 @@ fn chosen_uniformly(scene: &[u8], s: &Settings, spp: u32, stated: f32) -> Image 
     let mut session = Session::<Full, _, _>::with_selector(scene, bvh, uniform, &plan, shared.as_mut()).unwrap();
     let mut shard = Shard::new(&plan, 0, block.as_mut()).unwrap();
     session.begin_iteration(spp);
-    while shard.step(&session, Budget { rays: 1 << 20 }) == Progress::More {}
+    while shard.step(&session, Budget { rays: 1 << 20 }) == StepResult::More {}
     session.end_iteration([&shard]).unwrap();
     let film = session.film();
     Image {

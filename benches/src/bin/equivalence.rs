@@ -20,7 +20,7 @@
 //! rows as they should be, or the scenes are not there; 1 otherwise.
 
 use clap::Parser;
-use croupier::learn::{Constant, Estimate, Learning};
+use croupier::learn::{ControlVariate, Learning, PixelEstimator};
 use croupier::{Counters, MIN_RING, Settings, Strategy};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
@@ -133,8 +133,9 @@ impl Trial {
             Self::Poisoned => s.learning.cache_bytes = 32 << 10,
             Self::Budget => s.split_budget = 4,
             Self::Small => {
-                (s.ring, s.shadow_roulette, s.constant) = (MIN_RING, true, Constant::Cached);
-                s.learning = Learning { ledger: 4, cache_bytes: 16 << 10, estimate: Estimate::Blocks, ..s.learning };
+                (s.ring, s.shadow_roulette, s.control_variate) = (MIN_RING, true, ControlVariate::Cached);
+                s.learning =
+                    Learning { ledger: 4, cache_bytes: 16 << 10, estimate: PixelEstimator::Blocks, ..s.learning };
             }
         }
     }
@@ -143,11 +144,13 @@ impl Trial {
     fn happened(self, c: &Counters) -> bool {
         match self {
             Self::None | Self::Cache | Self::Adaptive | Self::Reloaded => true,
-            Self::Ring => c.ring_capped > 0,
-            Self::Shadow => c.shadow_kills > c.shadow_rays / 50 && c.light_kills > c.vertex_samples / 100,
+            Self::Ring => c.splits_limited_by_ring > 0,
+            Self::Shadow => {
+                c.shadow_rays_terminated > c.shadow_rays / 50 && c.light_samples_skipped > c.vertex_samples / 100
+            }
             Self::Ledger | Self::Small => c.ledger_full > c.samples_logged,
-            Self::Poisoned => c.roulette_kills > c.camera_samples / 20 && c.splits > c.camera_samples / 20,
-            Self::Budget => c.budget_capped > 0,
+            Self::Poisoned => c.paths_terminated > c.camera_samples / 20 && c.splits > c.camera_samples / 20,
+            Self::Budget => c.splits_limited_by_budget > 0,
         }
     }
 }
@@ -327,7 +330,7 @@ impl Place {
     fn render(&self, row: &Row, depth: u32, seed: u64) -> Image {
         let s = settings(&self.blob, row.strategy);
         // statistics of a size that suits small pictures
-        let small = Learning { cache_bytes: 1 << 20, split_count: 2000.0, ..s.learning };
+        let small = Learning { cache_bytes: 1 << 20, subdivide_count: 2000.0, ..s.learning };
         let mut s = Settings { seed, max_depth: depth, learning: small, ..s };
         row.trial.set(&mut s);
         let mut saved = Vec::new();
@@ -511,8 +514,8 @@ fn print(scene: &str, row: &Row, round: &Round) {
         100.0 * round.error(),
         round.mrays(),
         per_sample(c.splits),
-        per_sample(c.roulette_kills),
-        per_sample(c.ring_capped),
+        per_sample(c.paths_terminated),
+        per_sample(c.splits_limited_by_ring),
         round.verdict(row).1,
     );
 }

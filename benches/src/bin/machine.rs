@@ -7,8 +7,8 @@
 
 use clap::Parser;
 use croupier::accel::WideBvh;
-use croupier::profile::{AnyProfile, Full, Matte, Profile};
-use croupier::{BYTES_PER_PATH, Budget, Counters, Plan, Progress, Scene, Session, Settings, Shard, Strategy};
+use croupier::profile::{AnyProfile, DiffuseOnly, Full, Profile};
+use croupier::{BYTES_PER_PATH, Budget, Counters, Plan, Scene, Session, Settings, Shard, StepResult, Strategy};
 use croupier_benches::clock::Clock;
 use croupier_host::bake::{BakeOptions, Baked, bake};
 use croupier_host::blob::AlignedBytes;
@@ -90,7 +90,7 @@ impl<'a> Row<'a> {
     /// Renders once more.
     fn run(&mut self) -> Result<(), Box<dyn Error>> {
         let (counters, seconds) = match AnyProfile::smallest(self.blob.effects) {
-            AnyProfile::Matte => self.render::<Matte>()?,
+            AnyProfile::DiffuseOnly => self.render::<DiffuseOnly>()?,
             AnyProfile::Full => self.render::<Full>()?,
         };
         self.counters = counters;
@@ -109,7 +109,7 @@ impl<'a> Row<'a> {
         for &samples in self.load.iterations {
             session.begin_iteration(samples);
             for shard in &mut shards {
-                while shard.step(&session, Budget { rays: u64::MAX }) == Progress::More {}
+                while shard.step(&session, Budget { rays: u64::MAX }) == StepResult::More {}
             }
             session.end_iteration(&shards)?;
         }

@@ -15,7 +15,7 @@ const SHARES: [f64; 2] = [0.25, 8.0];
 
 /// Camera samples per pixel, by tile.
 #[derive(Debug)]
-pub(super) struct Allotment<'m> {
+pub(super) struct SampleAllocation<'m> {
     size: [u32; 2],
     /// Empty if all pixels have as many.
     counts: &'m mut [u32],
@@ -23,7 +23,7 @@ pub(super) struct Allotment<'m> {
     samples: u32,
 }
 
-impl<'m> Allotment<'m> {
+impl<'m> SampleAllocation<'m> {
     pub(super) fn measure(m: Measure, size: [u32; 2], adaptive: bool) -> Measure {
         m.add::<u32>(if adaptive { tiles(size) } else { 0 })
     }
@@ -47,9 +47,9 @@ impl<'m> Allotment<'m> {
         if n > 0 { f64::from(n) / f64::from(self.samples.max(1)) } else { 1.0 }
     }
 
-    /// Deals out `samples` camera samples per pixel in the mean: one to each, the others by what tiles wish, with what
+    /// Deals out `samples` camera samples per pixel in the mean: one to each, the others by the desired density of their tiles, with what
     /// rounding leaves over handed from tile to tile.
-    pub(super) fn deal(&mut self, samples: u32, film: &Film<'_>, pixels: &Pixels<'_>) {
+    pub(super) fn allocate(&mut self, samples: u32, film: &Film<'_>, pixels: &Pixels<'_>) {
         self.samples = samples;
         self.counts.fill(samples);
         if self.counts.is_empty() || !pixels.known() || samples < 2 {
@@ -58,12 +58,12 @@ impl<'m> Allotment<'m> {
         // wishes wait where the counts will be
         let (mut wished, mut area) = (0.0, 0.0);
         for tile in 0..self.counts.len() {
-            let wish = self.wish(tile as u32, film, pixels) as f32;
+            let desired_density = self.desired_density(tile as u32, film, pixels) as f32;
             let n = self.area(tile as u32);
-            wished += f64::from(wish) * n;
+            wished += f64::from(desired_density) * n;
             area += n;
             if let Some(count) = self.counts.get_mut(tile) {
-                *count = wish.to_bits();
+                *count = desired_density.to_bits();
             }
         }
         let mean = wished / area;
@@ -100,14 +100,14 @@ impl<'m> Allotment<'m> {
 
     /// sqrt(variance / cost) of a tile's samples. Pixels count their rays, of whatever kind, so the cost is their
     /// number.
-    fn wish(&self, tile: u32, film: &Film<'_>, pixels: &Pixels<'_>) -> f64 {
+    fn desired_density(&self, tile: u32, film: &Film<'_>, pixels: &Pixels<'_>) -> f64 {
         let [from, to] = self.corners(tile);
         let (mut error, mut rays) = (0.0, 0.0);
         for y in from[1]..to[1] {
             for x in from[0]..to[0] {
                 let i = y * self.size[0] + x;
                 let Some(p) = film.pixels().get(i as usize) else { continue };
-                let e = p.variance_of_mean().into_iter().zip(pixels.importance(i)).map(|(v, w)| v * f64::from(w));
+                let e = p.variance_of_mean().into_iter().zip(pixels.error_weight(i)).map(|(v, w)| v * f64::from(w));
                 error += e.sum::<f64>() * p.samples as f64;
                 rays += p.rays as f64 / p.samples.max(1) as f64;
             }

@@ -21,7 +21,7 @@ const SPREAD_PAIRS: f64 = 16.0;
 /// What a shard has gathered in an iteration.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Record {
+pub(super) struct BinRecord {
     count: u16,
     pairs: u16,
     cost: f32,
@@ -32,7 +32,7 @@ pub(super) struct Record {
     light: f32,
 }
 
-impl Record {
+impl BinRecord {
     /// Adds a finite sample; `false` if the bin is full.
     pub(super) fn add(&mut self, x: [f32; 3], cost: f32) -> bool {
         if self.count == BIN_LIMIT {
@@ -179,7 +179,7 @@ impl BinSums {
         self.visible += f64::from(s.visible);
     }
 
-    pub(super) fn absorb(&mut self, r: &Record) {
+    pub(super) fn absorb(&mut self, r: &BinRecord) {
         self.count += f64::from(r.count);
         self.pairs += f64::from(r.pairs);
         self.cost += f64::from(r.cost);
@@ -199,8 +199,8 @@ pub(super) struct Frozen {
     cost: f32,
     /// Mean, moment, variance, rgb each: two [`short`]s a word, the first below.
     colors: [u32; 5],
-    /// See [`Local8::light_share`].
-    light_share: f32,
+    /// See [`Local8::nee_share`].
+    nee_share: f32,
 }
 
 /// `x`, between 0 and `max`; a NaN is 0.
@@ -224,7 +224,7 @@ fn long(x: u32) -> f32 {
 }
 
 impl Frozen {
-    pub(super) const ZERO: Self = Self { count: 0.0, cost: 0.0, colors: [0; 5], light_share: 0.0 };
+    pub(super) const ZERO: Self = Self { count: 0.0, cost: 0.0, colors: [0; 5], nee_share: 0.0 };
 
     /// What is known of one sample with the sums `s`.
     fn of(s: &BinSums) -> Self {
@@ -244,7 +244,7 @@ impl Frozen {
         }
         let ([a, b, c], [d, e, g], [h, i, j]) = (mean, moment, variance);
         let squares: f64 = s.sqr.iter().sum();
-        f.light_share = saturate(s.light / squares.max(f64::MIN_POSITIVE), 1.0);
+        f.nee_share = saturate(s.light / squares.max(f64::MIN_POSITIVE), 1.0);
         f.colors = [a | b << 16, c | d << 16, e | g << 16, h | i << 16, j];
         f
     }
@@ -282,10 +282,10 @@ pub struct Local8 {
     pub moment: Vec3x8,
     /// Their variance at a point, without the spread of the mean over the cell as far as pairs tell; at most `moment`.
     pub variance: Vec3x8,
-    /// Mean counted cost of a sample ([`crate::learn::COST_BOUNCE`] and its like).
+    /// Mean counted cost of a sample ([`crate::cost::COST_BOUNCE`] and its like).
     pub cost: F32x8,
     /// Mean square of their light samples over `moment`, over all channels, at most 1.
-    pub light_share: F32x8,
+    pub nee_share: F32x8,
     /// Confidence: samples of the bin itself, older ones discounted. Its surroundings, which the other numbers lean on,
     /// do not count.
     pub count: F32x8,
@@ -297,7 +297,7 @@ impl Local8 {
         let row = |f: &Frozen| F32x8::new(*bytemuck::cast_ref::<_, [f32; 8]>(f));
         let [f0, f1, f2, f3, f4, f5, f6, f7] = rows;
         let rows = [row(f0), row(f1), row(f2), row(f3), row(f4), row(f5), row(f6), row(f7)];
-        let [count, cost, a, b, c, d, e, light_share] = F32x8::transpose(rows);
+        let [count, cost, a, b, c, d, e, nee_share] = F32x8::transpose(rows);
         let below = |w: F32x8| F32x8::from_bits(w.to_bits() << 16);
         let above = |w: F32x8| F32x8::from_bits(w.to_bits() & U32x8::splat(0xffff_0000));
         Self {
@@ -305,7 +305,7 @@ impl Local8 {
             moment: Vec3x8::new(above(b), below(c), above(c)),
             variance: Vec3x8::new(below(d), above(d), below(e)),
             cost,
-            light_share,
+            nee_share,
             count,
         }
     }

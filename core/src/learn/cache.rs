@@ -17,7 +17,7 @@ pub use super::training::Training;
 
 use super::bins::{BINS, BinSums, Frozen, freeze_leaf};
 use super::settings::Objective;
-use super::tree::{MAX_DEPTH, MAX_LEAVES, Node, ROOTS, Tree, direction_bin};
+use super::tree::{MAX_DEPTH, MAX_LEAVES, OctreeNode, ROOTS, Tree, direction_bin};
 use crate::memory::{Carver, Layout, Measure, MemoryError};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
@@ -28,30 +28,30 @@ const PRIOR_SAMPLES: f64 = 4.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Kind {
-    /// Matte, keyed by the shading normal.
-    Matte = 0,
+    /// Diffuse, keyed by the shading normal.
+    Diffuse = 0,
     /// All others, keyed by the direction that decides what they show.
-    Shiny = 1,
-    /// Matte ones that the camera sees. Their values are in units of their pixel.
-    FirstMatte = 2,
+    Glossy = 1,
+    /// Diffuse ones that the camera sees. Their values are in units of their pixel.
+    FirstDiffuse = 2,
     /// The other ones that the camera sees.
-    FirstShiny = 3,
+    FirstGlossy = 3,
 }
 
 /// How many nodes and leaves there is room for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CacheSize {
-    splits: u32,
+    subdivisions: u32,
 }
 
 impl CacheSize {
     /// Trees that never split.
-    pub const SMALLEST: Self = Self { splits: 0 };
+    pub const SMALLEST: Self = Self { subdivisions: 0 };
 
     /// The largest cache whose shared side and `shards` training sides fit in `bytes` together; `None` if none does.
     /// The smallest, four leaves that never split, takes 9.7 KiB and 3.25 KiB more for each shard.
     pub fn within(bytes: usize, shards: u32) -> Option<Self> {
-        let fits = |splits: u32| Self { splits }.bytes(shards).is_some_and(|b| b <= bytes);
+        let fits = |subdivisions: u32| Self { subdivisions }.bytes(shards).is_some_and(|b| b <= bytes);
         if !fits(0) {
             return None;
         }
@@ -61,7 +61,7 @@ impl CacheSize {
             let middle = low + (high - low) / 2;
             if fits(middle) { low = middle } else { high = middle }
         }
-        Some(Self { splits: low })
+        Some(Self { subdivisions: low })
     }
 
     /// Bytes of the shared side and of `shards` training sides.
@@ -72,7 +72,7 @@ impl CacheSize {
 
     /// Leaves of all octrees.
     pub fn leaves(self) -> u32 {
-        ROOTS + 7 * self.splits
+        ROOTS + 7 * self.subdivisions
     }
 
     pub(super) fn bins(self) -> usize {
@@ -91,7 +91,7 @@ pub struct Cache<'m> {
     pub(super) size: CacheSize,
     /// What the units of first vertices hang on.
     pub(super) objective: Objective,
-    splits_refused: u64,
+    subdivisions_refused: u64,
     /// Leaves of a cache without a tree.
     flat: Option<u32>,
 }
@@ -116,7 +116,7 @@ impl<'m> Cache<'m> {
     }
 
     pub(crate) fn measure(m: Measure, size: CacheSize) -> Measure {
-        Tree::measure(m, Tree::nodes_for(size.splits), size.leaves())
+        Tree::measure(m, Tree::nodes_for(size.subdivisions), size.leaves())
             .add::<BinSums>(size.bins())
             .add::<Frozen>(size.bins())
             .add::<u8>(size.bins())
@@ -128,10 +128,10 @@ impl<'m> Cache<'m> {
         [lo, hi]: [[f32; 3]; 2],
         objective: Objective,
     ) -> Result<Self, MemoryError> {
-        let tree = Tree::carve(c, Tree::nodes_for(size.splits), size.leaves(), lo, hi)?;
+        let tree = Tree::carve(c, Tree::nodes_for(size.subdivisions), size.leaves(), lo, hi)?;
         let (sums, frozen) = (c.take_unset(size.bins())?, c.take_unset(size.bins())?);
         let visibility = c.take_unset(size.bins())?;
-        let mut cache = Self { tree, sums, frozen, visibility, size, objective, splits_refused: 0, flat: None };
+        let mut cache = Self { tree, sums, frozen, visibility, size, objective, subdivisions_refused: 0, flat: None };
         cache.reset();
         Ok(cache)
     }
@@ -194,23 +194,23 @@ impl<'m> Cache<'m> {
         self.used_mut().iter_mut().zip(t.shadows()).for_each(|(b, s)| b.absorb_shadows(s));
     }
 
-    /// Ends the end of an iteration: splits leaves of more than `split_count` samples (taken as at least 1), then
+    /// Ends the end of an iteration: subdivides leaves of more than `subdivide_count` samples (taken as at least 1), then
     /// computes what look-ups read. Bins may have new numbers afterwards.
     ///
     /// Children inherit an eighth of their parent's sums each, and are split again while that is still too many. When
-    /// leaves run out, those with most samples have been split first; the rest is counted by [`Self::splits_refused`].
-    pub fn freeze(&mut self, split_count: f64) {
+    /// leaves run out, those with most samples have been split first; the rest is counted by [`Self::subdivisions_refused`].
+    pub fn freeze(&mut self, subdivide_count: f64) {
         if self.flat.is_some() {
             return self.refresh();
         }
-        let limit = if split_count.is_nan() { f64::INFINITY } else { split_count.max(1.0) };
+        let limit = if subdivide_count.is_nan() { f64::INFINITY } else { subdivide_count.max(1.0) };
         let mut threshold = f64::INFINITY;
-        // A pass splits what is above its threshold and finds the largest leaf that is left, for the next threshold.
+        // A pass subdivides what is above its threshold and finds the largest leaf that is left, for the next threshold.
         loop {
-            let (largest, full) = self.split_above(threshold);
+            let (largest, full) = self.subdivide_above(threshold);
             if full {
-                let refused = self.tree.indices().filter(|i| self.may_split(*i).is_some_and(|n| n > limit)).count();
-                self.splits_refused += refused as u64;
+                let refused = self.tree.indices().filter(|i| self.may_subdivide(*i).is_some_and(|n| n > limit)).count();
+                self.subdivisions_refused += refused as u64;
                 break;
             }
             if largest <= limit {
@@ -222,13 +222,13 @@ impl<'m> Cache<'m> {
     }
 
     /// Samples of the largest leaf that is left and may be split, and whether one was refused.
-    fn split_above(&mut self, threshold: f64) -> (f64, bool) {
+    fn subdivide_above(&mut self, threshold: f64) -> (f64, bool) {
         let (mut largest, mut full) = (0.0f64, false);
         for index in self.tree.indices() {
-            let Some(count) = self.may_split(index) else { continue };
+            let Some(count) = self.may_subdivide(index) else { continue };
             let rest = if count <= threshold {
                 count
-            } else if self.split(index) {
+            } else if self.subdivide(index) {
                 count / 8.0
             } else {
                 full = true;
@@ -240,17 +240,19 @@ impl<'m> Cache<'m> {
     }
 
     /// Samples of a leaf above the depth limit.
-    fn may_split(&self, index: u32) -> Option<f64> {
+    fn may_subdivide(&self, index: u32) -> Option<f64> {
         match self.tree.node(index) {
-            Node::Leaf { number, depth } if depth < MAX_DEPTH => Some(self.leaf(number).iter().map(|b| b.count).sum()),
+            OctreeNode::Leaf { number, depth } if depth < MAX_DEPTH => {
+                Some(self.leaf(number).iter().map(|b| b.count).sum())
+            }
             _ => None,
         }
     }
 
     /// Splits a leaf; `false` if there is no room or it is too deep.
-    pub(super) fn split(&mut self, index: u32) -> bool {
-        let Node::Leaf { number, .. } = self.tree.node(index) else { return false };
-        let Some(first) = self.tree.split(index) else { return false };
+    pub(super) fn subdivide(&mut self, index: u32) -> bool {
+        let OctreeNode::Leaf { number, .. } = self.tree.node(index) else { return false };
+        let Some(first) = self.tree.subdivide(index) else { return false };
         self.leaf_mut(number).iter_mut().for_each(|b| b.scale(0.125));
         let from = number as usize * BINS;
         for child in first..first + 7 {
@@ -273,11 +275,11 @@ impl<'m> Cache<'m> {
 
     fn freeze_below(&mut self, index: u32, prior: &BinSums) {
         match self.tree.node(index) {
-            Node::Leaf { number, .. } => self.freeze_one(number, prior, PRIOR_SAMPLES),
-            Node::Inner { child } => {
+            OctreeNode::Leaf { number, .. } => self.freeze_one(number, prior, PRIOR_SAMPLES),
+            OctreeNode::Inner { child } => {
                 let mut all = BinSums::ZERO;
                 self.tree.visit(index, &mut |n| {
-                    if let Node::Leaf { number, .. } = n {
+                    if let OctreeNode::Leaf { number, .. } = n {
                         self.leaf(number).iter().for_each(|b| all.add(b, 1.0));
                     }
                 });
@@ -349,11 +351,11 @@ impl<'m> Cache<'m> {
     }
 
     /// Splits that found no room: leaves too large at a [`Self::freeze`], inner nodes of what was merged.
-    pub fn splits_refused(&self) -> u64 {
-        self.splits_refused
+    pub fn subdivisions_refused(&self) -> u64 {
+        self.subdivisions_refused
     }
 
-    pub(super) fn refuse_split(&mut self) {
-        self.splits_refused += 1;
+    pub(super) fn refuse_subdivision(&mut self) {
+        self.subdivisions_refused += 1;
     }
 }

@@ -9,7 +9,7 @@ use crate::tiles::TILE;
 
 /// How the estimate of the pixels is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Estimate {
+pub enum PixelEstimator {
     /// By the built-in denoiser, which looks at albedo and normals if [`crate::Settings::aovs`] has them gathered;
     /// takes about 140 bytes a pixel, scratch included.
     #[default]
@@ -52,13 +52,13 @@ pub(super) fn tile_of(size: [u32; 2], film: u32) -> usize {
 }
 
 impl<'m> Pixels<'m> {
-    pub(super) fn measure(m: Measure, size: [u32; 2], features: bool, how: Option<Estimate>) -> Measure {
+    pub(super) fn measure(m: Measure, size: [u32; 2], features: bool, how: Option<PixelEstimator>) -> Measure {
         match how {
             None => m,
-            Some(Estimate::Denoised) => {
+            Some(PixelEstimator::Denoised) => {
                 m.add::<f32>(Planes::len(size, features)).add::<f32>(denoise::scratch_len(size))
             }
-            Some(Estimate::Blocks) => (0..3).fold(m, |m, _| m.add::<f32>(tiles(size))),
+            Some(PixelEstimator::Blocks) => (0..3).fold(m, |m, _| m.add::<f32>(tiles(size))),
         }
     }
 
@@ -66,19 +66,19 @@ impl<'m> Pixels<'m> {
         c: &mut Carver<'m>,
         size: [u32; 2],
         features: bool,
-        how: Option<Estimate>,
+        how: Option<PixelEstimator>,
         learning: &Learning,
     ) -> Result<Self, MemoryError> {
         let values = match how {
             None => Values::None,
-            Some(Estimate::Denoised) => {
+            Some(PixelEstimator::Denoised) => {
                 let memory = c.take(Planes::len(size, features))?;
                 let given = memory.len();
                 let planes = Planes::carve(size, features, memory)
                     .map_err(|e| MemoryError::TooSmall { needed: e.needed, given })?;
                 Values::Denoised { planes, scratch: c.take(denoise::scratch_len(size))? }
             }
-            Some(Estimate::Blocks) => {
+            Some(PixelEstimator::Blocks) => {
                 Values::Blocks([c.take(tiles(size))?, c.take(tiles(size))?, c.take(tiles(size))?])
             }
         };
@@ -103,7 +103,7 @@ impl<'m> Pixels<'m> {
 
     /// What a squared error of a pixel counts, per channel.
     #[inline]
-    pub(super) fn importance(&self, film: u32) -> [f32; 3] {
+    pub(super) fn error_weight(&self, film: u32) -> [f32; 3] {
         if !self.known || !self.relative {
             return [1.0; 3];
         }

@@ -10,21 +10,15 @@ mod adaptive;
 mod bins;
 pub mod cache;
 mod estimate;
-mod knowledge;
+mod learned_state;
 mod picture;
 mod save;
 mod settings;
 mod training;
 mod tree;
 
-pub use estimate::Estimate;
-pub(crate) use knowledge::Knowledge;
+pub use estimate::PixelEstimator;
+pub(crate) use learned_state::LearnedState;
 pub use picture::PictureStatistics;
-pub use settings::{Constant, Learning, Objective};
-
-/// Relative cost of a camera ray. Costs are counted, never measured: the picture must not depend on a clock.
-pub const COST_CAMERA: f32 = 1.0;
-/// Relative cost of a scattered ray and the shading around it.
-pub const COST_BOUNCE: f32 = 1.0;
-/// Relative cost of a shadow ray: it is over at the first hit, and no vertex waits at its end.
-pub const COST_SHADOW: f32 = 0.5;
+pub(crate) use settings::Needs;
+pub use settings::{ControlVariate, Learning, Objective};

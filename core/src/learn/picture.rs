@@ -1,11 +1,11 @@
 //! Error and cost of the picture per camera sample (EARS, eqs. 33 and 34).
 
-use super::adaptive::Allotment;
+use super::adaptive::SampleAllocation;
 use super::estimate::Pixels;
 use super::settings::Learning;
+use crate::counters::Counters;
 use crate::film::{PixelSums, trimmed};
 use crate::rrs::Norm;
-use crate::tracer::Counters;
 
 /// Share of the pixels whose variance is left out of the picture's. A single outlier would decide all factors: with the
 /// 0.001 % of EARS (section 5.2), none in a small picture, one bright sample made all vertices look worthless, and
@@ -60,7 +60,7 @@ impl Picture {
         &mut self,
         learning: &Learning,
         pixels: &mut Pixels<'_>,
-        allotment: &Allotment<'_>,
+        allocation: &SampleAllocation<'_>,
         counters: &Counters,
         visit: impl Visit,
     ) {
@@ -68,7 +68,7 @@ impl Picture {
         let kept = pixels.lend();
         let error = |film: usize, sums: &PixelSums| {
             // sums of finite samples may make errors that f32 does not hold
-            error_of(film as u32, sums, learning.norm, pixels, allotment).min(f64::from(f32::MAX)) as f32
+            error_of(film as u32, sums, learning.norm, pixels, allocation).min(f64::from(f32::MAX)) as f32
         };
         let mut n = 0u64;
         visit(&mut |film, sums| {
@@ -97,7 +97,7 @@ impl Picture {
             limit: f64::from(t.limit) * counters.camera_samples as f64 / n,
         };
 
-        let old = self.weight * f64::from(learning.carry);
+        let old = self.weight * f64::from(learning.decay);
         self.weight = old + work;
         let blend = |a: f64, b: f64| (a * old + b * work) / self.weight.max(f64::MIN_POSITIVE);
         let b = self.blended;
@@ -112,15 +112,15 @@ impl Picture {
     }
 }
 
-/// Mean error of a pixel's samples against its estimate, weighted by its importance, normed over the channels; over the
+/// Mean error of a pixel's samples against its estimate, weighted by its error weight, normed over the channels; over the
 /// pixel's share of the samples, so that the mean over the pixels is the picture's.
-fn error_of(film: u32, p: &PixelSums, norm: Norm, pixels: &Pixels<'_>, allotment: &Allotment<'_>) -> f64 {
-    let (n, share) = (p.samples as f64, allotment.share(film));
-    let (value, importance) = (pixels.value(film), pixels.importance(film));
+fn error_of(film: u32, p: &PixelSums, norm: Norm, pixels: &Pixels<'_>, allocation: &SampleAllocation<'_>) -> f64 {
+    let (n, share) = (p.samples as f64, allocation.share(film));
+    let (value, error_weight) = (pixels.value(film), pixels.error_weight(film));
     let error = |c: usize| {
         let x = f64::from(value[c]);
         let square = (p.sum_sqr[c] - 2.0 * x * p.sum[c]) / n + x * x;
-        square.max(0.0) * f64::from(importance[c]) / share
+        square.max(0.0) * f64::from(error_weight[c]) / share
     };
     let [r, g, b] = [error(0), error(1), error(2)];
     match norm {

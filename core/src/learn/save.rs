@@ -7,7 +7,7 @@
 //! | 1920 per leaf | sums of the leaves in the order of the shape |
 //!
 //! All numbers are little-endian. The header says what the sums hang on: the bounds, which place the cells, and the
-//! objective, because values of [first vertices](super::cache::Kind::FirstMatte) are in units of their pixel under the
+//! objective, because values of [first vertices](super::cache::Kind::FirstDiffuse) are in units of their pixel under the
 //! relative one, and radiance under the absolute one. Nothing else has to agree: after a change of strategy, norm,
 //! depth, camera or scene the sums are what they were of a render alike, in the same units, and fade as new ones come.
 //!
@@ -18,7 +18,7 @@
 use super::bins::{BINS, BinSums};
 use super::cache::Cache;
 use super::settings::Objective;
-use super::tree::{MAX_DEPTH, Node, ROOTS};
+use super::tree::{MAX_DEPTH, OctreeNode, ROOTS};
 use crate::scene::blob::content_hash;
 use bytemuck::{Pod, Zeroable};
 use core::fmt;
@@ -88,7 +88,7 @@ pub enum CacheError {
         found: u32,
     },
     /// A node that is neither 0 nor 1, or an inner one at the depth limit.
-    Node {
+    OctreeNode {
         /// Its place in the shape.
         index: u32,
         /// Its byte.
@@ -138,7 +138,7 @@ impl fmt::Display for CacheError {
                 Some(o) => write!(f, "saved cache has values for the objective {o}, need {expected}"),
                 None => write!(f, "saved cache has values for an unknown objective, {found}, need {expected}"),
             },
-            Self::Node { index, found, depth } => {
+            Self::OctreeNode { index, found, depth } => {
                 write!(f, "node {index} of the saved cache is {found} at depth {depth}")
             }
             Self::Shape { expected: [n, l], found: [m, k] } => {
@@ -240,7 +240,7 @@ fn check_shape(shape: &[u8], expected: [u32; 2]) -> Result<(), CacheError> {
     }
     let (mut depth, mut leaves) = (0usize, 0u32);
     for (index, found) in (0u32..).zip(shape.iter().copied()) {
-        let bad = CacheError::Node { index, found, depth: depth as u32 };
+        let bad = CacheError::OctreeNode { index, found, depth: depth as u32 };
         let excess = CacheError::Shape { expected, found: [index, leaves] };
         let o = open.get_mut(depth).filter(|o| **o > 0).ok_or(excess)?;
         *o -= 1;
@@ -304,8 +304,8 @@ impl Cache<'_> {
             self.tree.visit(root, &mut |node| {
                 let byte = nodes.next();
                 match node {
-                    Node::Inner { .. } => byte.into_iter().for_each(|b| *b = 1),
-                    Node::Leaf { number, .. } => {
+                    OctreeNode::Inner { .. } => byte.into_iter().for_each(|b| *b = 1),
+                    OctreeNode::Leaf { number, .. } => {
                         let numbers = self.leaf(number).iter().flat_map(BinSums::fields);
                         let bytes = leaves.next().unwrap_or(&mut []).as_chunks_mut().0;
                         bytes.iter_mut().zip(numbers).for_each(|(b, x)| *b = x.to_le_bytes());
@@ -369,20 +369,20 @@ impl Cache<'_> {
             at.leaf += 1;
             return self.hand_down(index, &bins, 1.0);
         }
-        if matches!(self.tree.node(index), Node::Leaf { .. }) && !self.split(index) {
-            self.refuse_split();
+        if matches!(self.tree.node(index), OctreeNode::Leaf { .. }) && !self.subdivide(index) {
+            self.refuse_subdivision();
         }
         match self.tree.node(index) {
-            Node::Inner { child } => (child..child + 8).for_each(|c| self.add_node(c, saved, at)),
-            Node::Leaf { .. } => (0..8).for_each(|_| self.add_node(index, saved, at)),
+            OctreeNode::Inner { child } => (child..child + 8).for_each(|c| self.add_node(c, saved, at)),
+            OctreeNode::Leaf { .. } => (0..8).for_each(|_| self.add_node(index, saved, at)),
         }
     }
 
     /// Adds a share of sums to all leaves below a node, in proportion to their volumes.
     fn hand_down(&mut self, index: u32, bins: &[BinSums; BINS], share: f64) {
         match self.tree.node(index) {
-            Node::Inner { child } => (child..child + 8).for_each(|c| self.hand_down(c, bins, 0.125 * share)),
-            Node::Leaf { number, .. } => {
+            OctreeNode::Inner { child } => (child..child + 8).for_each(|c| self.hand_down(c, bins, 0.125 * share)),
+            OctreeNode::Leaf { number, .. } => {
                 self.leaf_mut(number).iter_mut().zip(bins).for_each(|(b, o)| b.add(o, share));
             }
         }

@@ -1,7 +1,8 @@
 //! What the caller chooses about learning.
 
-use super::estimate::Estimate;
-use crate::rrs::{Learned8, MAX_FACTOR, MIN_FACTOR, Norm};
+use super::cache::CacheSize;
+use super::estimate::PixelEstimator;
+use crate::rrs::{Learned8, MAX_FACTOR, MIN_FACTOR, Norm, Space};
 use core::fmt;
 use croupier_simd::{F32x8, Vec3x8};
 
@@ -33,7 +34,7 @@ impl fmt::Display for Objective {
 
 /// The known value that stands in for what roulette skips (Szecsi et al. 2003).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Constant {
+pub enum ControlVariate {
     /// 0: plain roulette.
     #[default]
     Off,
@@ -47,7 +48,7 @@ pub enum Constant {
 /// Samples at which the cached mean counts half.
 const CONSTANT_TRUST: f32 = 64.0;
 
-impl Constant {
+impl ControlVariate {
     /// The value per lane; `None` if it is 0 everywhere.
     pub(crate) fn of(self, learned: &Learned8) -> Option<Vec3x8> {
         match self {
@@ -69,11 +70,11 @@ pub struct Learning {
     /// and iterations slower.
     pub samples: u32,
     /// Samples in a leaf of the octree at which it is divided (EARS: 40,000).
-    pub split_count: f32,
+    pub subdivide_count: f32,
     /// Part of the statistics that an iteration hands on to the next, in [0, 1].
-    pub carry: f32,
+    pub decay: f32,
     /// How the estimate of the pixels is made.
-    pub estimate: Estimate,
+    pub estimate: PixelEstimator,
     /// Which error is to be small.
     pub objective: Objective,
     /// How the errors of the channels become one.
@@ -88,12 +89,31 @@ impl Default for Learning {
             cache_bytes: 24 << 20,
             ledger: 2048,
             samples: 8,
-            split_count: 10_000.0,
-            carry: 0.75,
-            estimate: Estimate::Denoised,
+            subdivide_count: 10_000.0,
+            decay: 0.75,
+            estimate: PixelEstimator::Denoised,
             objective: Objective::Relative,
             norm: Norm::Mean,
             factors: [MIN_FACTOR, MAX_FACTOR],
         }
     }
+}
+
+/// What a render learns, and how.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Needs {
+    /// Columns and rows of the picture.
+    pub size: [u32; 2],
+    /// The film holds albedos and normals, which the denoiser looks at.
+    pub features: bool,
+    /// Over what local statistics are kept, if at all.
+    pub space: Option<Space>,
+    /// Room for local statistics, if there are any.
+    pub cache: Option<CacheSize>,
+    /// How the pixels are estimated, if anything needs that.
+    pub pixels: Option<PixelEstimator>,
+    /// Pixels get samples by their error.
+    pub adaptive: bool,
+    /// The caller's choices.
+    pub learning: Learning,
 }

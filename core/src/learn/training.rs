@@ -1,14 +1,14 @@
 //! A shard's side of the cache: what it has gathered in the current iteration.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
-use super::bins::{Record, ShadowRecord};
+use super::bins::{BinRecord, ShadowRecord};
 use super::cache::CacheSize;
 use crate::memory::{Carver, Layout, Measure, MemoryError};
 
 /// Records of one shard, one for every bin that the cache may ever have.
 #[derive(Debug)]
 pub struct Training<'m> {
-    records: &'m mut [Record],
+    records: &'m mut [BinRecord],
     shadows: &'m mut [ShadowRecord],
     used: usize,
 }
@@ -27,7 +27,7 @@ impl<'m> Training<'m> {
     }
 
     pub(crate) fn measure(m: Measure, size: CacheSize) -> Measure {
-        m.add::<Record>(size.bins()).add::<ShadowRecord>(size.bins())
+        m.add::<BinRecord>(size.bins()).add::<ShadowRecord>(size.bins())
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, size: CacheSize) -> Result<Self, MemoryError> {
@@ -79,7 +79,7 @@ impl<'m> Training<'m> {
         self.shadows_mut().get_mut(bin as usize).is_some_and(|s| s.add(visible))
     }
 
-    pub(super) fn records(&self) -> &[Record] {
+    pub(super) fn records(&self) -> &[BinRecord] {
         self.records.get(..self.used).unwrap_or(&[])
     }
 
@@ -91,7 +91,7 @@ impl<'m> Training<'m> {
         self.shadows.get_mut(..self.used).unwrap_or(&mut [])
     }
 
-    fn used_mut(&mut self) -> &mut [Record] {
+    fn used_mut(&mut self) -> &mut [BinRecord] {
         self.records.get_mut(..self.used).unwrap_or(&mut [])
     }
 }

@@ -30,7 +30,7 @@ const LAST: f32 = 65_535.996;
 
 /// What a node's word says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Node {
+pub(super) enum OctreeNode {
     Inner { child: u32 },
     Leaf { number: u32, depth: u32 },
 }
@@ -50,8 +50,8 @@ pub(super) struct Tree<'m> {
 }
 
 impl<'m> Tree<'m> {
-    pub(super) const fn nodes_for(splits: u32) -> u32 {
-        FIRST_CHILD + 8 * splits
+    pub(super) const fn nodes_for(subdivisions: u32) -> u32 {
+        FIRST_CHILD + 8 * subdivisions
     }
 
     pub(super) fn measure(m: Measure, nodes: u32, max_leaves: u32) -> Measure {
@@ -117,19 +117,19 @@ impl<'m> Tree<'m> {
         (0..ROOTS).chain(FIRST_CHILD..self.used)
     }
 
-    pub(super) fn node(&self, index: u32) -> Node {
+    pub(super) fn node(&self, index: u32) -> OctreeNode {
         let word = self.nodes.get(index as usize).copied().unwrap_or(LEAF);
         if word & LEAF == 0 {
-            Node::Inner { child: word }
+            OctreeNode::Inner { child: word }
         } else {
-            Node::Leaf { number: word & NUMBER, depth: (word & !LEAF) >> 26 }
+            OctreeNode::Leaf { number: word & NUMBER, depth: (word & !LEAF) >> 26 }
         }
     }
 
     /// Makes a leaf an inner node. The first child keeps its number; the first of the seven new numbers is returned.
     /// `None` if there is no room, or the leaf has [`MAX_DEPTH`].
-    pub(super) fn split(&mut self, index: u32) -> Option<u32> {
-        let Node::Leaf { number, depth } = self.node(index) else { return None };
+    pub(super) fn subdivide(&mut self, index: u32) -> Option<u32> {
+        let OctreeNode::Leaf { number, depth } = self.node(index) else { return None };
         if depth >= MAX_DEPTH || self.max_leaves - self.leaves < 7 {
             return None;
         }
@@ -144,10 +144,10 @@ impl<'m> Tree<'m> {
     }
 
     /// Calls `f` with every node below and including `index`: parents first, children in order.
-    pub(super) fn visit(&self, index: u32, f: &mut impl FnMut(Node)) {
+    pub(super) fn visit(&self, index: u32, f: &mut impl FnMut(OctreeNode)) {
         let node = self.node(index);
         f(node);
-        if let Node::Inner { child } = node {
+        if let OctreeNode::Inner { child } = node {
             (child..child + 8).for_each(|c| self.visit(c, f));
         }
     }

@@ -47,7 +47,7 @@ impl RrsStrategy for Classic {
     fn factor(&self, v: &Vertices8) -> F32x8 {
         let early = v.depth.lt(U32x8::splat(self.start));
         let expected = v.beta * v.albedo;
-        let expected = if self.relative { expected * v.learned.root_importance() } else { expected };
+        let expected = if self.relative { expected * v.learned.root_error_weight() } else { expected };
         early.select(F32x8::ONE, expected.max_component().min(F32x8::ONE))
     }
 }

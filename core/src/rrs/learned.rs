@@ -49,7 +49,7 @@ pub enum Space {
 pub struct Learned8 {
     /// What a squared error of the pixel's rgb counts in the error of the picture: 1 / (I^2 + 0.01) for the relative
     /// objective with I the estimate of the pixel, 1 for the absolute one.
-    pub importance: Vec3x8,
+    pub error_weight: Vec3x8,
     /// How the errors of the channels become one.
     pub norm: Norm,
     /// Mean cost of a camera sample over its mean error (eqs. 33, 34); 0 while unknown.
@@ -63,7 +63,7 @@ pub struct Learned8 {
     /// Mean cost of one sample (eq. 38).
     pub cost: F32x8,
     /// Mean square of the sample's light sample over `moment`, at most 1.
-    pub light_share: F32x8,
+    pub nee_share: F32x8,
     /// Samples behind these; 0 means that nothing is known.
     pub count: F32x8,
 }
@@ -71,14 +71,14 @@ pub struct Learned8 {
 impl Learned8 {
     /// Nothing known: errors count absolutely.
     pub const NONE: Self = Self {
-        importance: Vec3x8::ONE,
+        error_weight: Vec3x8::ONE,
         norm: Norm::Mean,
         cost_over_variance: F32x8::ZERO,
         mean: Vec3x8::ZERO,
         moment: Vec3x8::ZERO,
         variance: Vec3x8::ZERO,
         cost: F32x8::ONE,
-        light_share: F32x8::ONE,
+        nee_share: F32x8::ONE,
         count: F32x8::ZERO,
     };
 
@@ -86,20 +86,20 @@ impl Learned8 {
     /// `beta`.
     #[inline(always)]
     pub fn efficient_square(&self, beta: Vec3x8, r: Vec3x8) -> F32x8 {
-        let error = self.norm.of(beta * beta * self.importance * r);
+        let error = self.norm.of(beta * beta * self.error_weight * r);
         error * self.cost_over_variance / self.cost
     }
 
     /// The expected contribution of a vertex in units of its pixel, mean over the channels.
     #[inline(always)]
     pub fn contribution(&self, beta: Vec3x8) -> F32x8 {
-        (beta * self.mean * self.root_importance()).mean()
+        (beta * self.mean * self.root_error_weight()).mean()
     }
 
     /// Per channel: 1 over the pixel for the relative objective, 1 for the absolute.
     #[inline(always)]
-    pub fn root_importance(&self) -> Vec3x8 {
-        let i = self.importance;
+    pub fn root_error_weight(&self) -> Vec3x8 {
+        let i = self.error_weight;
         Vec3x8::new(i.x.sqrt(), i.y.sqrt(), i.z.sqrt())
     }
 

@@ -8,7 +8,7 @@
 
 use super::ears::{TRUST_MOMENT, least_throughput};
 use super::{Learned8, MIN_FACTOR};
-use crate::learn::COST_SHADOW;
+use crate::cost::COST_SHADOW;
 use croupier_simd::{F32x8, Vec3x8};
 
 impl Learned8 {
@@ -16,9 +16,9 @@ impl Learned8 {
     /// vertex's samples, roulette included. 1 where nothing is known; it grows out of that with the samples behind the
     /// second moment, and keeps the limit of throughput, as [`super::Ears`] does.
     #[inline(always)]
-    pub fn drawn(&self, beta: Vec3x8, albedo: Vec3x8) -> F32x8 {
+    pub fn nee_probability(&self, beta: Vec3x8, albedo: Vec3x8) -> F32x8 {
         let one = F32x8::ONE;
-        let error = self.norm.of(beta * beta * self.importance * self.moment) * self.light_share;
+        let error = self.norm.of(beta * beta * self.error_weight * self.moment) * self.nee_share;
         let best = (error * self.cost_over_variance * F32x8::splat(1.0 / COST_SHADOW)).sqrt();
         let known = self.count.gt(F32x8::ZERO) & self.cost_over_variance.gt(F32x8::ZERO) & best.is_finite();
         let grown = one + (best.min(one) - one) * self.trust(TRUST_MOMENT);
@@ -28,8 +28,8 @@ impl Learned8 {
     /// Chance in [[`MIN_FACTOR`], 1] that the ray to a light sample is traced, which adds the radiance `value` to the
     /// camera sample if nothing hides it; `root` is the square root of the chance that nothing does.
     #[inline(always)]
-    pub fn traced(&self, value: Vec3x8, root: F32x8) -> F32x8 {
-        let error = self.norm.of(value * value * self.importance);
+    pub fn shadow_ray_probability(&self, value: Vec3x8, root: F32x8) -> F32x8 {
+        let error = self.norm.of(value * value * self.error_weight);
         let p = (error * self.cost_over_variance * F32x8::splat(1.0 / COST_SHADOW)).sqrt() * root;
         let known = self.cost_over_variance.gt(F32x8::ZERO) & p.is_finite();
         known.select(p, F32x8::ONE).clamp(MIN_FACTOR, 1.0)

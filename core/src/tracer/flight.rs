@@ -6,7 +6,7 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// One ray per lane, from the camera or from a vertex.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Flight8 {
+pub(crate) struct RayState8 {
     /// Lanes in the air.
     pub active: Mask8,
     /// The rays; unit directions.
@@ -33,6 +33,6 @@ pub(crate) struct Flight8 {
     pub depth: U32x8,
     /// Product of the albedos of the vertices so far.
     pub albedo_product: F32x8,
-    /// See [`Target::importance`](super::root::Target::importance).
-    pub importance: Vec3x8,
+    /// See [`Target::error_weight`](super::root::Target::error_weight).
+    pub error_weight: Vec3x8,
 }

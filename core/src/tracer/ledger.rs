@@ -145,7 +145,7 @@ impl<'m> Ledger<'m> {
     }
 
     /// Part of a sample's estimate is lost to the ledger.
-    pub(crate) fn spoil(&mut self, slot: u32) {
+    pub(crate) fn mark_incomplete(&mut self, slot: u32) {
         if let Some(r) = self.get(slot) {
             r.open |= INCOMPLETE;
         }
@@ -347,7 +347,7 @@ mod tests {
                         let record = if slot == NO_RECORD { NO_RECORD } else { ledger.open(slot, lit) };
                         if slot != NO_RECORD && record == NO_RECORD {
                             refused += 1;
-                            ledger.spoil(slot);
+                            ledger.mark_incomplete(slot);
                             ledger.close(slot, &mut log);
                         }
                         forest.samples[child].recorded = record != NO_RECORD;

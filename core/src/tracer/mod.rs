@@ -5,9 +5,9 @@
 //!
 //! What goes on becomes a waiting vertex again. Every queue is fixed; see [`vertex::Pool`] for why none can overflow.
 
-mod counters;
 mod flight;
 mod free_list;
+mod job;
 mod ledger;
 mod occlude;
 mod place;
@@ -21,12 +21,9 @@ mod surface;
 mod trace;
 mod vertex;
 
-pub use counters::{Counters, Utilisation};
-pub use shard::{Budget, Progress, Shard, ShardError};
+pub(crate) use job::Job;
+pub use shard::{Budget, Shard, ShardError, StepResult};
 
-use crate::film::{PixelAov, PixelSums};
-use crate::learn::cache::{CacheSize, Training};
-use crate::memory::Measure;
 use crate::settings::Settings;
 use crate::tiles::{TILE_PIXELS, Tiles};
 
@@ -46,14 +43,4 @@ fn ledger_capacity(settings: &Settings) -> usize {
 /// Pixel slots of one shard.
 fn pixel_slots(tiles: &Tiles) -> usize {
     tiles.most_tiles().saturating_mul(TILE_PIXELS as usize)
-}
-
-/// Bytes of a shard's block; [`Shard::new`] carves in the same order.
-pub(crate) fn shard_measure(settings: &Settings, cache: Option<CacheSize>, tiles: &Tiles) -> Measure {
-    let pixels = pixel_slots(tiles);
-    let m = vertex::Pool::measure(Measure::new(), settings.ring as usize);
-    let m = root::Roots::measure(m, roots_capacity(settings));
-    let m = ledger::Ledger::measure(m, ledger_capacity(settings));
-    let m = cache.map_or(m, |size| Training::measure(m, size));
-    m.add::<PixelSums>(pixels).add::<PixelAov>(if settings.aovs { pixels } else { 0 })
 }

@@ -3,7 +3,7 @@
 use super::scatter::LitSamples;
 use super::shard::Shard;
 use crate::accel::{self, Intersector, Ray8};
-use crate::learn::COST_SHADOW;
+use crate::cost::COST_SHADOW;
 use crate::light::{LightSample8, LightSelector};
 use crate::profile::Profile;
 use crate::session::Session;

@@ -48,23 +48,23 @@ pub(super) fn place<P: Profile, I: Intersector, L: LightSelector>(
     roots: &Roots<'_>,
 ) -> Place8 {
     let v = &*a.vertex;
-    let knowledge = session.knowledge();
+    let learned = session.learned();
     match space {
         Space::Scene => {
             let mirrored = v.ns * (v.ns.dot(v.wo) * F32x8::splat(2.0)) - v.wo;
             let matte = U32x8::new(a.kind).eq(U32x8::splat(MaterialKind::Diffuse as u32));
             let dir = Vec3x8::select(a.transmissive, v.wo, Vec3x8::select(matte, v.ns, mirrored));
             let seen = v.depth.eq(U32x8::splat(1));
-            let kind = U32x8::select(matte, U32x8::splat(Kind::Matte as u32), U32x8::splat(Kind::Shiny as u32));
-            let first = U32x8::splat(Kind::FirstMatte as u32 - Kind::Matte as u32);
+            let kind = U32x8::select(matte, U32x8::splat(Kind::Diffuse as u32), U32x8::splat(Kind::Glossy as u32));
+            let first = U32x8::splat(Kind::FirstDiffuse as u32 - Kind::Diffuse as u32);
             let kind = kind + U32x8::select(seen, first, U32x8::splat(0));
-            let known = if knowledge.weighs_pixels() { a.active } else { a.active.and_not(seen) };
-            let bin = knowledge.scene_bins(kind, v.p, dir, jitter(v.key), known);
+            let known = if learned.weighs_pixels() { a.active } else { a.active.and_not(seen) };
+            let bin = learned.scene_bins(kind, v.p, dir, jitter(v.key), known);
             let mut unscale = a.albedo;
             if (seen & a.active).any() {
                 // in one cell bright pixels see bright samples: only their ratio is alike, whatever a pixel's samples
                 let share = roots.targets(v.root, a.active).share;
-                let own = inverse(v.importance * share.sqr(), f32::MIN_POSITIVE);
+                let own = inverse(v.error_weight * share.sqr(), f32::MIN_POSITIVE);
                 unscale = Vec3x8::select(seen, own.map(F32x8::sqrt), unscale);
             }
             Place8 { bin, scale: inverse(unscale, DARKEST), unscale }
@@ -73,7 +73,7 @@ pub(super) fn place<P: Profile, I: Intersector, L: LightSelector>(
             let (film, depth) = (roots.targets(v.root, a.active).film.to_array(), v.depth.to_array());
             let mut bin = [0; 8];
             for i in a.active.lanes() {
-                bin[i] = knowledge.image_bin(film[i], depth[i]);
+                bin[i] = learned.image_bin(film[i], depth[i]);
             }
             Place8 { bin: U32x8::new(bin), scale: v.beta, unscale: inverse(v.beta, f32::MIN_POSITIVE) }
         }

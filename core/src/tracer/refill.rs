@@ -1,7 +1,7 @@
 //! Stage `refill`: camera samples in the order of tiles, pixels (Morton) and samples, eight at a time. Neighbouring
 //! lanes are samples of one pixel or of neighbouring pixels, so primary packets are coherent.
 
-use super::flight::Flight8;
+use super::flight::RayState8;
 use super::ledger::NO_RECORD;
 use super::root::Target;
 use super::shard::Shard;
@@ -70,31 +70,31 @@ impl Shard<'_> {
     pub(super) fn camera_rays<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
         session: &Session<'_, '_, P, I, L>,
-    ) -> Option<Flight8> {
+    ) -> Option<RayState8> {
         let iteration = session.iteration();
         // numbers of one pixel must not come back in another iteration, however many samples it had
-        let settings = self.plan.settings();
+        let settings = &self.job.settings;
         let (seed, first_sample) = match settings.adaptive {
             true => (settings.seed ^ iteration.number.wrapping_mul(0x9e37_79b9_7f4a_7c15), 0),
             false => (settings.seed, iteration.first_sample),
         };
-        let tiles = self.plan.tiles;
+        let tiles = self.job.tiles;
         let (mut x, mut y, mut pixel, mut sample, mut root) = ([0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8]);
         let (mut ledger, mut weight) = ([NO_RECORD; 8], [[1.0; 3]; 8]);
         let mut lanes = 0;
         while lanes < 8 {
-            let Some((p, slot, s)) = self.cursor.next(&tiles, self.index, |t| session.knowledge().samples_of_tile(t))
+            let Some((p, slot, s)) = self.cursor.next(&tiles, self.index, |t| session.learned().samples_of_tile(t))
             else {
                 break;
             };
             let film = tiles.film_index(p) as u32;
-            let (importance, share) = session.knowledge().importance(film);
-            let Some(r) = self.roots.open(Target { importance, share, film, pixel: slot }) else { break };
+            let (error_weight, share) = session.learned().error_weight(film);
+            let Some(r) = self.roots.open(Target { error_weight, share, film, pixel: slot }) else { break };
             [x[lanes], y[lanes]] = p;
             pixel[lanes] = film;
             sample[lanes] = first_sample.wrapping_add(s);
             root[lanes] = r;
-            weight[lanes] = importance;
+            weight[lanes] = error_weight;
             if self.ledger.is_on() && s < settings.learning.samples {
                 ledger[lanes] = self.ledger.open(NO_RECORD, false);
                 self.counters.ledger_full += u64::from(ledger[lanes] == NO_RECORD);
@@ -109,10 +109,10 @@ impl Shard<'_> {
         let px = F32x8::from_fn(|i| x[i] as f32) + u0;
         let py = F32x8::from_fn(|i| y[i] as f32) + u1;
         let lens = if P::EFFECTS.contains(Effects::LENS) { [u2, u3] } else { [F32x8::ZERO; 2] };
-        let (o, d) = camera::generate(session.scene().camera, self.plan.settings().size, px, py, lens);
+        let (o, d) = camera::generate(session.scene().camera, self.job.settings.size, px, py, lens);
         let active = Mask8::first(lanes);
         self.counters.camera_rays += lanes as u64;
-        Some(Flight8 {
+        Some(RayState8 {
             active,
             ray: Ray8 { o, d, tmin: F32x8::ZERO, tmax: F32x8::INFINITY },
             from: o,
@@ -126,7 +126,7 @@ impl Shard<'_> {
             key: key.child(U32x8::splat(0)),
             depth: U32x8::splat(1),
             albedo_product: F32x8::ONE,
-            importance: Vec3x8::from_fn(|i| weight[i]),
+            error_weight: Vec3x8::from_fn(|i| weight[i]),
         })
     }
 }

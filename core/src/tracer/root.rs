@@ -28,8 +28,8 @@ pub(crate) struct Root {
 #[repr(C)]
 pub(crate) struct Target {
     /// What a squared error of a sample's rgb counts in the error of the picture.
-    pub importance: [f32; 3],
-    /// Samples of the pixel over those of the mean pixel; `importance` times its square is that of the pixel.
+    pub error_weight: [f32; 3],
+    /// Samples of the pixel over those of the mean pixel; `error_weight` times its square is that of the pixel.
     pub share: f32,
     /// Film index.
     pub film: u32,
@@ -40,8 +40,8 @@ pub(crate) struct Target {
 /// The pixels of eight camera samples.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Target8 {
-    /// See [`Target::importance`].
-    pub importance: Vec3x8,
+    /// See [`Target::error_weight`].
+    pub error_weight: Vec3x8,
     /// See [`Target::share`].
     pub share: F32x8,
     /// Film indices.
@@ -94,7 +94,7 @@ impl<'m> Roots<'m> {
         let [a, b, c, d, e, f, g, h] = U32x8::select(mask, slots, U32x8::splat(u32::MAX)).to_array();
         let rows = [row(a), row(b), row(c), row(d), row(e), row(f), row(g), row(h)];
         let [x, y, z, share, film, ..] = F32x8::transpose(rows);
-        Target8 { importance: Vec3x8::new(x, y, z), share, film: film.to_bits() }
+        Target8 { error_weight: Vec3x8::new(x, y, z), share, film: film.to_bits() }
     }
 
     pub(crate) fn get(&mut self, slot: u32) -> &mut Root {

@@ -55,17 +55,17 @@ impl Shard<'_> {
         session: &Session<'_, '_, P, I, L>,
         a: Arrival8<'_>,
     ) {
-        let settings = *self.plan.settings();
+        let settings = self.job.settings;
         let strategy = settings.strategy;
-        let knowledge = session.knowledge();
+        let state = session.learned();
         let v = &*a.vertex;
         let mut logged = None;
         let mut learned = Learned8::NONE;
         if strategy.needs_image() || settings.shadow_roulette {
-            learned = knowledge.image8(v.importance);
+            learned = state.image8(v.error_weight);
             if let Some(space) = strategy.space() {
                 let found = place(session, &a, space, &self.roots);
-                knowledge.local8(&mut learned, found.bin, found.unscale, a.active);
+                state.local8(&mut learned, found.bin, found.unscale, a.active);
                 self.counters.look_ups.count(a.active.count());
                 logged = Some(found);
             }
@@ -85,7 +85,7 @@ impl Shard<'_> {
         let s = self.bound(s, v.root, a.active);
         let n = rrs::comb(a.active.zero_unless(s), self.comb_bits());
         self.record_factors(a.active, s, v);
-        if let Some(c) = settings.constant.of(&learned) {
+        if let Some(c) = settings.control_variate.of(&learned) {
             // what the samples rounded away, or added, is expected to have given (Szecsi et al. 2003)
             let rounded = F32x8::ONE - F32x8::from_fn(|i| n[i] as f32) / s;
             let found = Found8 { pixel: v.beta * c * rounded, local: a.weight * c * rounded };
@@ -97,7 +97,7 @@ impl Shard<'_> {
         let (root, ledger, depth) = (v.root.to_array(), v.ledger.to_array(), v.depth.to_array());
         let beta = v.beta / s;
         let plays = settings.shadow_roulette && logged.is_some();
-        let drawn = if plays { learned.drawn(beta, a.albedo) } else { F32x8::ONE };
+        let drawn = if plays { learned.nee_probability(beta, a.albedo) } else { F32x8::ONE };
         let lit = if plays { self.lit(n, drawn, &a) } else { n };
         a.vertex.beta = beta;
         a.vertex.drawn = drawn;
@@ -107,13 +107,13 @@ impl Shard<'_> {
         let records = a.vertex.records();
         for i in a.active.lanes() {
             let Some(class) = MaterialKind::from_u32(a.kind[i]).filter(|_| n[i] > 0) else {
-                self.counters.roulette_kills += 1;
+                self.counters.paths_terminated += 1;
                 self.close(root[i], ledger[i], depth[i]);
                 continue;
             };
             let extra = n[i] - 1;
             self.counters.splits += u64::from(extra);
-            self.counters.light_kills += u64::from(n[i] - lit[i]);
+            self.counters.light_samples_skipped += u64::from(n[i] - lit[i]);
             let r = self.roots.get(root[i]);
             r.splits = r.splits.saturating_add(extra);
             // the lane's share of `open` passes to the waiting vertex
@@ -153,14 +153,14 @@ impl Shard<'_> {
         let mut cut = Mask8::NONE;
         if self.pool.free() < active.count() as usize + RESERVE {
             cut = splitting;
-            self.counters.ring_capped += u64::from(splitting.count());
+            self.counters.splits_limited_by_ring += u64::from(splitting.count());
         } else {
-            let budget = self.plan.settings().split_budget;
+            let budget = self.job.settings.split_budget;
             let root = root.to_array();
             let bits =
                 splitting.lanes().filter(|&i| self.roots.get(root[i]).splits >= budget).fold(0, |m, i| m | 1 << i);
             cut |= Mask8::from_bits(bits);
-            self.counters.budget_capped += u64::from(cut.count());
+            self.counters.splits_limited_by_budget += u64::from(cut.count());
         }
         cut.select(F32x8::ONE, s)
     }

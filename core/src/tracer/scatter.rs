@@ -1,7 +1,7 @@
 //! Stage `scatter`: eight samples of vertices of one class. Each sample is one scattered ray and, unless roulette
 //! spares it, one light sample (EARS' atomic sample), combined by multiple importance sampling.
 
-use super::flight::Flight8;
+use super::flight::RayState8;
 use super::ledger::{NO_BIN, NO_RECORD};
 use super::settle::Found8;
 use super::shard::Shard;
@@ -71,7 +71,7 @@ impl Shard<'_> {
     pub(super) fn scatter<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
         session: &Session<'_, '_, P, I, L>,
-    ) -> Option<Flight8> {
+    ) -> Option<RayState8> {
         let (fullest, _) = self.pool.fullest();
         let mut taken = self.take(fullest).map(|b| (fullest, b));
         for ring in 0..RINGS {
@@ -111,11 +111,11 @@ impl Shard<'_> {
         let root = v.root.to_array();
         for i in broken.lanes() {
             self.count_non_finite(root[i]);
-            self.ledger.spoil(ledger.lane(i));
+            self.ledger.mark_incomplete(ledger.lane(i));
         }
         let flying = flying.and_not(broken);
         self.close_lanes(active.and_not(flying), v.root, ledger, v.depth);
-        Some(Flight8 {
+        Some(RayState8 {
             active: flying,
             ray: Ray8 { o: accel::offset(v.p, v.ng, v.error, wi), d: wi, tmin: F32x8::ZERO, tmax: F32x8::INFINITY },
             from: v.p,
@@ -129,7 +129,7 @@ impl Shard<'_> {
             key: key.child(U32x8::splat(0)),
             depth: v.depth + U32x8::splat(1),
             albedo_product: v.albedo_product,
-            importance: v.importance,
+            error_weight: v.error_weight,
         })
     }
 
@@ -155,7 +155,7 @@ impl Shard<'_> {
                 *record = self.ledger.open(parent, lit);
                 if *record == NO_RECORD {
                     self.counters.ledger_full += 1;
-                    self.ledger.spoil(parent);
+                    self.ledger.mark_incomplete(parent);
                     self.settle_record(parent);
                 }
             }
@@ -177,8 +177,8 @@ impl Shard<'_> {
         let radiance = v.beta * f.f * l.radiance * weight;
         let mut found = Found8 { pixel: radiance, local: f.f * l.radiance * weight };
         let mut mask = mask & (radiance.any_positive() | !radiance.is_finite());
-        let towards = if mask.any() && self.plan.settings().shadow_roulette {
-            let towards = session.knowledge().bins_towards(v.bin, l.wi, mask);
+        let towards = if mask.any() && self.job.settings.shadow_roulette {
+            let towards = session.learned().bins_towards(v.bin, l.wi, mask);
             mask = self.shadow_roulette(session, s, towards, &mut found, mask);
             towards
         } else {
@@ -203,11 +203,11 @@ impl Shard<'_> {
         found: &mut Found8,
         mask: Mask8,
     ) -> Mask8 {
-        let knowledge = session.knowledge();
-        let p = knowledge.image8(s.vertex.importance).traced(found.pixel, knowledge.visibility_root(bin));
+        let learned = session.learned();
+        let p = learned.image8(s.vertex.error_weight).shadow_ray_probability(found.pixel, learned.visibility_root(bin));
         let [u, ..] = s.key.uniforms(SHADOW_BLOCK);
         let on = mask & (u.lt(p) | p.ge(F32x8::ONE));
-        self.counters.shadow_kills += u64::from(mask.count() - on.count());
+        self.counters.shadow_rays_terminated += u64::from(mask.count() - on.count());
         found.pixel = found.pixel / p;
         found.local = found.local / p;
         on
@@ -221,7 +221,7 @@ impl Shard<'_> {
         if logged.none() {
             return;
         }
-        let local = found.local * self.tamed(clear & logged, found.pixel, v.root);
+        let local = found.local * self.firefly_scale(clear & logged, found.pixel, v.root);
         let Some(training) = &mut self.training else { return };
         for i in (logged & towards.lt(U32x8::splat(NO_BIN))).lanes() {
             let taken = training.log_shadow(towards.lane(i), clear.lane(i));

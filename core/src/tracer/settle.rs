@@ -37,29 +37,29 @@ impl Shard<'_> {
         }
         let logged = mask.and_not(ledger.eq(U32x8::splat(NO_RECORD)));
         if logged.any() {
-            let x = found.local * self.tamed(good, radiance, U32x8::new(root));
+            let x = found.local * self.firefly_scale(good, radiance, U32x8::new(root));
             let (r, g, b) = (x.x.to_array(), x.y.to_array(), x.z.to_array());
             let ledger = ledger.to_array();
             for i in (good & logged).lanes() {
                 self.ledger.gather(ledger[i], [r[i], g[i], b[i]]);
             }
             for i in mask.and_not(good).lanes() {
-                self.ledger.spoil(ledger[i]);
+                self.ledger.mark_incomplete(ledger[i]);
             }
         }
     }
 
     /// What part of eight contributions the statistics take. The variance of the picture leaves outliers out; so must
     /// the moments that are weighed against it, or cells that met one sample of them would split for ever.
-    pub(super) fn tamed(&mut self, mask: Mask8, radiance: Vec3x8, root: U32x8) -> F32x8 {
+    pub(super) fn firefly_scale(&mut self, mask: Mask8, radiance: Vec3x8, root: U32x8) -> F32x8 {
         let limit = F32x8::splat(self.outlier);
         let square = radiance * radiance;
-        // the importance of a channel is at most that of a black pixel
+        // the error weight of a channel is at most that of a black pixel
         let most = square.max_component() * F32x8::splat(1.0 / REL_MSE_EPSILON as f32);
         if (mask & most.gt(limit)).none() {
             return F32x8::ONE;
         }
-        let error = self.plan.settings().learning.norm.of(square * self.roots.targets(root, mask).importance);
+        let error = self.job.settings.learning.norm.of(square * self.roots.targets(root, mask).error_weight);
         error.gt(limit).select((limit / error).sqrt(), F32x8::ONE)
     }
 

@@ -1,19 +1,20 @@
 //! One unit of parallel work: exclusively owned, bounded, deterministic.
 
-use super::counters::Counters;
+use super::job::Job;
 use super::ledger::Ledger;
 use super::refill::Cursor;
 use super::root::Roots;
 use super::vertex::{Pool, RESERVE};
 use super::{ledger_capacity, pixel_slots, roots_capacity};
 use crate::accel::Intersector;
+use crate::counters::Counters;
 use crate::film::{PixelAov, PixelSums};
 use crate::learn::cache::Training;
 use crate::light::LightSelector;
-use crate::memory::{Carver, MemoryError};
+use crate::memory::{Carver, Layout, Measure, MemoryError};
 use crate::profile::Profile;
 use crate::session::{Iteration, Session};
-use crate::settings::{Plan, Settings};
+use crate::settings::Settings;
 use crate::tiles::TILE_PIXELS;
 use core::fmt;
 use rand_core::{Rng, SeedableRng};
@@ -28,7 +29,7 @@ pub struct Budget {
 
 /// What to do after a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Progress {
+pub enum StepResult {
     /// Step again.
     More,
     /// This shard has finished the iteration.
@@ -64,7 +65,7 @@ impl core::error::Error for ShardError {}
 /// plan needs shards of its own, unless it is to continue with equal iterations.
 #[derive(Debug)]
 pub struct Shard<'m> {
-    pub(super) plan: Plan,
+    pub(super) job: Job,
     pub(crate) index: u32,
     /// Scene and iteration that the accumulators belong to; iteration 0 is none.
     joined: (u64, Iteration),
@@ -83,24 +84,34 @@ pub struct Shard<'m> {
 }
 
 impl<'m> Shard<'m> {
-    /// Carves shard `index` out of a block of at least `plan.shard()`.
-    pub fn new(plan: &Plan, index: u32, block: &'m mut [u8]) -> Result<Self, ShardError> {
-        let s = plan.settings();
+    /// Bytes of a shard; [`Self::carve`] carves in the same order.
+    pub(crate) fn measure(job: &Job) -> Measure {
+        let (settings, pixels) = (&job.settings, pixel_slots(&job.tiles));
+        let m = Pool::measure(Measure::new(), settings.ring as usize);
+        let m = Roots::measure(m, roots_capacity(settings));
+        let m = Ledger::measure(m, ledger_capacity(settings));
+        let m = job.cache.map_or(m, |size| Training::measure(m, size));
+        m.add::<PixelSums>(pixels).add::<PixelAov>(if settings.aovs { pixels } else { 0 })
+    }
+
+    /// Carves shard `index` out of a block of `layout`.
+    pub(crate) fn carve(job: &Job, layout: Layout, index: u32, block: &'m mut [u8]) -> Result<Self, ShardError> {
+        let s = &job.settings;
         if index >= s.shards {
             return Err(ShardError::Index { index, shards: s.shards });
         }
         let memory = ShardError::Memory;
-        let mut c = Carver::new(block, plan.shard()).map_err(memory)?;
-        let pixels = pixel_slots(&plan.tiles);
+        let mut c = Carver::new(block, layout).map_err(memory)?;
+        let pixels = pixel_slots(&job.tiles);
         Ok(Self {
-            plan: *plan,
+            job: *job,
             index,
             joined: (0, Iteration::default()),
             cursor: Cursor::finished(),
             pool: Pool::carve(&mut c, s.ring as usize).map_err(memory)?,
             roots: Roots::carve(&mut c, roots_capacity(s)).map_err(memory)?,
             ledger: Ledger::carve(&mut c, ledger_capacity(s)).map_err(memory)?,
-            training: plan.cache.map(|size| Training::carve(&mut c, size)).transpose().map_err(memory)?,
+            training: job.cache.map(|size| Training::carve(&mut c, size)).transpose().map_err(memory)?,
             pixels: c.take(pixels).map_err(memory)?,
             aovs: c.take(if s.aovs { pixels } else { 0 }).map_err(memory)?,
             outlier: f32::INFINITY,
@@ -119,7 +130,7 @@ impl<'m> Shard<'m> {
         &self.counters
     }
 
-    /// Starts no further camera samples in the iteration of its last step; stepping on to [`Progress::Done`] finishes
+    /// Starts no further camera samples in the iteration of its last step; stepping on to [`StepResult::Done`] finishes
     /// those in flight, so that what was rendered stays unbiased. A shard that has not stepped in this iteration yet
     /// joins it with a step of 0 rays first.
     pub fn stop(&mut self) {
@@ -132,17 +143,17 @@ impl<'m> Shard<'m> {
         &mut self,
         session: &Session<'_, '_, P, I, L>,
         budget: Budget,
-    ) -> Progress {
+    ) -> StepResult {
         if self.joined != session.identity() {
             self.begin(session);
         }
         let start = self.counters.rays();
         while self.counters.rays() - start < budget.rays {
             if !self.turn(session) {
-                return Progress::Done;
+                return StepResult::Done;
             }
         }
-        Progress::More
+        StepResult::More
     }
 
     fn begin<P: Profile, I: Intersector, L: LightSelector>(&mut self, session: &Session<'_, '_, P, I, L>) {
@@ -152,15 +163,15 @@ impl<'m> Shard<'m> {
         self.pool.reset();
         self.roots.reset();
         self.ledger.reset();
-        self.cursor = Cursor::new(&self.plan.tiles, self.index, iteration.samples);
+        self.cursor = Cursor::new(&self.job.tiles, self.index, iteration.samples);
         self.counters = Counters::default();
         self.pixels.fill(PixelSums::default());
-        self.outlier = session.knowledge().outlier();
+        self.outlier = session.learned().outlier();
         if let Some(t) = &mut self.training {
-            t.clear(session.knowledge().used_bins());
+            t.clear(session.learned().used_bins());
         }
         self.aovs.fill(PixelAov::default());
-        let seed = self.plan.settings().seed
+        let seed = self.job.settings.seed
             ^ (iteration.number << 20 | u64::from(self.index)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         self.comb = Pcg32::seed_from_u64(seed);
     }
@@ -180,7 +191,7 @@ impl<'m> Shard<'m> {
             self.advance(session, &f);
         }
         // after what arrived was stored, before the next packet is taken
-        let waiting = self.plan.settings().ring as usize - self.pool.free();
+        let waiting = self.job.settings.ring as usize - self.pool.free();
         self.counters.ring_peak = self.counters.ring_peak.max(waiting as u64);
         true
     }
@@ -192,7 +203,7 @@ impl<'m> Shard<'m> {
 
     /// What it was made for.
     pub(crate) fn settings(&self) -> &Settings {
-        self.plan.settings()
+        &self.job.settings
     }
 
     /// Has it finished this iteration of this scene?
@@ -202,7 +213,7 @@ impl<'m> Shard<'m> {
 
     /// Calls `f(film index, sums, auxiliary sums)` for each of its pixels.
     pub(crate) fn for_each_pixel(&self, mut f: impl FnMut(usize, &PixelSums, Option<&PixelAov>)) {
-        let tiles = &self.plan.tiles;
+        let tiles = &self.job.tiles;
         let mut next = tiles.next_of(self.index, 0);
         let mut slot = 0;
         while let Some(tile) = next {

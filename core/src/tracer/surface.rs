@@ -1,6 +1,6 @@
 //! Stage `surface`: what was hit, what it emits, and the vertex that it becomes.
 
-use super::flight::Flight8;
+use super::flight::RayState8;
 use super::ledger::NO_BIN;
 use super::roulette::Arrival8;
 use super::settle::Found8;
@@ -13,7 +13,7 @@ use crate::profile::Profile;
 use crate::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind, NONE, TRIANGLE_SMOOTH};
 use crate::scene::{Effects, Scene};
 use crate::session::Session;
-use crate::settings::HARD_STOP;
+use crate::settings::MAX_PATH_LENGTH;
 use crate::texture;
 use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
 
@@ -28,7 +28,7 @@ impl Shard<'_> {
     pub(super) fn escape<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
         session: &Session<'_, '_, P, I, L>,
-        f: &Flight8,
+        f: &RayState8,
         escaped: Mask8,
     ) {
         let scene = session.scene();
@@ -47,7 +47,7 @@ impl Shard<'_> {
     pub(super) fn arrive<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
         session: &Session<'_, '_, P, I, L>,
-        f: &Flight8,
+        f: &RayState8,
         hit: &Hit8,
     ) {
         let scene = session.scene();
@@ -59,8 +59,8 @@ impl Shard<'_> {
             self.emission(session, f, hit, point.ng);
         }
         let ends = U32x8::splat(session.max_depth());
-        if self.plan.settings().max_depth > HARD_STOP {
-            self.counters.hard_stopped += u64::from(mask.and_not(f.depth.lt(ends)).count());
+        if self.job.settings.max_depth > MAX_PATH_LENGTH {
+            self.counters.max_length_reached += u64::from(mask.and_not(f.depth.lt(ends)).count());
         }
         let first = mask & f.depth.eq(U32x8::splat(1));
         let mut going = mask & f.depth.lt(ends);
@@ -86,11 +86,11 @@ impl Shard<'_> {
             samples: U32x8::splat(0),
             drawn: F32x8::ONE,
             bin: U32x8::splat(NO_BIN),
-            importance: f.importance,
+            error_weight: f.error_weight,
         };
         going &= s.scatters;
         let lanes_if = |wanted: bool, lanes: Mask8| if wanted { lanes } else { Mask8::NONE };
-        let needs_albedo = self.plan.settings().strategy.needs_albedo();
+        let needs_albedo = self.job.settings.strategy.needs_albedo();
         let wanted = lanes_if(wants_aov, first & s.scatters) | lanes_if(needs_albedo, going);
         let albedo = albedo::<P>(scene, &vertex, &s.kind, wanted);
         if wants_aov {
@@ -116,7 +116,7 @@ impl Shard<'_> {
     fn emission<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
         session: &Session<'_, '_, P, I, L>,
-        f: &Flight8,
+        f: &RayState8,
         hit: &Hit8,
         ng: Vec3x8,
     ) {
@@ -144,7 +144,7 @@ impl Shard<'_> {
         self.gather(mask, f.root, f.ledger, &found);
     }
 
-    fn record_first_hit(&mut self, first: Mask8, f: &Flight8, hit: &Hit8, normal: Vec3x8, albedo: Vec3x8) {
+    fn record_first_hit(&mut self, first: Mask8, f: &RayState8, hit: &Hit8, normal: Vec3x8, albedo: Vec3x8) {
         let root = f.root.to_array();
         // a host's intersector may answer anything
         let good = first & hit.t.is_finite() & normal.is_finite() & albedo.is_finite();

@@ -1,9 +1,9 @@
 //! Stage `trace`: closest hits, and what each ray finds.
 
-use super::flight::Flight8;
+use super::flight::RayState8;
 use super::shard::Shard;
 use crate::accel::{Hit8, Intersector};
-use crate::learn::COST_BOUNCE;
+use crate::cost::COST_BOUNCE;
 use crate::light::LightSelector;
 use crate::profile::Profile;
 use crate::session::Session;
@@ -13,7 +13,7 @@ impl Shard<'_> {
     pub(super) fn advance<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
         session: &Session<'_, '_, P, I, L>,
-        f: &Flight8,
+        f: &RayState8,
     ) {
         if f.active.none() {
             return;
@@ -31,7 +31,7 @@ impl Shard<'_> {
     fn trace<P: Profile, I: Intersector, L: LightSelector>(
         &mut self,
         session: &Session<'_, '_, P, I, L>,
-        f: &Flight8,
+        f: &RayState8,
     ) -> Hit8 {
         let n = f.active.count();
         self.counters.trace.count(n);

@@ -51,12 +51,12 @@ pub(crate) struct Vertex8 {
     pub ledger: U32x8,
     /// Samples left, the number of the next one, and how many of those left draw a light sample: see [`pack_samples`].
     pub samples: U32x8,
-    /// Chance of a sample to draw a light sample ([`crate::rrs::Learned8::drawn`]).
+    /// Chance of a sample to draw a light sample ([`crate::rrs::Learned8::nee_probability`]).
     pub drawn: F32x8,
     /// Its bin of the statistics, [`NO_BIN`](super::ledger::NO_BIN) if there is none.
     pub bin: U32x8,
-    /// See [`Target::importance`](super::root::Target::importance).
-    pub importance: Vec3x8,
+    /// See [`Target::error_weight`](super::root::Target::error_weight).
+    pub error_weight: Vec3x8,
 }
 
 /// Row and column of the words that are read or changed while a vertex waits.
@@ -124,9 +124,9 @@ impl Vertex8 {
                 f(self.samples),
                 self.drawn,
                 f(self.bin),
-                self.importance.x,
-                self.importance.y,
-                self.importance.z,
+                self.error_weight.x,
+                self.error_weight.y,
+                self.error_weight.z,
             ],
         ]
     }
@@ -150,7 +150,7 @@ impl Vertex8 {
             samples: e[2].to_bits(),
             drawn: e[3],
             bin: e[4].to_bits(),
-            importance: Vec3x8::new(e[5], e[6], e[7]),
+            error_weight: Vec3x8::new(e[5], e[6], e[7]),
         }
     }
 
@@ -426,7 +426,7 @@ mod tests {
             samples: u(26),
             drawn: f(27),
             bin: u(29),
-            importance: v3(30),
+            error_weight: v3(30),
             ledger: u(28),
         };
         let records = v.records();
@@ -441,7 +441,7 @@ mod tests {
             assert_eq!(back.albedo_product.lane(i), v.albedo_product.lane(7 - i));
             assert_eq!((back.samples.lane(i), back.drawn.lane(i)), (v.samples.lane(7 - i), v.drawn.lane(7 - i)));
             assert_eq!((back.ledger.lane(i), back.bin.lane(i)), (v.ledger.lane(7 - i), v.bin.lane(7 - i)));
-            assert_eq!(back.importance.lane(i), v.importance.lane(7 - i));
+            assert_eq!(back.error_weight.lane(i), v.error_weight.lane(7 - i));
         }
     }
 }

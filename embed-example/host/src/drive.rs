@@ -12,11 +12,11 @@ use croupier::accel::{Intersector, WideBvh};
 use croupier::film::{PixelAov, PixelStats};
 use croupier::learn::PictureStatistics;
 use croupier::learn::cache::{Cache, CacheError};
-use croupier::profile::{AnyProfile, Full, Matte, Profile};
+use croupier::profile::{AnyProfile, DiffuseOnly, Full, Profile};
 use croupier::rrs::Space;
 use croupier::{
-    Budget, Counters, ErrorEstimate, Phase, Plan, Progress as Step, Scene, SceneError, Session, SessionError, Settings,
-    SettingsError, Shard, ShardError,
+    Budget, Counters, ErrorEstimate, Phase, Plan, Scene, SceneError, Session, SessionError, Settings, SettingsError,
+    Shard, ShardError, StepResult,
 };
 use rayon::prelude::*;
 use schedule::Work;
@@ -96,7 +96,7 @@ pub struct CacheRecord {
     pub leaves: u32,
     /// Splits for which there was no room, in all iterations so far. A leaf that remains too large counts again in
     /// each.
-    pub splits_refused: u64,
+    pub subdivisions_refused: u64,
 }
 
 /// A finished render.
@@ -223,7 +223,7 @@ pub fn drive(scene: &[u8], options: &Options<'_>, observer: &dyn Observer) -> Re
 /// Renders a validated scene with the smallest profile that holds its effects.
 pub fn drive_scene(scene: Scene<'_>, options: &Options<'_>, observer: &dyn Observer) -> Result<Rendered, DriveError> {
     match AnyProfile::smallest(scene.effects) {
-        AnyProfile::Matte => drive_with::<Matte>(scene, options, observer),
+        AnyProfile::DiffuseOnly => drive_with::<DiffuseOnly>(scene, options, observer),
         AnyProfile::Full => drive_with::<Full>(scene, options, observer),
     }
 }
@@ -344,7 +344,8 @@ fn end_iteration<P: Profile, I: Intersector>(
     let mut counters = Counters::default();
     shards.iter().for_each(|s| counters.merge(s.counters()));
     let error = session.film().error_estimate();
-    let cache = session.cache().map(|c| CacheRecord { leaves: c.leaves(), splits_refused: c.splits_refused() });
+    let cache =
+        session.cache().map(|c| CacheRecord { leaves: c.leaves(), subdivisions_refused: c.subdivisions_refused() });
     let seconds = |from: Instant, to: Instant| (to - from).as_secs_f64();
     Ok(IterationRecord {
         work: Work { samples: 0, rays: counters.rays(), seconds: begun.elapsed().as_secs_f64() },
@@ -387,7 +388,7 @@ impl<P: Profile + Sync, I: Intersector + Sync> Run<'_, '_, '_, P, I> {
             let worked = shard.counters().rays().saturating_sub(before);
             let rays = self.rays.fetch_add(worked, Ordering::Relaxed) + worked;
             self.observer.progress(&self.progress(rays));
-            if progress == Step::Done {
+            if progress == StepResult::Done {
                 return stopped;
             }
             if !stopped && self.observer.stop() {

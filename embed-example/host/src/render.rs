@@ -5,7 +5,7 @@ use crate::image::Picture;
 use crate::statistics::Statistics;
 use croupier::denoise::{Planes, scratch_len};
 use croupier::film::{PixelAov, PixelStats};
-use croupier::learn::{Constant, Learning};
+use croupier::learn::{ControlVariate, Learning};
 use croupier::profile::AnyProfile;
 use croupier::{Film, MIN_RING, Plan, Scene, Settings, SettingsError, Strategy, rrs};
 use serde::Serialize;
@@ -67,8 +67,8 @@ pub struct RenderOptions {
     pub adaptive: bool,
     /// See [`Settings::shadow_roulette`]. Absent: with [`Strategy::is_efficiency_aware`] ones, whose rule it is.
     pub shadow_roulette: Option<bool>,
-    /// See [`Settings::constant`].
-    pub constant: Constant,
+    /// See [`Settings::control_variate`].
+    pub control_variate: ControlVariate,
     /// Choices of the strategies that learn.
     pub learning: Learning,
     /// A saved cache to begin with. Needs a strategy that learns from the scene.
@@ -95,7 +95,7 @@ impl Default for RenderOptions {
             split_budget: None,
             adaptive: false,
             shadow_roulette: None,
-            constant: Constant::default(),
+            control_variate: ControlVariate::default(),
             learning: Learning::default(),
             cache: None,
             save_cache: false,
@@ -206,7 +206,7 @@ impl PlanSummary {
             strategy: Strategy::None(rrs::None),
             adaptive: false,
             shadow_roulette: false,
-            constant: Constant::Off,
+            control_variate: ControlVariate::Off,
             ..*settings
         };
         Ok(Self {
@@ -251,7 +251,7 @@ fn choose(base: Settings, options: &RenderOptions) -> Result<Settings, RenderErr
         aovs: true,
         adaptive: options.adaptive,
         shadow_roulette: options.shadow_roulette.unwrap_or(strategy.is_efficiency_aware()),
-        constant: options.constant,
+        control_variate: options.control_variate,
         learning: options.learning,
     })
 }
@@ -270,7 +270,7 @@ pub fn check(options: &RenderOptions) -> Result<(), RenderError> {
         aovs: true,
         adaptive: false,
         shadow_roulette: false,
-        constant: Constant::Off,
+        control_variate: ControlVariate::Off,
         learning: Learning::default(),
     };
     Plan::new(&choose(least, options)?)?;
@@ -366,20 +366,20 @@ fn stats(r: &Rendered) -> RenderStats {
         ("scatter_rays", c.scatter_rays),
         ("shadow_rays", c.shadow_rays),
         ("vertex_samples", c.vertex_samples),
-        ("roulette_kills", c.roulette_kills),
+        ("paths_terminated", c.paths_terminated),
         ("splits", c.splits),
-        ("ring_capped", c.ring_capped),
-        ("budget_capped", c.budget_capped),
+        ("splits_limited_by_ring", c.splits_limited_by_ring),
+        ("splits_limited_by_budget", c.splits_limited_by_budget),
         ("ring_peak", c.ring_peak),
-        ("shadow_kills", c.shadow_kills),
-        ("light_kills", c.light_kills),
+        ("shadow_rays_terminated", c.shadow_rays_terminated),
+        ("light_samples_skipped", c.light_samples_skipped),
         ("look_ups", c.look_ups.lanes),
         ("samples_logged", c.samples_logged),
         ("samples_refused", c.samples_refused),
         ("shadows_refused", c.shadows_refused),
         ("ledger_full", c.ledger_full),
         ("factors_not_finite", c.factors_not_finite),
-        ("hard_stopped", c.hard_stopped),
+        ("max_length_reached", c.max_length_reached),
         ("distances_clamped", c.distances_clamped),
         ("non_finite", c.non_finite),
     ];

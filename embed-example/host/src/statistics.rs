@@ -45,7 +45,7 @@ pub struct Iteration {
     /// Leaves of the cache afterwards.
     pub leaves: Option<u32>,
     /// Splits for which there was no room so far. A leaf that remains too large counts again in each iteration.
-    pub splits_refused: Option<u64>,
+    pub subdivisions_refused: Option<u64>,
     /// Estimated relMSE of the picture afterwards; absent after a single sample.
     pub relmse_estimate: Option<f64>,
     /// Seconds, on the wall or by [`Observer::seconds`](crate::render::Observer::seconds).
@@ -106,7 +106,7 @@ impl Iteration {
             cost,
             efficiency: variance.map(|v| 1.0 / (v * cost)).filter(|e| e.is_finite()),
             leaves: i.cache.map(|c| c.leaves),
-            splits_refused: i.cache.map(|c| c.splits_refused),
+            subdivisions_refused: i.cache.map(|c| c.subdivisions_refused),
             relmse_estimate: judged.then_some(i.error.rel_mse),
             seconds: i.work.seconds,
         }
@@ -158,7 +158,7 @@ impl fmt::Display for Statistics {
             ]);
         }
         write_table(f, &table)?;
-        if let Some(n) = self.iterations.last().and_then(|i| i.splits_refused).filter(|n| *n > 0) {
+        if let Some(n) = self.iterations.last().and_then(|i| i.subdivisions_refused).filter(|n| *n > 0) {
             writeln!(f, "{n} splits refused so far for lack of room")?;
         }
         writeln!(f)?;

@@ -73,8 +73,8 @@ fn help_tells_the_defaults_of_the_core() {
             ("--split-budget <N>", format!("{} if absent", s.split_budget)),
             ("--ledger <N>", format!("[default: {}]", l.ledger)),
             ("--learn-samples <N>", format!("[default: {}]", l.samples)),
-            ("--split-count <N>", format!("[default: {}]", l.split_count)),
-            ("--carry <X>", format!("[default: {}]", l.carry)),
+            ("--subdivide-count <N>", format!("[default: {}]", l.subdivide_count)),
+            ("--decay <X>", format!("[default: {}]", l.decay)),
             ("--factors <LO:HI>", format!("[default: {}:{}]", l.factors[0], l.factors[1])),
             ("--estimate <denoised|blocks>", "[default: denoised]".into()),
         ] {
@@ -91,8 +91,8 @@ fn help_tells_the_defaults_of_the_core() {
 fn usage_errors_are_status_2() {
     let dir = tempfile::tempdir().unwrap();
     for (arguments, said) in [
-        (["--constant", "on"], "off, cached or a finite number"),
-        (["--constant", "nan"], "off, cached or a finite number"),
+        (["--control-variate", "on"], "off, cached or a finite number"),
+        (["--control-variate", "nan"], "off, cached or a finite number"),
         (["--objective", "both"], "relative or absolute"),
         (["--norm", "median"], "mean, luminance or max"),
         (["--cache-bytes", "24MB"], "24MiB"),
@@ -103,12 +103,12 @@ fn usage_errors_are_status_2() {
         (["--ledger", "0"], "1..=16777216"),
         (["--ledger", "16777217"], "1..=16777216"),
         (["--learn-samples", "0"], "--learn-samples"),
-        (["--split-count", "0"], "finite number above 0"),
-        (["--split-count", "-5"], "finite number above 0"),
-        (["--split-count", "nan"], "finite number above 0"),
-        (["--carry", "-0.1"], "from 0 to 1"),
-        (["--carry", "1.1"], "from 0 to 1"),
-        (["--carry", "nan"], "from 0 to 1"),
+        (["--subdivide-count", "0"], "finite number above 0"),
+        (["--subdivide-count", "-5"], "finite number above 0"),
+        (["--subdivide-count", "nan"], "finite number above 0"),
+        (["--decay", "-0.1"], "from 0 to 1"),
+        (["--decay", "1.1"], "from 0 to 1"),
+        (["--decay", "nan"], "from 0 to 1"),
         (["--factors", "0.5"], "from 0.05 to 1 and from 1 to 20"),
         (["--factors", "0.04:20"], "from 0.05 to 1 and from 1 to 20"),
         (["--factors", "0.05:21"], "from 0.05 to 1 and from 1 to 20"),
@@ -135,8 +135,8 @@ fn flags_that_do_not_fit_together_are_status_1() {
         (&["--cache-bytes", "60KiB", "--shards", "16"][..], "cache of 61440 bytes: with so many shards it needs"),
         (&["--cache-bytes", "11KiB"], "cache of 11264 bytes: with so many shards it needs"),
         (&["--shards", "65536"], "cache of 25165824 bytes: with so many shards it needs"),
-        (&["--constant", "0.5", "--rrs", "threshold"], "cannot serve threshold"),
-        (&["--constant", "cached", "--rrs", "classic"], "cached mean needs"),
+        (&["--control-variate", "0.5", "--rrs", "threshold"], "cannot serve threshold"),
+        (&["--control-variate", "cached", "--rrs", "classic"], "cached mean needs"),
     ] {
         for command in ["render", "info"] {
             let out = croupier(dir.path(), &[&[command, "missing.crp"], arguments].concat());
@@ -186,7 +186,7 @@ fn wrong_files_are_named_before_rendering() {
     beside.iter().for_each(|name| std::fs::remove_dir(name).unwrap());
     fails(&["--rrs", "classic", "--cache-out", "x.cache"], &["`classic`", "no cache"]);
     fails(&["--rrs", "bolin-meyer", "--cache-in", "words.cache"], &["`bolin-meyer`", "no cache"]);
-    fails(&["--rrs", "classic", "--constant", "cached"], &["constant", "ears"]);
+    fails(&["--rrs", "classic", "--control-variate", "cached"], &["constant", "ears"]);
 
     // of a scene with other bounds: a triangle
     std::fs::write(dir.join("t.obj"), "v 0 0 0\nv 7 0 0\nv 0 7 0\nf 1 2 3\n").unwrap();
@@ -208,7 +208,8 @@ fn wrong_files_are_named_before_rendering() {
 fn everything_at_once() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let flags = ["--rrs", "ears", "--spp", "6", "--adaptive", "--shadow-roulette", "--constant", "cached", "--json"];
+    let flags =
+        ["--rrs", "ears", "--spp", "6", "--adaptive", "--shadow-roulette", "--control-variate", "cached", "--json"];
     let more = ["--objective", "absolute", "--norm", "luminance", "--denoise", "--false-color", "--stats"];
     let caches = ["--cache-out", "a.cache", "-o", "a.exr"];
     let found = json(&render(dir, &[&flags[..], &more, &caches].concat()));
@@ -267,8 +268,8 @@ fn every_flag_changes_the_picture() {
         &[],
         &["--adaptive"],
         &["--shadow-roulette=false"],
-        &["--constant", "cached"],
-        &["--constant", "0.25"],
+        &["--control-variate", "cached"],
+        &["--control-variate", "0.25"],
         &["--objective", "absolute"],
         &["--norm", "luminance"],
         &["--norm", "max"],
@@ -277,8 +278,8 @@ fn every_flag_changes_the_picture() {
         &["--split-budget", "0"],
         &["--ledger", "16"],
         &["--learn-samples", "1"],
-        &["--split-count", "1000"],
-        &["--carry", "0"],
+        &["--subdivide-count", "1000"],
+        &["--decay", "0"],
         &["--factors", "1:1"],
         &["--estimate", "blocks"],
     ];
@@ -298,22 +299,26 @@ fn every_flag_changes_the_picture() {
     let base = &found[0];
     let ring = of("--ring");
     assert!(counter(base, "ring_peak") > 16 && counter(base, "splits") > 1000, "{base}");
-    assert_eq!((counter(base, "ledger_full"), counter(base, "budget_capped")), (0, 0), "{base}");
-    assert!(counter(ring, "ring_peak") <= 16 && counter(ring, "ring_capped") > counter(base, "ring_capped"), "{ring}");
+    assert_eq!((counter(base, "ledger_full"), counter(base, "splits_limited_by_budget")), (0, 0), "{base}");
+    assert!(
+        counter(ring, "ring_peak") <= 16
+            && counter(ring, "splits_limited_by_ring") > counter(base, "splits_limited_by_ring"),
+        "{ring}"
+    );
     let budget = of("--split-budget");
-    assert!(counter(budget, "splits") == 0 && counter(budget, "budget_capped") > 1000, "{budget}");
+    assert!(counter(budget, "splits") == 0 && counter(budget, "splits_limited_by_budget") > 1000, "{budget}");
     let ledger = of("--ledger");
     assert!(counter(ledger, "ledger_full") > 1000, "{ledger}");
     // 68 bytes a record, in two shards
     assert_eq!((learning(base) - learning(ledger)) / (2 * (2048 - 16)), 68, "{ledger}");
     let samples = of("--learn-samples");
     assert!(counter(samples, "samples_logged") < counter(base, "samples_logged") / 2, "{samples}");
-    assert!(leaves(of("--split-count")) > 2 * leaves(base));
+    assert!(leaves(of("--subdivide-count")) > 2 * leaves(base));
     // what the last iteration alone has given is not enough to divide as much
-    assert!(2 * leaves(of("--carry")) < leaves(base));
+    assert!(2 * leaves(of("--decay")) < leaves(base));
     let idle = of("--factors");
     assert!(
-        counter(idle, "splits") == 0 && counter(idle, "roulette_kills") < counter(base, "roulette_kills") / 10,
+        counter(idle, "splits") == 0 && counter(idle, "paths_terminated") < counter(base, "paths_terminated") / 10,
         "{idle}"
     );
     // 140 bytes a pixel, or 12 for 64

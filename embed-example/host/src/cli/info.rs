@@ -5,7 +5,7 @@ use super::notes::Notes;
 use super::settings::SettingsFlags;
 use super::{Outcome, say, say_json, scene};
 use croupier::scene::Effects;
-use croupier::{HARD_STOP, Scene, SceneError};
+use croupier::{MAX_PATH_LENGTH, Scene, SceneError};
 use croupier_host::render::{PlanSummary, RenderOptions, check, plan};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -68,7 +68,7 @@ impl Facts {
             bounds: [scene.info.bounds_min, scene.info.bounds_max],
             size: scene.camera.size,
             max_depth: scene.info.max_depth,
-            longest_path: scene.info.max_depth.min(HARD_STOP),
+            longest_path: scene.info.max_depth.min(MAX_PATH_LENGTH),
             effects: called_for.map(|(_, name)| *name).collect(),
             plan: plan(&scene, options).ok(),
             notes,
@@ -98,7 +98,7 @@ pub fn run(args: &Args) -> Outcome {
     line("lights", lights.to_string())?;
     line("bounds", format!("{:?} to {:?}", f.bounds[0], f.bounds[1]))?;
     let limited =
-        if f.max_depth > HARD_STOP { format!(" (the scene asks for {})", f.max_depth) } else { String::new() };
+        if f.max_depth > MAX_PATH_LENGTH { format!(" (the scene asks for {})", f.max_depth) } else { String::new() };
     let [width, height] = f.size;
     line("picture", format!("{width}x{height} pixels, paths of up to {} segments{limited}", f.longest_path))?;
     line("effects", f.effects.join(", "))?;

@@ -2,7 +2,7 @@
 
 use croupier::Strategy;
 use croupier::learn::cache::CacheError;
-use croupier::learn::{Constant, Estimate, Learning, Objective};
+use croupier::learn::{ControlVariate, Learning, Objective, PixelEstimator};
 use croupier::rrs::{MAX_FACTOR, MIN_FACTOR, Norm, Space};
 use croupier_host::drive::DriveError;
 use croupier_host::render::RenderOptions;
@@ -20,8 +20,8 @@ pub struct LearningFlags {
     #[arg(long, value_name = "true|false", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     shadow_roulette: Option<bool>,
     /// What stands in for samples that roulette skips: off, cached (the learned mean) or a radiance
-    #[arg(long, value_name = "off|cached|NUMBER", default_value = "off", value_parser = constant, allow_negative_numbers = true)]
-    constant: Constant,
+    #[arg(long, value_name = "off|cached|NUMBER", default_value = "off", value_parser = control_variate, allow_negative_numbers = true)]
+    control_variate: ControlVariate,
     /// Which error is to be small: relative to the pixel, or absolute
     #[arg(long, value_name = "relative|absolute", default_value = "relative", value_parser = objective)]
     objective: Objective,
@@ -38,17 +38,17 @@ pub struct LearningFlags {
     #[arg(long, value_name = "N", default_value_t = Learning::default().samples, value_parser = clap::value_parser!(u32).range(1..))]
     learn_samples: u32,
     /// Samples in a leaf of the octree at which it is divided, above 0
-    #[arg(long, value_name = "N", default_value_t = Learning::default().split_count, value_parser = above_0, allow_negative_numbers = true)]
-    split_count: f32,
+    #[arg(long, value_name = "N", default_value_t = Learning::default().subdivide_count, value_parser = above_0, allow_negative_numbers = true)]
+    subdivide_count: f32,
     /// Part of the statistics that an iteration hands on to the next, 0 to 1
-    #[arg(long, value_name = "X", default_value_t = Learning::default().carry, value_parser = part, allow_negative_numbers = true)]
-    carry: f32,
+    #[arg(long, value_name = "X", default_value_t = Learning::default().decay, value_parser = part, allow_negative_numbers = true)]
+    decay: f32,
     /// Smallest and largest learned factor, at most and at least 1, within 0.05 and 20
     #[arg(long, value_name = "LO:HI", default_value = "0.05:20", value_parser = factors)]
     factors: [f32; 2],
     /// What errors are judged by: the denoised picture (140 bytes a pixel) or means over 8x8 pixels (12 bytes for each)
     #[arg(long, value_name = "denoised|blocks", default_value = "denoised", value_parser = estimate)]
-    estimate: Estimate,
+    estimate: PixelEstimator,
 }
 
 /// Flags about saved statistics.
@@ -68,13 +68,13 @@ impl LearningFlags {
     pub fn apply(&self, options: &mut RenderOptions) {
         options.adaptive = self.adaptive;
         options.shadow_roulette = self.shadow_roulette;
-        options.constant = self.constant;
+        options.control_variate = self.control_variate;
         options.learning = Learning {
             cache_bytes: self.cache_bytes,
             ledger: self.ledger,
             samples: self.learn_samples,
-            split_count: self.split_count,
-            carry: self.carry,
+            subdivide_count: self.subdivide_count,
+            decay: self.decay,
             estimate: self.estimate,
             objective: self.objective,
             norm: self.norm,
@@ -110,12 +110,12 @@ impl CacheFlags {
     }
 }
 
-fn constant(text: &str) -> Result<Constant, String> {
+fn control_variate(text: &str) -> Result<ControlVariate, String> {
     match text {
-        "off" => Ok(Constant::Off),
-        "cached" => Ok(Constant::Cached),
+        "off" => Ok(ControlVariate::Off),
+        "cached" => Ok(ControlVariate::Cached),
         _ => match text.parse::<f32>() {
-            Ok(x) if x.is_finite() => Ok(Constant::Number(x)),
+            Ok(x) if x.is_finite() => Ok(ControlVariate::Number(x)),
             _ => Err("write off, cached or a finite number".into()),
         },
     }
@@ -138,10 +138,10 @@ fn norm(text: &str) -> Result<Norm, String> {
     }
 }
 
-fn estimate(text: &str) -> Result<Estimate, String> {
+fn estimate(text: &str) -> Result<PixelEstimator, String> {
     match text {
-        "denoised" => Ok(Estimate::Denoised),
-        "blocks" => Ok(Estimate::Blocks),
+        "denoised" => Ok(PixelEstimator::Denoised),
+        "blocks" => Ok(PixelEstimator::Blocks),
         _ => Err("write denoised or blocks".into()),
     }
 }
@@ -200,7 +200,7 @@ mod tests {
         assert_eq!([part("0"), part("0.75"), part("1")], [Ok(0.0), Ok(0.75), Ok(1.0)]);
         assert!(["-0.1", "1.1", "nan", ""].iter().all(|text| part(text).is_err()));
         assert!(["-1", "0", "inf", "1e-60", "nan", ""].iter().all(|text| above_0(text).is_err()));
-        assert_eq!(constant("-0.5"), Ok(Constant::Number(-0.5)));
-        assert!(constant("inf").is_err() && constant("on").is_err());
+        assert_eq!(control_variate("-0.5"), Ok(ControlVariate::Number(-0.5)));
+        assert!(control_variate("inf").is_err() && control_variate("on").is_err());
     }
 }

@@ -6,7 +6,7 @@ use super::output::Outputs;
 use super::progress::Rendering;
 use super::settings::SettingsFlags;
 use super::{Outcome, say, say_json, scene};
-use croupier::{HARD_STOP, Scene};
+use croupier::{MAX_PATH_LENGTH, Scene};
 use croupier_host::render::{PlanSummary, RenderOptions, RenderResult, RenderStats, Target, check, render_scene};
 use croupier_host::statistics::Statistics;
 use serde::Serialize;
@@ -183,8 +183,8 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
 /// What to say if paths end before the scene wants them to, and nobody asked for it.
 fn shortened(scene: &Scene<'_>, given: Option<u32>) -> Option<String> {
     let wanted = scene.info.max_depth;
-    let text = || format!("paths end after {HARD_STOP} segments, the scene asks for {wanted}");
-    (given.is_none() && wanted > HARD_STOP).then(text)
+    let text = || format!("paths end after {MAX_PATH_LENGTH} segments, the scene asks for {wanted}");
+    (given.is_none() && wanted > MAX_PATH_LENGTH).then(text)
 }
 
 fn print(r: &Report<'_>) -> Outcome {

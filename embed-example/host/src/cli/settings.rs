@@ -2,7 +2,7 @@
 
 use croupier::learn::cache::CacheSize;
 use croupier::rrs::ParseError;
-use croupier::{HARD_STOP, MIN_RING, Strategy};
+use croupier::{MAX_PATH_LENGTH, MIN_RING, Strategy};
 use croupier_host::render::RenderOptions;
 
 /// Flags of the core's settings.
@@ -12,7 +12,7 @@ pub struct SettingsFlags {
     #[arg(long, value_name = "NAME", long_help = strategies(), default_value_t = RenderOptions::default().strategy, value_parser = strategy)]
     rrs: String,
     /// Path segments from the camera: 1 shows emitters only; the scene's own number if absent
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(HARD_STOP)))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_PATH_LENGTH)))]
     max_depth: Option<u32>,
     /// Size in pixels; the scene's own if absent
     #[arg(long, value_name = "WxH", value_parser = size)]

@@ -28,7 +28,7 @@ pub(super) fn calibrate(cache: &Cache<'_>, scene: &Scene<'_>) -> Option<Calibrat
     let mut random = Random(scene.hash | 1);
     let vertices: Vec<_> = (0..PACKETS).map(|_| Packet::new(scene, &mut random)).collect();
     let all = Mask8::first(8);
-    let matte = U32x8::splat(Kind::Matte as u32);
+    let matte = U32x8::splat(Kind::Diffuse as u32);
     let bin = |i: usize| cache.find_jittered(matte, vertices[i].p, vertices[i].n, vertices[i].jitter, all);
     let look_up = seconds_of(|| {
         for i in 0..PACKETS {

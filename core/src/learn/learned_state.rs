@@ -1,17 +1,17 @@
 //! The session's side of learning: everything learned, frozen while an iteration runs.
 
-use super::COST_BOUNCE;
-use super::adaptive::Allotment;
-use super::cache::{Cache, CacheSize, Training};
-use super::estimate::{Estimate, Pixels};
+use super::adaptive::SampleAllocation;
+use super::cache::{Cache, Training};
+use super::estimate::Pixels;
 use super::picture::{Picture, PictureStatistics, Visit};
-use super::settings::{Learning, Objective};
+use super::settings::{Learning, Needs, Objective};
+use crate::cost::COST_BOUNCE;
+use crate::counters::Counters;
 use crate::film::Film;
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::rrs::{Learned8, Space};
 use crate::scene::Scene;
-use crate::settings::Settings;
-use crate::tracer::Counters;
+
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Bins of path lengths per block of pixels, for statistics over the picture.
@@ -19,58 +19,48 @@ const DEPTHS: u32 = 16;
 
 /// Everything learned.
 #[derive(Debug)]
-pub(crate) struct Knowledge<'m> {
+pub(crate) struct LearnedState<'m> {
     learning: Learning,
     size: [u32; 2],
     cache: Option<Cache<'m>>,
     /// Side of the pixel blocks of statistics over the picture.
     block: u32,
     pixels: Pixels<'m>,
-    allotment: Allotment<'m>,
+    allocation: SampleAllocation<'m>,
     picture: Picture,
     /// Something needs the statistics of the picture.
     needed: bool,
 }
 
-/// How the pixels are estimated, if anything needs that.
-fn estimate(s: &Settings) -> Option<Estimate> {
-    let needed = s.strategy.needs_image() || s.shadow_roulette || s.adaptive;
-    needed.then_some(s.learning.estimate)
-}
-
-impl<'m> Knowledge<'m> {
-    pub(crate) fn measure(m: Measure, s: &Settings, cache: Option<CacheSize>) -> Measure {
-        let m = cache.map_or(m, |size| Cache::measure(m, size));
-        let m = Pixels::measure(m, s.size, s.aovs, estimate(s));
-        Allotment::measure(m, s.size, s.adaptive)
+impl<'m> LearnedState<'m> {
+    pub(crate) fn measure(m: Measure, needs: &Needs) -> Measure {
+        let m = needs.cache.map_or(m, |size| Cache::measure(m, size));
+        let m = Pixels::measure(m, needs.size, needs.features, needs.pixels);
+        SampleAllocation::measure(m, needs.size, needs.adaptive)
     }
 
-    pub(crate) fn carve(
-        c: &mut Carver<'m>,
-        s: &Settings,
-        cache: Option<CacheSize>,
-        scene: &Scene<'_>,
-    ) -> Result<Self, MemoryError> {
+    pub(crate) fn carve(c: &mut Carver<'m>, needs: &Needs, scene: &Scene<'_>) -> Result<Self, MemoryError> {
+        let n = *needs;
         let info = scene.info;
         let bounds = [info.bounds_min, info.bounds_max];
-        let mut cache = cache.map(|size| Cache::carve(c, size, bounds, s.learning.objective)).transpose()?;
+        let mut cache = n.cache.map(|size| Cache::carve(c, size, bounds, n.learning.objective)).transpose()?;
         let mut block = 1;
-        if let Some(cache) = cache.as_mut().filter(|_| s.strategy.space() == Some(Space::Image)) {
-            let blocks = |side: u32| s.size.map(|n| u64::from(n.div_ceil(side))).iter().product::<u64>();
+        if let Some(cache) = cache.as_mut().filter(|_| n.space == Some(Space::Image)) {
+            let blocks = |side: u32| n.size.map(|n| u64::from(n.div_ceil(side))).iter().product::<u64>();
             while blocks(block) > u64::from(cache.size().leaves()) {
                 block += 1;
             }
             cache.flatten(blocks(block) as u32);
         }
         Ok(Self {
-            learning: s.learning,
-            size: s.size,
+            learning: n.learning,
+            size: n.size,
             cache,
             block,
-            pixels: Pixels::carve(c, s.size, s.aovs, estimate(s), &s.learning)?,
-            allotment: Allotment::carve(c, s.size, s.adaptive)?,
+            pixels: Pixels::carve(c, n.size, n.features, n.pixels, &n.learning)?,
+            allocation: SampleAllocation::carve(c, n.size, n.adaptive)?,
             picture: Picture::default(),
-            needed: estimate(s).is_some(),
+            needed: n.pixels.is_some(),
         })
     }
 
@@ -105,20 +95,20 @@ impl<'m> Knowledge<'m> {
 
     /// Begins an iteration of `samples` camera samples per pixel in the mean.
     pub(crate) fn begin(&mut self, samples: u32, film: &Film<'_>) {
-        self.allotment.deal(samples, film, &self.pixels);
+        self.allocation.allocate(samples, film, &self.pixels);
     }
 
     /// Camera samples of each pixel of a tile in this iteration.
     pub(crate) fn samples_of_tile(&self, tile: u32) -> u32 {
-        self.allotment.of_tile(tile)
+        self.allocation.of_tile(tile)
     }
 
     /// What a squared error of a sample of a pixel counts, per channel: less if the pixel has more samples. And its
     /// samples over those of the mean pixel.
     #[inline]
-    pub(crate) fn importance(&self, film: u32) -> ([f32; 3], f32) {
-        let share = self.allotment.share(film) as f32;
-        (self.pixels.importance(film).map(|x| x / (share * share)), share)
+    pub(crate) fn error_weight(&self, film: u32) -> ([f32; 3], f32) {
+        let share = self.allocation.share(film) as f32;
+        (self.pixels.error_weight(film).map(|x| x / (share * share)), share)
     }
 
     /// See [`Cache::bins_towards`].
@@ -148,11 +138,11 @@ impl<'m> Knowledge<'m> {
         if limit > 0.0 { limit as f32 } else { f32::INFINITY }
     }
 
-    /// What is known of the picture, for vertices of pixels of this importance.
+    /// What is known of the picture, for vertices of pixels of this error weight.
     #[inline]
-    pub(crate) fn image8(&self, importance: Vec3x8) -> Learned8 {
+    pub(crate) fn image8(&self, error_weight: Vec3x8) -> Learned8 {
         Learned8 {
-            importance,
+            error_weight,
             norm: self.learning.norm,
             cost_over_variance: F32x8::splat(self.cost_over_variance()),
             ..Learned8::NONE
@@ -169,7 +159,7 @@ impl<'m> Knowledge<'m> {
         learned.moment = l.moment * square;
         learned.variance = l.variance * square;
         learned.cost = l.cost.max(F32x8::splat(COST_BOUNCE));
-        learned.light_share = l.light_share;
+        learned.nee_share = l.nee_share;
         learned.count = l.count;
     }
 
@@ -196,7 +186,7 @@ impl<'m> Knowledge<'m> {
     /// Measures error and cost of an iteration, whose pixels `visit` shows, against the estimate made before it.
     pub(crate) fn measure_picture(&mut self, counters: &Counters, visit: impl Visit) {
         if self.needed && self.pixels.known() {
-            self.picture.measure(&self.learning, &mut self.pixels, &self.allotment, counters, visit);
+            self.picture.measure(&self.learning, &mut self.pixels, &self.allocation, counters, visit);
         }
     }
 
@@ -209,7 +199,7 @@ impl<'m> Knowledge<'m> {
     /// double, little is lost with the first ones, which have learned least. A quarter of the weight for the very first
     /// made the next pictures worse and no later one better.
     pub(crate) fn weight_of(&self, film: usize) -> f64 {
-        1.0 / self.allotment.share(film as u32)
+        1.0 / self.allocation.share(film as u32)
     }
 
     /// Ends an iteration: a new estimate of the pixels from the film. The first iteration is measured against its own.
@@ -217,7 +207,7 @@ impl<'m> Knowledge<'m> {
         if self.needed {
             self.pixels.refresh(film);
             if !self.picture.known() {
-                self.picture.measure(&self.learning, &mut self.pixels, &self.allotment, counters, visit);
+                self.picture.measure(&self.learning, &mut self.pixels, &self.allocation, counters, visit);
             }
         }
     }
@@ -225,9 +215,9 @@ impl<'m> Knowledge<'m> {
     /// Ends an iteration: adds what the shards learned of the scene.
     pub(crate) fn learn_scene<'a, 'b: 'a>(&mut self, shards: impl Iterator<Item = &'a Training<'b>>) {
         if let Some(cache) = &mut self.cache {
-            cache.begin_merge(f64::from(self.learning.carry));
+            cache.begin_merge(f64::from(self.learning.decay));
             shards.for_each(|t| cache.absorb(t));
-            cache.freeze(f64::from(self.learning.split_count));
+            cache.freeze(f64::from(self.learning.subdivide_count));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What happened: work, lane utilisation and every event in which a bound was met.
 
-use crate::learn::{COST_BOUNCE, COST_CAMERA, COST_SHADOW};
+use crate::cost::{COST_BOUNCE, COST_CAMERA, COST_SHADOW};
 
 /// Lanes used of lanes offered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -43,17 +43,17 @@ pub struct Counters {
     /// Samples of vertices (scatter lanes).
     pub vertex_samples: u64,
     /// Vertices at which roulette ended the path.
-    pub roulette_kills: u64,
+    pub paths_terminated: u64,
     /// Samples that splitting added.
     pub splits: u64,
     /// Lanes whose factor was cut to 1 because the ring was nearly full.
-    pub ring_capped: u64,
+    pub splits_limited_by_ring: u64,
     /// Lanes whose factor was cut to 1 because their camera sample had used up its split budget.
-    pub budget_capped: u64,
+    pub splits_limited_by_budget: u64,
     /// Shadow rays that roulette spared.
-    pub shadow_kills: u64,
+    pub shadow_rays_terminated: u64,
     /// Light samples that roulette spared.
-    pub light_kills: u64,
+    pub light_samples_skipped: u64,
     /// Sum of the segments of all paths, shared ones counted for each.
     pub path_segments: u64,
     /// Samples that were offered to the statistics, the refused ones included.
@@ -69,8 +69,8 @@ pub struct Counters {
     pub ledger_full: u64,
     /// Vertices whose factor was not a finite number and became 1.
     pub factors_not_finite: u64,
-    /// Hits at which a path ended because of the hard stop ([`crate::HARD_STOP`]) before its `max_depth`.
-    pub hard_stopped: u64,
+    /// Hits at which a path ended because of the longest path length ([`crate::MAX_PATH_LENGTH`]) before its `max_depth`.
+    pub max_length_reached: u64,
     /// Light samples so near to a point light that its distance was taken for larger (NUMERICS SOL-5).
     pub distances_clamped: u64,
     /// Contributions or weights that were not finite and were not added.
@@ -97,7 +97,7 @@ impl Counters {
         self.camera_rays + self.scatter_rays + self.shadow_rays
     }
 
-    /// What efficiency is reckoned with: rays, each times its relative cost ([`crate::learn::COST_SHADOW`] and its
+    /// What efficiency is reckoned with: rays, each times its relative cost ([`crate::cost::COST_SHADOW`] and its
     /// like).
     pub fn cost(&self) -> f64 {
         let parts =
@@ -117,19 +117,19 @@ impl Counters {
         self.shadow_rays += o.shadow_rays;
         self.camera_samples += o.camera_samples;
         self.vertex_samples += o.vertex_samples;
-        self.roulette_kills += o.roulette_kills;
+        self.paths_terminated += o.paths_terminated;
         self.splits += o.splits;
-        self.ring_capped += o.ring_capped;
-        self.budget_capped += o.budget_capped;
-        self.shadow_kills += o.shadow_kills;
-        self.light_kills += o.light_kills;
+        self.splits_limited_by_ring += o.splits_limited_by_ring;
+        self.splits_limited_by_budget += o.splits_limited_by_budget;
+        self.shadow_rays_terminated += o.shadow_rays_terminated;
+        self.light_samples_skipped += o.light_samples_skipped;
         self.path_segments += o.path_segments;
         self.samples_logged += o.samples_logged;
         self.samples_refused += o.samples_refused;
         self.shadows_refused += o.shadows_refused;
         self.ledger_full += o.ledger_full;
         self.factors_not_finite += o.factors_not_finite;
-        self.hard_stopped += o.hard_stopped;
+        self.max_length_reached += o.max_length_reached;
         self.distances_clamped += o.distances_clamped;
         self.non_finite += o.non_finite;
         if self.first_non_finite == 0 {

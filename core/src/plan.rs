@@ -1,0 +1,61 @@
+//! How much memory a render needs: sizes first, so that nothing is ever asked for again.
+
+use crate::film::{PixelAov, PixelStats};
+use crate::learn::LearnedState;
+use crate::memory::{Layout, Measure};
+use crate::settings::{Settings, SettingsError};
+use crate::tiles::Tiles;
+use crate::tracer::{Job, Shard, ShardError};
+
+/// Sizes of the memory blocks of a render.
+#[derive(Clone, Copy, Debug)]
+pub struct Plan {
+    pub(crate) job: Job,
+    session: Layout,
+    shard: Layout,
+}
+
+impl Plan {
+    /// Checks the settings and measures the blocks.
+    ///
+    /// # Errors
+    /// The first setting that cannot be used.
+    pub fn new(settings: &Settings) -> Result<Self, SettingsError> {
+        let s = *settings;
+        let cache = s.check()?;
+        let pixels = s.size[0] as usize * s.size[1] as usize;
+        let session = Measure::new().add::<PixelStats>(pixels).add::<PixelAov>(if s.aovs { pixels } else { 0 });
+        let session = LearnedState::measure(session, &s.needs(cache));
+        let job = Job { settings: s, tiles: Tiles::new(s.size, s.shards), cache };
+        Ok(Self {
+            job,
+            session: session.layout().ok_or(SettingsError::Memory)?,
+            shard: Shard::measure(&job).layout().ok_or(SettingsError::Memory)?,
+        })
+    }
+
+    /// Size and alignment of the session's block.
+    pub fn session(&self) -> Layout {
+        self.session
+    }
+
+    /// Size and alignment of each shard's block.
+    pub fn shard(&self) -> Layout {
+        self.shard
+    }
+
+    /// Settings that the plan was made for.
+    pub fn settings(&self) -> &Settings {
+        &self.job.settings
+    }
+}
+
+impl<'m> Shard<'m> {
+    /// Carves shard `index` out of a block of at least [`Plan::shard`] bytes.
+    ///
+    /// # Errors
+    /// An index beyond the plan's shards, or a block that does not fit.
+    pub fn new(plan: &Plan, index: u32, block: &'m mut [u8]) -> Result<Self, ShardError> {
+        Self::carve(&plan.job, plan.shard, index, block)
+    }
+}
