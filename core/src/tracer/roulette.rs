@@ -7,7 +7,7 @@ use super::cache_key::cache_lookup;
 use super::ledger::NO_BIN;
 use super::ring::RESERVE;
 use super::shading::Arrival8;
-use super::vertex::{PathVertex8, pack_samples};
+use super::vertex::pack_samples;
 use crate::bsdf;
 use crate::rrs::{self, Learned8, Vertices8};
 use crate::scene::Scene;
@@ -39,9 +39,8 @@ impl CombNumbers {
 }
 
 /// What roulette decided for eight vertices.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Decision8 {
-    /// The vertices with their samples.
-    pub vertex: PathVertex8,
     /// Samples of each; 0 ends the path.
     pub n: [u32; 8],
     /// How many of them draw a light sample.
@@ -63,7 +62,8 @@ fn shininess(scene: &Scene<'_>, a: &Arrival8) -> F32x8 {
     })
 }
 
-/// Rounds the factors of the vertices that paths have arrived at; `free` are the slots left in the ring.
+/// Rounds the factors of the vertices that paths have arrived at, and gives the vertices their samples; `free` are the
+/// slots left in the ring.
 #[inline(always)]
 pub(crate) fn roulette<W: World>(
     world: &W,
@@ -71,7 +71,7 @@ pub(crate) fn roulette<W: World>(
     book: &mut Bookkeeping<'_>,
     comb: &mut CombNumbers,
     free: usize,
-    a: &Arrival8,
+    a: &mut Arrival8,
 ) -> Decision8 {
     let strategy = settings.strategy;
     let (v, active) = (&a.vertex, a.active);
@@ -115,15 +115,13 @@ pub(crate) fn roulette<W: World>(
     let plays = settings.shadow_roulette && key.is_some();
     let nee_probability = if plays { learned.nee_probability(beta, a.albedo) } else { F32x8::ONE };
     let with_nee = if plays { samples_with_nee(comb, n, nee_probability, a) } else { n };
-    let vertex = PathVertex8 {
-        beta,
-        nee_probability,
-        albedo_product: v.albedo_product * a.albedo.mean(),
-        samples: U32x8::from_fn(|i| pack_samples(n[i], with_nee[i])),
-        bin: key.map_or(U32x8::splat(NO_BIN), |k| k.bin),
-        ..*v
-    };
-    Decision8 { vertex, n, with_nee }
+    let v = &mut a.vertex;
+    v.beta = beta;
+    v.nee_probability = nee_probability;
+    v.albedo_product *= a.albedo.mean();
+    v.samples = U32x8::from_fn(|i| pack_samples(n[i], with_nee[i]));
+    v.bin = key.map_or(U32x8::splat(NO_BIN), |k| k.bin);
+    Decision8 { n, with_nee }
 }
 
 /// How many of the `n` samples of each vertex draw a light sample, if each does with probability `nee_probability`: one
