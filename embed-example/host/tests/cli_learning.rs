@@ -186,7 +186,7 @@ fn wrong_files_are_named_before_rendering() {
     beside.iter().for_each(|name| std::fs::remove_dir(name).unwrap());
     fails(&["--rrs", "classic", "--cache-out", "x.cache"], &["`classic`", "no cache"]);
     fails(&["--rrs", "bolin-meyer", "--cache-in", "words.cache"], &["`bolin-meyer`", "no cache"]);
-    fails(&["--rrs", "classic", "--control-variate", "cached"], &["constant", "ears"]);
+    fails(&["--rrs", "classic", "--control-variate", "cached"], &["control variate", "ears"]);
 
     // of a scene with other bounds: a triangle
     std::fs::write(dir.join("t.obj"), "v 0 0 0\nv 7 0 0\nv 0 7 0\nf 1 2 3\n").unwrap();
