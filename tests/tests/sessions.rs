@@ -2,7 +2,7 @@
 
 use croupier::accel::WideBvh;
 use croupier::learn::Learning;
-use croupier::profile::{DiffuseOnly, Full, Profile};
+use croupier::profile::{DiffuseOnly, Profile};
 use croupier::{
     BLOCK_ALIGN, Budget, Effects, MemoryError, Plan, Scene, Session, SessionError, Settings, SettingsError, Shard,
     ShardError, StepResult,
@@ -15,7 +15,7 @@ use croupier_tests::scenes::{add_quad, blob, cornell, everything, facing_y, spot
 type Start<'s, 'm> = Result<Session<'s, 'm, DiffuseOnly, WideBvh<'s>>, SessionError>;
 
 fn start<'s, 'm>(scene: &Scene<'s>, plan: &Plan, block: &'m mut [u8]) -> Start<'s, 'm> {
-    Session::new(*scene, WideBvh::new(scene), plan, block)
+    Session::builder(*scene).profile().build(plan, block)
 }
 
 /// Killed by: a check against a smaller size, a block carved without a check of its address.
@@ -152,7 +152,7 @@ fn a_profile_without_an_effect_refuses_the_scene() {
         let plan = Plan::new(&Settings::for_scene(&scene)).unwrap();
         let mut shared = AlignedBytes::zeroed(plan.session().size);
         let result = start(&scene, &plan, shared.as_mut()).err();
-        let full = Session::<Full, _>::new(scene, WideBvh::new(&scene), &plan, shared.as_mut());
+        let full = Session::new(scene, &plan, shared.as_mut());
         assert!(full.is_ok(), "the full profile has everything");
         result.map(|e| (e, e.to_string()))
     };

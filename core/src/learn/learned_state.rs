@@ -20,7 +20,7 @@ const DEPTHS: u32 = 16;
 
 /// Everything learned.
 #[derive(Debug)]
-pub(crate) struct LearnedState<'m> {
+pub struct LearnedState<'m> {
     learning: Learning,
     size: [u32; 2],
     cache: Option<Cache<'m>>,

@@ -18,7 +18,7 @@ mod settings;
 mod training;
 mod tree;
 
-pub(crate) use learned_state::LearnedState;
+pub use learned_state::LearnedState;
 pub(crate) use needs::Needs;
 pub use picture::PictureStatistics;
 pub use settings::{ControlVariate, Learning, Objective, PixelEstimator};
