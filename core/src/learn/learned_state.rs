@@ -3,8 +3,9 @@
 use super::adaptive::SampleAllocation;
 use super::cache::{Cache, Training};
 use super::estimate::Pixels;
+use super::needs::Needs;
 use super::picture::{Picture, PictureStatistics, Visit};
-use super::settings::{Learning, Needs, Objective};
+use super::settings::{Learning, Objective};
 use crate::cost::COST_BOUNCE;
 use crate::counters::Counters;
 use crate::film::Film;

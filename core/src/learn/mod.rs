@@ -11,14 +11,14 @@ mod bins;
 pub mod cache;
 mod estimate;
 mod learned_state;
+mod needs;
 mod picture;
 mod save;
 mod settings;
 mod training;
 mod tree;
 
-pub use estimate::PixelEstimator;
 pub use learned_state::LearnedState;
+pub(crate) use needs::Needs;
 pub use picture::PictureStatistics;
-pub(crate) use settings::Needs;
-pub use settings::{ControlVariate, Learning, Objective};
+pub use settings::{ControlVariate, Learning, Objective, PixelEstimator};

@@ -167,8 +167,6 @@ pub enum DriveError {
     Session(SessionError),
     /// A shard cannot be made.
     Shard(ShardError),
-    /// There is no such roulette strategy.
-    Strategy(croupier::rrs::ParseError),
     /// The saved cache cannot be loaded, or the cache not be saved.
     Cache(CacheError),
     /// A cache is to be loaded or saved with this strategy, which learns nothing of the scene.
@@ -186,7 +184,6 @@ impl fmt::Display for DriveError {
             Self::Settings(e) => e.fmt(f),
             Self::Session(e) => e.fmt(f),
             Self::Shard(e) => e.fmt(f),
-            Self::Strategy(e) => e.fmt(f),
             Self::Cache(e @ CacheError::Bounds { .. }) => write!(f, "statistics of another scene: {e}"),
             Self::Cache(e) => e.fmt(f),
             Self::NoCache(strategy) => {
