@@ -1,7 +1,7 @@
 //! The session's side of learning: everything learned, frozen while an iteration runs.
 
 use super::adaptive::SampleAllocation;
-use super::cache::{Cache, Training};
+use super::cache::{Cache, Training, VertexKind8};
 use super::estimate::Pixels;
 use super::picture::{Picture, PictureStatistics, Visit};
 use super::settings::{Learning, Needs, Objective};
@@ -80,7 +80,14 @@ impl<'m> LearnedState<'m> {
 
     /// See [`Cache::find_jittered`].
     #[inline]
-    pub(crate) fn scene_bins(&self, kind: U32x8, p: Vec3x8, dir: Vec3x8, jitter: [F32x8; 3], active: Mask8) -> U32x8 {
+    pub(crate) fn scene_bins(
+        &self,
+        kind: VertexKind8,
+        p: Vec3x8,
+        dir: Vec3x8,
+        jitter: [F32x8; 3],
+        active: Mask8,
+    ) -> U32x8 {
         match &self.cache {
             Some(c) => c.find_jittered(kind, p, dir, jitter, active),
             None => U32x8::splat(u32::MAX),

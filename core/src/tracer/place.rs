@@ -3,7 +3,7 @@
 use super::root::Roots;
 use super::roulette::Arrival8;
 use crate::accel::Intersector;
-use crate::learn::cache::Kind;
+use crate::learn::cache::VertexKind8;
 use crate::light::LightSelector;
 use crate::profile::Profile;
 use crate::rng::Key8;
@@ -55,11 +55,8 @@ pub(super) fn place<P: Profile, I: Intersector, L: LightSelector>(
             let matte = U32x8::new(a.kind).eq(U32x8::splat(MaterialKind::Diffuse as u32));
             let dir = Vec3x8::select(a.transmissive, v.wo, Vec3x8::select(matte, v.ns, mirrored));
             let seen = v.depth.eq(U32x8::splat(1));
-            let kind = U32x8::select(matte, U32x8::splat(Kind::Diffuse as u32), U32x8::splat(Kind::Glossy as u32));
-            let first = U32x8::splat(Kind::FirstDiffuse as u32 - Kind::Diffuse as u32);
-            let kind = kind + U32x8::select(seen, first, U32x8::splat(0));
             let known = if learned.weighs_pixels() { a.active } else { a.active.and_not(seen) };
-            let bin = learned.scene_bins(kind, v.p, dir, jitter(v.key), known);
+            let bin = learned.scene_bins(VertexKind8::of(matte, seen), v.p, dir, jitter(v.key), known);
             let mut unscale = a.albedo;
             if (seen & a.active).any() {
                 // in one cell bright pixels see bright samples: only their ratio is alike, whatever a pixel's samples

@@ -7,12 +7,12 @@
 //! how many shadow rays from the leaf towards its directions met nothing, and the squared sums of light samples alone.
 //!
 //! There are several octrees, for kinds of vertices that should not be mixed, and the direction is the caller's choice:
-//! see [`Kind`]. Shards look up in what [`Cache::freeze`] computed and log into their own [`Training`]; between
+//! see [`VertexKind`]. Shards look up in what [`Cache::freeze`] computed and log into their own [`Training`]; between
 //! iterations those are absorbed in shard order, so the cache is the same whatever the threads did.
 //!
 //! | file | holds |
 //! |---|---|
-//! | `kind` | [`Kind`]: one octree for each |
+//! | `kind` | [`VertexKind`]: one octree for each |
 //! | `bins` | statistics of one bin: of an iteration, of all of them, as look-ups read them |
 //! | `tree` | octrees: the leaf around a position, the bin of a direction |
 //! | `size` | [`CacheSize`]: room for leaves |
@@ -29,7 +29,7 @@ mod training;
 mod tree;
 
 pub use bins::{BIN_LIMIT, Local8, MAX_VALUE};
-pub use kind::Kind;
+pub use kind::{VertexKind, VertexKind8};
 pub use save::CacheError;
 pub use shared::Cache;
 pub use size::CacheSize;

@@ -2,6 +2,7 @@
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use super::bins::{BINS, BinSums, Frozen, Local8, freeze_leaf};
+use super::kind::VertexKind8;
 use super::size::CacheSize;
 use super::training::Training;
 use super::tree::{MAX_DEPTH, OctreeNode, ROOTS, Tree, direction_bin};
@@ -92,18 +93,18 @@ impl<'m> Cache<'m> {
         Ok(cache)
     }
 
-    /// The bins of eight vertices, `u32::MAX` in inactive lanes. `kind` holds [`Kind`]s, `dir` unit vectors in world
-    /// space. Places outside the bounds belong to the nearest leaf.
+    /// The bins of eight vertices, `u32::MAX` in inactive lanes. `dir`: unit vectors, world space. Places outside
+    /// the bounds belong to the nearest leaf.
     #[inline]
-    pub fn find(&self, kind: U32x8, p: Vec3x8, dir: Vec3x8, active: Mask8) -> U32x8 {
-        self.bins_of(self.tree.find(kind & U32x8::splat(ROOTS - 1), p, None), dir, active)
+    pub fn find(&self, kind: VertexKind8, p: Vec3x8, dir: Vec3x8, active: Mask8) -> U32x8 {
+        self.bins_of(self.tree.find(kind, p, None), dir, active)
     }
 
     /// As [`Self::find`], of places moved by `jitter - 0.5` of the edge of their leaf, `jitter` in [0, 1). So what is
     /// looked up has no visible borders: it is a box filter over the leaves, by sampling.
     #[inline]
-    pub fn find_jittered(&self, kind: U32x8, p: Vec3x8, dir: Vec3x8, jitter: [F32x8; 3], active: Mask8) -> U32x8 {
-        self.bins_of(self.tree.find(kind & U32x8::splat(ROOTS - 1), p, Some(jitter)), dir, active)
+    pub fn find_jittered(&self, kind: VertexKind8, p: Vec3x8, dir: Vec3x8, jitter: [F32x8; 3], active: Mask8) -> U32x8 {
+        self.bins_of(self.tree.find(kind, p, Some(jitter)), dir, active)
     }
 
     #[inline(always)]
