@@ -1,7 +1,7 @@
 //! The session's side of learning: everything learned, frozen while an iteration runs.
 
 use super::adaptive::SampleAllocation;
-use super::cache::{Cache, Training, VertexKind8};
+use super::cache::{BINS, Cache, Training, VertexKind8};
 use super::estimate::Pixels;
 use super::picture::{Picture, PictureStatistics, Visit};
 use super::settings::{Learning, Needs, Objective};
@@ -11,11 +11,11 @@ use crate::film::Film;
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::rrs::{Learned8, Space};
 use crate::scene::Scene;
-
+use crate::tiles::BlockGrid;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
-/// Bins of path lengths per block of pixels, for statistics over the picture.
-const DEPTHS: u32 = 16;
+/// Bins of path lengths per block of pixels, for statistics over the picture: those of a leaf, whose place it takes.
+const DEPTHS: u32 = BINS as u32;
 
 /// Everything learned.
 #[derive(Debug)]
@@ -46,8 +46,8 @@ impl<'m> LearnedState<'m> {
         let mut cache = n.cache.map(|size| Cache::carve(c, size, bounds, n.learning.objective)).transpose()?;
         let mut block = 1;
         if let Some(cache) = cache.as_mut().filter(|_| n.space == Some(Space::Image)) {
-            let blocks = |side: u32| n.size.map(|n| u64::from(n.div_ceil(side))).iter().product::<u64>();
-            while blocks(block) > u64::from(cache.size().leaves()) {
+            let blocks = |side: u32| BlockGrid::new(n.size, side).count();
+            while blocks(block) > cache.size().leaves() as usize {
                 block += 1;
             }
             cache.flatten(blocks(block) as u32);
@@ -96,8 +96,7 @@ impl<'m> LearnedState<'m> {
 
     /// The bin of path length `depth` under a pixel.
     pub(crate) fn image_bin(&self, film: u32, depth: u32) -> u32 {
-        let (x, y) = (film % self.size[0] / self.block, film / self.size[0] / self.block);
-        (y * self.size[0].div_ceil(self.block) + x) * DEPTHS + depth.clamp(1, DEPTHS) - 1
+        BlockGrid::new(self.size, self.block).of_pixel(film) * DEPTHS + depth.clamp(1, DEPTHS) - 1
     }
 
     /// Begins an iteration of `samples` camera samples per pixel in the mean.

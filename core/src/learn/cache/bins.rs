@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, U32x8, Vec3x8};
 
 /// Direction bins of a leaf.
-pub(super) const BINS: usize = 16;
+pub(in crate::learn) const BINS: usize = 16;
 
 /// Samples (and pairs) that one bin takes from one shard in one iteration: below it no f32 sum stalls.
 pub const BIN_LIMIT: u16 = u16::MAX;

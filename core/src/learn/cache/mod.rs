@@ -28,6 +28,7 @@ mod size;
 mod training;
 mod tree;
 
+pub(super) use bins::BINS;
 pub use bins::{BIN_LIMIT, Local8, MAX_VALUE};
 pub use kind::{VertexKind, VertexKind8};
 pub use save::CacheError;
