@@ -1,7 +1,7 @@
 //! The session's side of learning: everything learned, frozen while an iteration runs.
 
 use super::adaptive::SampleAllocation;
-use super::cache::{BINS, Cache, Training, VertexKind8};
+use super::cache::{BINS, Cache, NO_BIN, Training, VertexKind8};
 use super::estimate::Pixels;
 use super::picture::{Picture, PictureStatistics, Visit};
 use super::settings::{Learning, Needs, Objective};
@@ -90,7 +90,7 @@ impl<'m> LearnedState<'m> {
     ) -> U32x8 {
         match &self.cache {
             Some(c) => c.find_jittered(kind, p, dir, jitter, active),
-            None => U32x8::splat(u32::MAX),
+            None => U32x8::splat(NO_BIN),
         }
     }
 
@@ -122,7 +122,7 @@ impl<'m> LearnedState<'m> {
     pub(crate) fn bins_towards(&self, bin: U32x8, dir: Vec3x8, active: Mask8) -> U32x8 {
         match &self.cache {
             Some(c) => c.bins_towards(bin, dir, active),
-            None => U32x8::splat(u32::MAX),
+            None => U32x8::splat(NO_BIN),
         }
     }
 

@@ -1,7 +1,7 @@
 //! The side of the cache that all shards look up in.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
-use super::bins::{BINS, BinSums, Frozen, Local8, freeze_leaf};
+use super::bins::{BINS, BinSums, Frozen, Local8, NO_BIN, freeze_leaf};
 use super::kind::VertexKind8;
 use super::size::CacheSize;
 use super::training::Training;
@@ -93,7 +93,7 @@ impl<'m> Cache<'m> {
         Ok(cache)
     }
 
-    /// The bins of eight vertices, `u32::MAX` in inactive lanes. `dir`: unit vectors, world space. Places outside
+    /// The bins of eight vertices, [`NO_BIN`] in inactive lanes. `dir`: unit vectors, world space. Places outside
     /// the bounds belong to the nearest leaf.
     #[inline]
     pub fn find(&self, kind: VertexKind8, p: Vec3x8, dir: Vec3x8, active: Mask8) -> U32x8 {
@@ -109,10 +109,10 @@ impl<'m> Cache<'m> {
 
     #[inline(always)]
     fn bins_of(&self, first: U32x8, dir: Vec3x8, active: Mask8) -> U32x8 {
-        U32x8::select(active, first + direction_bin(dir), U32x8::splat(u32::MAX))
+        U32x8::select(active, first + direction_bin(dir), U32x8::splat(NO_BIN))
     }
 
-    /// The bins of the same leaves as `bin` for other directions: unit vectors `dir`, world space. `u32::MAX` in
+    /// The bins of the same leaves as `bin` for other directions: unit vectors `dir`, world space. [`NO_BIN`] in
     /// inactive lanes and where `bin` is no bin.
     #[inline]
     pub fn bins_towards(&self, bin: U32x8, dir: Vec3x8, active: Mask8) -> U32x8 {
@@ -135,7 +135,7 @@ impl<'m> Cache<'m> {
         // beyond the bins in use lies whatever the caller's memory held
         let used = self.frozen.get(..self.bins() as usize).unwrap_or(&[]);
         let row = |b: u32| used.get(b as usize).unwrap_or(&Frozen::ZERO);
-        let [a, b, c, d, e, f, g, h] = U32x8::select(active, bin, U32x8::splat(u32::MAX)).to_array();
+        let [a, b, c, d, e, f, g, h] = U32x8::select(active, bin, U32x8::splat(NO_BIN)).to_array();
         Local8::gather([row(a), row(b), row(c), row(d), row(e), row(f), row(g), row(h)])
     }
 

@@ -73,7 +73,7 @@ impl<'m> Training<'m> {
 
     /// Adds a shadow ray from a vertex in the leaf of `bin` towards its directions
     /// ([`super::Cache::bins_towards`]), and whether it met nothing. `false` if it was not taken: the bin does
-    /// not exist or has 65,535 of this iteration, the first ones; [`crate::Counters::shadows_refused`] counts them.
+    /// not exist or has [`BIN_LIMIT`](super::BIN_LIMIT) of this iteration, the first ones; [`crate::Counters::shadows_refused`] counts them.
     #[inline]
     pub fn log_shadow(&mut self, bin: u32, visible: bool) -> bool {
         self.shadows_mut().get_mut(bin as usize).is_some_and(|s| s.add(visible))

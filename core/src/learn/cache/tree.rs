@@ -9,7 +9,7 @@
 //! look-up needs two descents.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
-use super::bins::BINS;
+use super::bins::{BINS, NO_BIN};
 use super::kind::{VertexKind, VertexKind8};
 use crate::memory::{Carver, Measure, MemoryError};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -23,6 +23,9 @@ pub(super) const ROOTS: u32 = VertexKind::ALL.len() as u32;
 /// Children lie at multiples of 8, so the roots have eight words as well.
 const FIRST_CHILD: u32 = 8;
 const _: () = assert!(ROOTS <= FIRST_CHILD);
+
+// no bin of any leaf has the number of none
+const _: () = assert!(MAX_LEAVES as u64 * BINS as u64 <= NO_BIN as u64);
 
 const LEAF: u32 = 1 << 31;
 const NUMBER: u32 = MAX_LEAVES - 1;
