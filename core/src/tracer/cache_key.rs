@@ -2,7 +2,7 @@
 
 use super::book::Bookkeeping;
 use super::shading::Arrival8;
-use crate::learn::cache::Kind;
+use crate::learn::cache::VertexKind8;
 use crate::rrs::Space;
 use crate::scene::blob::MaterialKind;
 use crate::world::World;
@@ -39,11 +39,8 @@ pub(super) fn cache_lookup<W: World>(world: &W, book: &Bookkeeping<'_>, a: &Arri
             let diffuse = U32x8::new(a.kind).eq(U32x8::splat(MaterialKind::Diffuse as u32));
             let dir = Vec3x8::select(a.transmissive, v.wo, Vec3x8::select(diffuse, v.ns, mirrored));
             let seen = v.path.depth.eq(U32x8::splat(1));
-            let kind = U32x8::select(diffuse, U32x8::splat(Kind::Diffuse as u32), U32x8::splat(Kind::Glossy as u32));
-            let first = U32x8::splat(Kind::FirstDiffuse as u32 - Kind::Diffuse as u32);
-            let kind = kind + U32x8::select(seen, first, U32x8::splat(0));
             let known = if learned.weighs_pixels() { active } else { active.and_not(seen) };
-            let bin = learned.scene_bins(kind, v.p, dir, v.key.cache_jitter(), known);
+            let bin = learned.scene_bins(VertexKind8::of(diffuse, seen), v.p, dir, v.key.cache_jitter(), known);
             let mut unscale = a.albedo;
             if (seen & active).any() {
                 // in one cell bright pixels see bright samples: only their ratio is alike, whatever a pixel's samples

@@ -2,12 +2,13 @@
 
 use crate::alias;
 use croupier::scene::blob::{Alias, Environment, EnvironmentKind, Light, LightKind};
+use croupier::simd::LUMINANCE;
 use std::f64::consts::{PI, TAU};
 
-/// Rec. 709 luminance, in the weights the core uses; negative channels and NaN count as 0.
+/// Luminance of a linear Rec. 709 colour; negative channels and NaN count as 0.
 fn luminance(c: [f32; 3]) -> f64 {
     let [r, g, b] = c.map(|x| f64::from(x.max(0.0)));
-    0.212_671 * r + 0.715_16 * g + 0.072_169 * b
+    LUMINANCE[0] * r + LUMINANCE[1] * g + LUMINANCE[2] * b
 }
 
 /// Integral of bilinear luminance over each cell of a lat-long map, in luminance x sr, row by row.
