@@ -3,12 +3,12 @@
 use super::root::Roots;
 use super::roulette::Arrival8;
 use crate::accel::Intersector;
+use crate::bsdf;
 use crate::learn::cache::Kind;
 use crate::light::LightSelector;
 use crate::profile::Profile;
 use crate::rng::Key8;
 use crate::rrs::Space;
-use crate::scene::blob::MaterialKind;
 use crate::session::Session;
 use croupier_simd::{F32x8, U32x8, Vec3x8};
 
@@ -38,8 +38,7 @@ fn inverse(x: Vec3x8, floor: f32) -> Vec3x8 {
     Vec3x8::new(one(x.x), one(x.y), one(x.z))
 }
 
-/// The bins of arrived vertices. What matte surfaces reflect hangs on where they face; what shiny ones reflect on the
-/// mirrored direction; what others let through on the viewing direction. Samples are logged over the albedo, so that a
+/// The bins of arrived vertices, keyed by the direction that the model states ([`bsdf::CacheDirection`]). Samples are logged over the albedo, so that a
 /// texture or a black and a white thing in one cell do not pass for noise.
 pub(super) fn place<P: Profile, I: Intersector, L: LightSelector>(
     session: &Session<'_, '_, P, I, L>,
@@ -52,10 +51,11 @@ pub(super) fn place<P: Profile, I: Intersector, L: LightSelector>(
     match space {
         Space::Scene => {
             let mirrored = v.ns * (v.ns.dot(v.wo) * F32x8::splat(2.0)) - v.wo;
-            let matte = U32x8::new(a.kind).eq(U32x8::splat(MaterialKind::Diffuse as u32));
-            let dir = Vec3x8::select(a.transmissive, v.wo, Vec3x8::select(matte, v.ns, mirrored));
+            let by_normal = bsdf::lanes_of(bsdf::kinds_keyed_by_normal(), &a.kind);
+            let by_view = bsdf::lanes_of(bsdf::kinds_keyed_by_view(), &a.kind);
+            let dir = Vec3x8::select(by_view, v.wo, Vec3x8::select(by_normal, v.ns, mirrored));
             let seen = v.depth.eq(U32x8::splat(1));
-            let kind = U32x8::select(matte, U32x8::splat(Kind::Diffuse as u32), U32x8::splat(Kind::Glossy as u32));
+            let kind = U32x8::select(by_normal, U32x8::splat(Kind::Diffuse as u32), U32x8::splat(Kind::Glossy as u32));
             let first = U32x8::splat(Kind::FirstDiffuse as u32 - Kind::Diffuse as u32);
             let kind = kind + U32x8::select(seen, first, U32x8::splat(0));
             let known = if learned.weighs_pixels() { a.active } else { a.active.and_not(seen) };

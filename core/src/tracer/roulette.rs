@@ -16,9 +16,6 @@ use crate::scene::blob::MaterialKind;
 use crate::session::Session;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
-/// Phong exponent of a perfect mirror.
-const MIRROR_SHININESS: f32 = 1e4;
-
 /// Eight vertices that paths have arrived at.
 pub(super) struct Arrival8<'a> {
     pub vertex: &'a mut Vertex8,
@@ -26,25 +23,17 @@ pub(super) struct Arrival8<'a> {
     pub weight: Vec3x8,
     /// [`MaterialKind`] per lane.
     pub kind: [u32; 8],
-    /// Lanes whose material lets light through.
-    pub transmissive: Mask8,
     /// 0 unless the strategy needs it.
     pub albedo: Vec3x8,
     pub active: Mask8,
 }
 
-/// Phong exponents that correspond to the materials' GGX widths: 2 / alpha^2 - 2.
+/// Phong exponents of the materials; 0 where there is none.
 fn shininess(scene: &Scene<'_>, a: &Arrival8<'_>) -> F32x8 {
     let material = a.vertex.material.to_array();
     F32x8::from_fn(|i| {
-        let m = scene.materials.get(material[i] as usize);
-        match MaterialKind::from_u32(a.kind[i]) {
-            Some(MaterialKind::Diffuse | MaterialKind::Plastic | MaterialKind::RoughPlastic) | None => 0.0,
-            Some(MaterialKind::RoughConductor | MaterialKind::RoughDielectric) => {
-                m.map_or(0.0, |m| (2.0 / (m.alpha * m.alpha) - 2.0).clamp(0.0, MIRROR_SHININESS))
-            }
-            Some(_) => MIRROR_SHININESS,
-        }
+        let kind = MaterialKind::from_u32(a.kind[i]);
+        kind.zip(scene.materials.get(material[i] as usize)).map_or(0.0, |(kind, m)| bsdf::shininess(kind, m))
     })
 }
 

@@ -17,12 +17,6 @@ use crate::settings::MAX_PATH_LENGTH;
 use crate::texture;
 use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
 
-/// Kinds that scatter from behind as well.
-const TRANSMISSIVE: u32 = 1 << MaterialKind::Dielectric as u32
-    | 1 << MaterialKind::RoughDielectric as u32
-    | 1 << MaterialKind::ThinDielectric as u32
-    | 1 << MaterialKind::Null as u32;
-
 impl Shard<'_> {
     /// Lanes that left the scene.
     pub(super) fn escape<P: Profile, I: Intersector, L: LightSelector>(
@@ -101,14 +95,7 @@ impl Shard<'_> {
             return;
         }
         let albedo = if needs_albedo { albedo } else { Vec3x8::ZERO };
-        let arrival = Arrival8 {
-            vertex: &mut vertex,
-            weight: f.weight,
-            kind: s.kind,
-            transmissive: s.transmissive,
-            albedo,
-            active: going,
-        };
+        let arrival = Arrival8 { vertex: &mut vertex, weight: f.weight, kind: s.kind, albedo, active: going };
         self.roulette(session, arrival);
     }
 
@@ -203,8 +190,6 @@ fn albedo<P: Profile>(scene: &Scene<'_>, vertex: &Vertex8, kinds: &[u32; 8], act
 struct Shading8 {
     material: U32x8,
     kind: [u32; 8],
-    /// Lanes whose material lets light through.
-    transmissive: Mask8,
     reflectance: Vec3x8,
     /// Shading normal, turned towards `wo` on two-sided materials.
     ns: Vec3x8,
@@ -230,7 +215,7 @@ fn shade<P: Profile>(scene: &Scene<'_>, hit: &Hit8, wo: Vec3x8, ng: Vec3x8) -> S
         textures[i] = m.texture;
         smooth |= u32::from(t.flags & TRIANGLE_SMOOTH != 0) << i;
         two_sided |= u32::from(m.flags & MATERIAL_TWO_SIDED != 0) << i;
-        through |= (TRANSMISSIVE >> m.kind & 1) << i;
+        through |= (bsdf::transmissive_kinds() >> m.kind & 1) << i;
         textured |= u32::from(m.texture != NONE) << i;
     }
     let mut reflectance = Vec3x8::from_fn(|i| reflectance[i]);
@@ -259,5 +244,5 @@ fn shade<P: Profile>(scene: &Scene<'_>, hit: &Hit8, wo: Vec3x8, ng: Vec3x8) -> S
     let turn = behind & Mask8::from_bits(two_sided).and_not(transmissive);
     let ns = Vec3x8::select(turn, -ns, ns);
     let scatters = (cos.gt(F32x8::ZERO) | turn | (transmissive & behind)) & hit.hit;
-    Shading8 { material: U32x8::new(material), kind, transmissive, reflectance, ns, scatters }
+    Shading8 { material: U32x8::new(material), kind, reflectance, ns, scatters }
 }
