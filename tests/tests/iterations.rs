@@ -2,8 +2,7 @@
 
 use croupier::{ErrorEstimate, Film, Scene, Settings, Strategy};
 use croupier_host::drive::schedule::{LARGEST_ITERATION, Work, next};
-use croupier_host::drive::{Options, Rendered, Unobserved, drive};
-use croupier_host::render::{Observer, Progress, Target};
+use croupier_host::drive::{Observer, Options, Progress, Rendered, Target, Unobserved, drive};
 use croupier_tests::scenes::{blob, everything};
 use std::time::Duration;
 

@@ -4,8 +4,7 @@ use croupier::{Film, Scene, Settings};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin;
-use croupier_host::drive::{Options, Unobserved, drive};
-use croupier_host::render::{Observer, Progress, Target};
+use croupier_host::drive::{Observer, Options, Progress, Target, Unobserved, drive};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 

@@ -1,47 +1,20 @@
 //! Rendering a scene blob to a picture: what the program asks for and gets.
 
-use crate::drive::{Options, Rendered, drive_scene};
+pub use crate::drive::{DriveError as RenderError, Observer, Progress, Target};
+
+use crate::drive::{self, Options, Rendered, drive_scene};
 use crate::image::Picture;
 use crate::statistics::Statistics;
 use croupier::denoise::{Planes, scratch_len};
 use croupier::film::{PixelAov, PixelStats};
 use croupier::learn::ControlVariate;
+use croupier::learn::cache::CacheSize;
 use croupier::profile::AnyProfile;
 use croupier::rrs::Ears;
-use croupier::{Film, Plan, Scene, Settings, SettingsError, Strategy, rrs};
+use croupier::{Plan, Scene, Settings, SettingsError, Strategy, rrs};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
-
-/// When a render is done.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Target {
-    /// Samples per pixel, >= 1.
-    Spp(u32),
-    /// Seconds of rendering, > 0, on the wall or by [`Observer::seconds`]. No iteration begins that would pass them at
-    /// the speed so far; one that has begun is finished, and the first one, a sample per pixel, is rendered in any
-    /// case. The image then depends on the machine.
-    Seconds(f64),
-    /// Rays of all kinds, >= 1. The same: passed by at most one iteration.
-    Rays(u64),
-    /// Estimated relMSE of the whole image, > 0, looked at after iterations; not believed below 4 samples per pixel.
-    Error(f64),
-}
-
-impl Target {
-    /// Seconds left, from what has been done so far: work goes on at the same speed, and the squared error falls as 1 /
-    /// work. `None` while nothing is known.
-    pub fn seconds_left(&self, p: &Progress) -> Option<f64> {
-        let by_part = |part: f64| p.seconds * (1.0 / part - 1.0);
-        let left = match *self {
-            Self::Spp(n) => by_part(p.spp / f64::from(n)),
-            Self::Seconds(s) => s - p.seconds,
-            Self::Rays(n) => by_part(p.rays as f64 / n as f64),
-            Self::Error(e) => by_part(e / p.relmse_estimate?),
-        };
-        left.is_finite().then(|| left.max(0.0))
-    }
-}
 
 /// Options of a render, besides the scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,49 +56,21 @@ impl RenderOptions {
             calibrate: false,
         }
     }
+
+    /// Takes as many shards as their statistics have room for, at most as many as there are. If there is no room for
+    /// one, [`check`] says what one needs.
+    pub fn fit_shards(&mut self) {
+        let s = &mut self.settings;
+        let learns = s.strategy.space().is_some();
+        let fits = |shards: &u32| !learns || CacheSize::within(s.learning.cache_bytes, *shards).is_some();
+        s.shards = (1..=s.shards).rev().find(fits).unwrap_or(1);
+    }
 }
 
 /// With efficiency-aware roulette and splitting.
 impl Default for RenderOptions {
     fn default() -> Self {
         Self::new(Strategy::Ears(Ears::default()))
-    }
-}
-
-/// State of a render on its way.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Progress {
-    /// Mean samples per pixel so far.
-    pub spp: f64,
-    /// Rays so far.
-    pub rays: u64,
-    /// Wall-clock seconds so far.
-    pub seconds: f64,
-    /// Estimated relMSE of the picture after the last finished iteration ([`croupier::ErrorEstimate::rel_mse`]): the
-    /// samples of the iteration under way are not in it. `None` while the first is under way. Where a pixel has a
-    /// single sample, its square stands in for its squared error, so that after an iteration of one sample the estimate
-    /// is far too large.
-    pub relmse_estimate: Option<f64>,
-}
-
-/// Watches a render, and may end it. Called from the thread that called [`render_scene`] and from its workers.
-pub trait Observer: Sync {
-    /// Called by each worker after each step: when a shard has traced some 65 000 rays or has finished its part of the
-    /// iteration. Workers do not wait for each other, so that several may call at a time; each waits for its own call.
-    fn progress(&self, progress: &Progress);
-    /// True ends the render soon, and must stay true; what was rendered is still returned. Asked before each iteration
-    /// but the first, and by each worker after each step that leaves its shard something to do: such a shard begins no
-    /// further camera samples and finishes those under way. So a first iteration whose shards take a single step each
-    /// is finished. Nothing else ends an iteration early, no [`Target`] either.
-    fn stop(&self) -> bool;
-    /// An iteration is finished: the picture so far and the wall-clock seconds it took. Called from the thread that
-    /// called [`render`]; the time spent in here does not count as rendering.
-    fn iteration(&self, _film: &Film<'_>, _seconds: f64) {}
-    /// Seconds of rendering so far, for [`Target::Seconds`]; `None` is time on the wall without that in
-    /// [`Self::iteration`]. On a machine with other work a host may count CPU time instead. Asked between iterations,
-    /// by the thread that called [`render_scene`].
-    fn seconds(&self) -> Option<f64> {
-        None
     }
 }
 
@@ -217,8 +162,6 @@ impl fmt::Display for PlanSummary {
     }
 }
 
-pub use crate::drive::DriveError as RenderError;
-
 /// Fails if the options make no sense whatever the scene: known before one is loaded.
 pub fn check(options: &RenderOptions) -> Result<(), RenderError> {
     let mut settings = options.settings;
@@ -230,7 +173,7 @@ pub fn check(options: &RenderOptions) -> Result<(), RenderError> {
         settings.max_depth = 1;
     }
     Plan::new(&settings)?;
-    Ok(())
+    if options.cache.is_some() || options.save_cache { drive::needs_cache(&settings) } else { Ok(()) }
 }
 
 /// Renders a scene blob.

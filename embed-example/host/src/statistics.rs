@@ -48,7 +48,7 @@ pub struct Iteration {
     pub subdivisions_refused: Option<u64>,
     /// Estimated relMSE of the picture afterwards; absent after a single sample.
     pub relmse_estimate: Option<f64>,
-    /// Seconds, on the wall or by [`Observer::seconds`](crate::render::Observer::seconds).
+    /// Seconds, on the wall or by [`Observer::seconds`](crate::drive::Observer::seconds).
     pub seconds: f64,
 }
 

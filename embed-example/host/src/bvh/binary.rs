@@ -1,12 +1,23 @@
 //! The binary tree: boxes over single triangles or few of them.
 
-use super::Effort;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+
+/// How hard to try.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Effort {
+    /// Previews: fewest passes.
+    Fast,
+    /// Close to the best tree in a fraction of its time.
+    #[default]
+    Medium,
+    /// The best tree: for scenes that are baked once and rendered often.
+    Slow,
+}
 
 /// A box.
 #[derive(Clone, Copy, Debug, PartialEq)]

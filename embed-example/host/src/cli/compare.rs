@@ -1,6 +1,7 @@
 //! `croupier compare`
 
-use super::{Outcome, say, say_json};
+use super::console::{Outcome, say, say_json};
+use super::values::stops;
 use croupier_host::compare::{Bias, CompareOptions, Comparison, ImageMean, Inputs, compare};
 use croupier_host::image::{ImageError, Picture, Rgb};
 use std::path::{Path, PathBuf};
@@ -24,7 +25,7 @@ pub struct Args {
     #[arg(long)]
     keep_outliers: bool,
     /// Stops of exposure for FLIP
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = super::stops, allow_negative_numbers = true)]
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = stops, allow_negative_numbers = true)]
     exposure: f32,
     /// Print the figures as one line of JSON
     #[arg(long)]

@@ -1,10 +1,10 @@
 //! `croupier info`
 
-use super::notes::Notes;
+use super::console::{Outcome, say, say_json};
+use super::notes::{Notes, about};
+use super::scene;
 use super::settings::SettingsFlags;
-use super::{Outcome, say, say_json, scene};
-use croupier::scene::Effects;
-use croupier::{MAX_PATH_LENGTH, Scene, SceneError};
+use croupier::{Effects, MAX_PATH_LENGTH, Scene, SceneError};
 use croupier_host::render::{PlanSummary, RenderOptions, check, plan};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -80,7 +80,7 @@ pub fn run(args: &Args) -> Outcome {
     // Said before the scene is loaded.
     check(&options)?;
     let (bytes, notes) = scene::open(path)?;
-    let f = Facts::of(&bytes, &options, notes).map_err(|e| scene::about(path)(&e))?;
+    let f = Facts::of(&bytes, &options, notes).map_err(|e| about(path)(&e))?;
     if args.json {
         return say_json(&f);
     }

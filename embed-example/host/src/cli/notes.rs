@@ -1,11 +1,12 @@
 //! What loading and baking assumed, ignored or left out: printed on stderr, and part of every JSON report about a
 //! scene.
 
-use super::scene::about;
+use super::console::note;
 use croupier_host::bake::BakeReport;
 use croupier_host::load::LoadReport;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::Path;
 
 /// Notes that are printed; JSON has them all.
@@ -39,15 +40,23 @@ impl Notes {
 
     /// Adds one, and prints it.
     pub fn add(&mut self, path: Option<&Path>, text: String) {
-        super::note(&about(path)(&text));
+        note(&about(path)(&text));
         self.notes.push(text);
     }
 
     /// Prints them, with the scene's name in front.
     pub fn print(&self, path: Option<&Path>) {
-        self.notes.iter().take(PRINTED).for_each(|text| super::note(&about(path)(text)));
+        self.notes.iter().take(PRINTED).for_each(|text| note(&about(path)(text)));
         if let Some(more @ 1..) = self.notes.len().checked_sub(PRINTED) {
-            super::note(&about(path)(&format!("... and {more} more notes; --json has them all")));
+            note(&about(path)(&format!("... and {more} more notes; --json has them all")));
         }
+    }
+}
+
+/// Puts the scene's name in front of an error or a note about its content.
+pub fn about<'a>(path: Option<&'a Path>) -> impl Fn(&dyn Display) -> String + 'a {
+    move |e| match path {
+        Some(path) => format!("{}: {e}", path.display()),
+        None => format!("built-in scene: {e}"),
     }
 }

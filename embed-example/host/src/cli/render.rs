@@ -1,11 +1,13 @@
 //! `croupier render`
 
 use super::cache::CacheFlags;
-use super::notes::Notes;
+use super::console::{Outcome, say, say_json};
+use super::notes::{Notes, about};
 use super::output::Outputs;
 use super::progress::Rendering;
+use super::scene;
 use super::settings::SettingsFlags;
-use super::{Outcome, say, say_json, scene};
+use super::values::{exr_path, positive, stops};
 use croupier::{MAX_PATH_LENGTH, Scene};
 use croupier_host::render::{PlanSummary, RenderOptions, RenderResult, RenderStats, Target, check, render_scene};
 use croupier_host::statistics::Statistics;
@@ -35,7 +37,7 @@ pub struct Flags {
     #[arg(long, value_name = "N", default_value_t = RenderOptions::default().threads)]
     threads: usize,
     /// Stops of exposure for the PNG; 0 if absent, 1 for the built-in scene
-    #[arg(long, value_name = "STOPS", value_parser = super::stops, allow_negative_numbers = true)]
+    #[arg(long, value_name = "STOPS", value_parser = stops, allow_negative_numbers = true)]
     exposure: Option<f32>,
     /// Add the denoised picture as layer `denoised`, and make the PNG from it
     #[arg(long)]
@@ -92,9 +94,9 @@ impl Flags {
             calibrate: self.stats,
             ..self.settings.options()?
         };
+        self.cache.apply(&mut options)?;
         // Said before the scene is loaded.
         check(&options)?;
-        self.cache.apply(&mut options)?;
         Ok(options)
     }
 }
@@ -130,13 +132,13 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     outputs.check()?;
     let options = flags.options()?;
     let (bytes, mut notes) = scene::open(path)?;
-    let validated = Scene::from_bytes(&bytes).map_err(|e| scene::about(path)(&e))?;
+    let validated = Scene::from_bytes(&bytes).map_err(|e| about(path)(&e))?;
     if let Some(text) = shortened(&validated, options.settings.max_depth) {
         notes.add(path, text);
     }
     let watch = Rendering::start(options.target);
     let result = render_scene(validated, &options, &watch)
-        .map_err(|e| flags.cache.about(&e).unwrap_or_else(|| scene::about(path)(&e)))?;
+        .map_err(|e| flags.cache.about(&e).unwrap_or_else(|| about(path)(&e)))?;
     drop(watch);
     let RenderResult { picture, stats, statistics, plan, cache, stopped_early } = &result;
     if let Some([x, y]) = stats.first_non_finite {
@@ -201,21 +203,4 @@ fn print(r: &Report<'_>) -> Outcome {
     }
     let names: Vec<_> = r.written.iter().map(|p| p.display().to_string()).collect();
     if names.is_empty() { Ok(()) } else { say(&format!("wrote {}", names.join(", "))) }
-}
-
-fn exr_path(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
-        Ok(path)
-    } else {
-        Err("the name must end in .exr".into())
-    }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
-        Ok(_) => Err("must be above 0 and finite".into()),
-        Err(e) => Err(e.to_string()),
-    }
 }

@@ -1,6 +1,6 @@
 //! From a path to scene bytes.
 
-use super::notes::Notes;
+use super::notes::{Notes, about};
 use super::progress;
 use croupier_host::bake::{self, BakeError};
 use croupier_host::builtin;
@@ -8,7 +8,6 @@ use croupier_host::description::SceneDescription;
 use croupier_host::load::{self, LoadReport};
 use memmap2::Mmap;
 use std::error::Error;
-use std::fmt::Display;
 use std::fs::File;
 use std::ops::Deref;
 use std::path::Path;
@@ -68,12 +67,4 @@ fn map(path: &Path) -> Result<SceneBytes, Box<dyn Error>> {
     // does is asked of the user in the help text of `bake`.
     let map = unsafe { Mmap::map(&file) }.map_err(failed)?;
     Ok(SceneBytes::Mapped(map))
-}
-
-/// Puts the scene's name in front of an error or a note about its content.
-pub fn about<'a>(path: Option<&'a Path>) -> impl Fn(&dyn Display) -> String + 'a {
-    move |e| match path {
-        Some(path) => format!("{}: {e}", path.display()),
-        None => format!("built-in scene: {e}"),
-    }
 }

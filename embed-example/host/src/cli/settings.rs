@@ -2,7 +2,6 @@
 
 use clap::{Arg, ArgMatches, Command, FromArgMatches, error::ErrorKind};
 use croupier::learn::Learning;
-use croupier::learn::cache::CacheSize;
 use croupier::{MAX_PATH_LENGTH, SettingError, SettingInfo, SettingRange, Settings, Strategy};
 use croupier_host::render::RenderOptions;
 use std::fmt::Write;
@@ -28,18 +27,10 @@ impl SettingsFlags {
             options.settings.set(row.name, text)?;
         }
         if given("shards").is_none() {
-            options.settings.shards = shards(&options.settings);
+            options.fit_shards();
         }
         Ok(options)
     }
-}
-
-/// The usual number of shards, less where their statistics do not fit. If not even those of one do, the core says what
-/// one needs.
-fn shards(settings: &Settings) -> u32 {
-    let learns = settings.strategy.space().is_some();
-    let fits = |shards: &u32| !learns || CacheSize::within(settings.learning.cache_bytes, *shards).is_some();
-    (1..=settings.shards).rev().find(fits).unwrap_or(1)
 }
 
 /// Values that the program accepts: those of the core, but for what would be cut or could not be written.

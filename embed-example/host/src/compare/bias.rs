@@ -18,7 +18,8 @@
 //! block missed its neighbours have seen. That takes the drift below 0.1 and only ever makes |z| smaller (Gaussian
 //! noise: 0.2 % beyond 3 instead of 0.27 %); a bias over an area larger than its noise still shows.
 
-use super::{CompareError, Estimate};
+use super::estimate::Estimate;
+use super::metric::CompareError;
 use serde::Serialize;
 
 /// How blocks are tested.

@@ -4,7 +4,7 @@
 //! SIGGRAPH 2022, section 5). For strategies that learn, work is counted in rays: when they begin to split, a camera
 //! sample may cost twenty times as much as the one before.
 
-use crate::render::Target;
+use super::observe::Target;
 use croupier::ErrorEstimate;
 
 /// Iterations grow to this many samples per pixel.
@@ -20,7 +20,7 @@ pub struct Work {
     pub samples: u32,
     /// Rays of all kinds.
     pub rays: u64,
-    /// Seconds, on the wall or by [`Observer::seconds`](crate::render::Observer::seconds).
+    /// Seconds, on the wall or by [`Observer::seconds`](super::Observer::seconds).
     pub seconds: f64,
 }
 
