@@ -6,9 +6,8 @@
 /// allowed to use, which is exactly what is in doubt here.
 #[cfg(all(target_arch = "x86_64", target_feature = "avx2"))]
 #[inline(never)]
-pub fn missing() -> Option<&'static str> {
+pub(crate) fn missing() -> Option<&'static str> {
     use std::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
-    #[allow(unused_unsafe, reason = "`__cpuid` is an unsafe function before Rust 1.91 and a safe one since")]
     // SAFETY: every x86-64 processor has `cpuid`; leaves 0 and 1 always exist, the others are asked for only if leaf 0
     // and 0x8000_0000 say that they do. `xgetbv` runs only if the OSXSAVE bit says that the system has enabled it.
     unsafe {
@@ -23,7 +22,7 @@ pub fn missing() -> Option<&'static str> {
 
 /// Programs built for the baseline of their architecture run everywhere.
 #[cfg(not(all(target_arch = "x86_64", target_feature = "avx2")))]
-pub fn missing() -> Option<&'static str> {
+pub(crate) fn missing() -> Option<&'static str> {
     None
 }
 

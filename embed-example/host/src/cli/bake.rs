@@ -11,7 +11,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Folder with scene.json, or .obj file
     scene: PathBuf,
     /// Where the baked scene goes. Programs map this file into memory: replace it by another `bake`, never edit it in
@@ -35,7 +35,7 @@ struct Report<'a> {
 }
 
 /// Runs the command.
-pub fn run(args: &Args) -> Outcome {
+pub(crate) fn run(args: &Args) -> Outcome {
     super::output::writable(&args.output)?;
     let (bytes, notes) = scene::open(Some(&args.scene))?;
     let scene = Scene::from_bytes(&bytes).map_err(|e| about(Some(&args.scene))(&e))?;

@@ -7,18 +7,18 @@ use std::path::PathBuf;
 /// Flags about saved statistics.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Learning")]
-pub struct CacheFlags {
+pub(crate) struct CacheFlags {
     /// Begin with statistics that a render of this scene with the same objective has saved
     #[arg(long, value_name = "FILE")]
     cache_in: Option<PathBuf>,
     /// Save the statistics of the scene in the end
     #[arg(long, value_name = "FILE")]
-    pub cache_out: Option<PathBuf>,
+    pub(crate) cache_out: Option<PathBuf>,
 }
 
 impl CacheFlags {
     /// Puts them into `options`, and reads the saved statistics.
-    pub fn apply(&self, options: &mut RenderOptions) -> Result<(), Box<dyn Error>> {
+    pub(crate) fn apply(&self, options: &mut RenderOptions) -> Result<(), Box<dyn Error>> {
         let read = |p: &PathBuf| std::fs::read(p).map_err(|e| format!("cannot read {}: {e}", p.display()));
         options.cache = self.cache_in.as_ref().map(read).transpose()?;
         options.save_cache = self.cache_out.is_some();
@@ -26,7 +26,7 @@ impl CacheFlags {
     }
 
     /// Text of an error that is about the saved statistics: with the name of their file, and what to do.
-    pub fn about(&self, e: &RenderError) -> Option<String> {
+    pub(crate) fn about(&self, e: &RenderError) -> Option<String> {
         let path = self.cache_in.as_ref().filter(|_| e.is_about_cache())?.display();
         let hint = if e.calls_for_cache_bytes() { "; give more --cache-bytes" } else { "" };
         Some(format!("{path}: {e}{hint}"))

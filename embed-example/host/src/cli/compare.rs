@@ -7,7 +7,7 @@ use croupier_host::image::{ImageError, Picture, Rgb};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// EXR image
     image: PathBuf,
     /// EXR reference of the same size
@@ -36,7 +36,7 @@ pub struct Args {
 const LISTED: usize = 10;
 
 /// Runs the command.
-pub fn run(args: &Args) -> Outcome {
+pub(crate) fn run(args: &Args) -> Outcome {
     let (image, image_stderr) = read(&args.image, args.stderr_image.as_deref())?;
     let (reference, mut reference_stderr) = read(&args.reference, args.stderr_reference.as_deref())?;
     if reference_stderr.is_none() {

@@ -4,21 +4,21 @@ use std::error::Error;
 use std::io::{self, Write};
 
 /// How a command ends: an error is printed as one line.
-pub type Outcome = Result<(), Box<dyn Error>>;
+pub(crate) type Outcome = Result<(), Box<dyn Error>>;
 
 /// Prints one line on stderr, whatever the text holds.
-pub fn complain(text: &str) {
+pub(crate) fn complain(text: &str) {
     let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
     let _ = writeln!(io::stderr(), "croupier: {text}");
 }
 
 /// Prints what is no error, but may not be what the user expects.
-pub fn note(text: &str) {
+pub(crate) fn note(text: &str) {
     complain(&format!("note: {text}"));
 }
 
 /// Prints a line of results. A reader that has gone away (`croupier info | head`) is no error.
-pub fn say(line: &str) -> Outcome {
+pub(crate) fn say(line: &str) -> Outcome {
     match writeln!(io::stdout(), "{line}") {
         Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(e.into()),
         _ => Ok(()),
@@ -26,6 +26,6 @@ pub fn say(line: &str) -> Outcome {
 }
 
 /// Prints results as one line of JSON; numbers that are not finite become `null`.
-pub fn say_json(value: &impl serde::Serialize) -> Outcome {
+pub(crate) fn say_json(value: &impl serde::Serialize) -> Outcome {
     say(&serde_json::to_string(value)?)
 }

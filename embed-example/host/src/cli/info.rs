@@ -10,7 +10,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Folder with scene.json, .obj file, or baked .crp file; the built-in Cornell box if absent
     scene: Option<PathBuf>,
     /// Print the facts as one line of JSON
@@ -74,7 +74,7 @@ impl Facts {
 }
 
 /// Runs the command.
-pub fn run(args: &Args) -> Outcome {
+pub(crate) fn run(args: &Args) -> Outcome {
     let path = args.scene.as_deref();
     let options = args.settings.options()?;
     // Said before the scene is loaded.

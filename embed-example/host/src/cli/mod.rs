@@ -42,7 +42,7 @@ enum Command {
 }
 
 /// The whole program.
-pub fn run() -> ExitCode {
+pub(crate) fn run() -> ExitCode {
     let cli = Cli::parse();
     let outcome = match cli.command {
         None => render::run(None, &cli.render),

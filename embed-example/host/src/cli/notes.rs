@@ -14,7 +14,7 @@ const PRINTED: usize = 20;
 
 /// One sentence each, and how many of what. Nothing is known of a baked file: it was said when the file was baked.
 #[derive(Debug, Default, Serialize)]
-pub struct Notes {
+pub(crate) struct Notes {
     notes: Vec<String>,
     /// By name; only those that are there.
     scene_counts: BTreeMap<&'static str, u32>,
@@ -22,7 +22,7 @@ pub struct Notes {
 
 impl Notes {
     /// Of a scene that was loaded and baked just now.
-    pub fn of(load: &LoadReport, bake: &BakeReport) -> Self {
+    pub(crate) fn of(load: &LoadReport, bake: &BakeReport) -> Self {
         let counts = [
             ("split_polygons", "faces of more than three corners, split into triangles", load.polygons),
             ("skipped_elements", "points and lines, left out", load.skipped_elements),
@@ -39,13 +39,13 @@ impl Notes {
     }
 
     /// Adds one, and prints it.
-    pub fn add(&mut self, path: Option<&Path>, text: String) {
+    pub(crate) fn add(&mut self, path: Option<&Path>, text: String) {
         note(&about(path)(&text));
         self.notes.push(text);
     }
 
     /// Prints them, with the scene's name in front.
-    pub fn print(&self, path: Option<&Path>) {
+    pub(crate) fn print(&self, path: Option<&Path>) {
         self.notes.iter().take(PRINTED).for_each(|text| note(&about(path)(text)));
         if let Some(more @ 1..) = self.notes.len().checked_sub(PRINTED) {
             note(&about(path)(&format!("... and {more} more notes; --json has them all")));
@@ -54,7 +54,7 @@ impl Notes {
 }
 
 /// Puts the scene's name in front of an error or a note about its content.
-pub fn about<'a>(path: Option<&'a Path>) -> impl Fn(&dyn Display) -> String + 'a {
+pub(crate) fn about<'a>(path: Option<&'a Path>) -> impl Fn(&dyn Display) -> String + 'a {
     move |e| match path {
         Some(path) => format!("{}: {e}", path.display()),
         None => format!("built-in scene: {e}"),

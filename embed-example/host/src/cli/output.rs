@@ -20,24 +20,24 @@ const FALSE_COLOR: [(&str, &str); 6] = [
 
 /// Where everything goes.
 #[derive(Debug)]
-pub struct Outputs<'a> {
+pub(crate) struct Outputs<'a> {
     /// All layers.
-    pub exr: &'a Path,
+    pub(crate) exr: &'a Path,
     /// The tone-mapped picture, beside the EXR.
-    pub png: PathBuf,
+    pub(crate) png: PathBuf,
     /// What was learned, if asked for.
-    pub cache: Option<&'a Path>,
+    pub(crate) cache: Option<&'a Path>,
     /// A picture for each of [`FALSE_COLOR`], or nothing.
-    pub false_color: Vec<PathBuf>,
+    pub(crate) false_color: Vec<PathBuf>,
 }
 
 /// What became of them.
 #[derive(Debug, Default)]
-pub struct Written {
+pub(crate) struct Written {
     /// Files that are complete, in the order in which they were written.
-    pub files: Vec<PathBuf>,
+    pub(crate) files: Vec<PathBuf>,
     /// Why the first of the others is not.
-    pub error: Option<ImageError>,
+    pub(crate) error: Option<ImageError>,
 }
 
 impl Written {
@@ -51,14 +51,14 @@ impl Written {
 
 impl<'a> Outputs<'a> {
     /// Names of all files.
-    pub fn new(exr: &'a Path, cache: Option<&'a Path>, false_color: bool) -> Self {
+    pub(crate) fn new(exr: &'a Path, cache: Option<&'a Path>, false_color: bool) -> Self {
         let drawings = FALSE_COLOR.iter().filter(|_| false_color);
         let false_color = drawings.map(|(layer, _)| exr.with_extension(format!("{layer}.png"))).collect();
         Self { exr, png: exr.with_extension("png"), cache, false_color }
     }
 
     /// Fails unless all of them can be written, none over another.
-    pub fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         let pictures = [self.exr, &self.png].into_iter().chain(self.false_color.iter().map(PathBuf::as_path));
         if let Some(cache) = self.cache.filter(|c| pictures.clone().any(|p| p == *c)) {
             return Err(format!("cannot write {}: a picture and the statistics cannot share it", cache.display()));
@@ -67,7 +67,7 @@ impl<'a> Outputs<'a> {
     }
 
     /// Writes everything: the PNG and the false colours are made from `picture`. `image` names the layer of the PNG.
-    pub fn write(&self, picture: &Picture, cache: Option<&[u8]>, image: &str, exposure: f32) -> Written {
+    pub(crate) fn write(&self, picture: &Picture, cache: Option<&[u8]>, image: &str, exposure: f32) -> Written {
         let mut written = Written::default();
         written.add(self.exr, picture.write_exr(self.exr));
         if let Some((path, bytes)) = self.cache.zip(cache) {
@@ -92,7 +92,7 @@ impl<'a> Outputs<'a> {
 }
 
 /// Fails unless a file of this name can be written: makes and removes the temporary one that comes first.
-pub fn writable(path: &Path) -> Result<(), String> {
+pub(crate) fn writable(path: &Path) -> Result<(), String> {
     let failed = |why: &dyn std::fmt::Display| format!("cannot write {}: {why}", path.display());
     if path.is_dir() {
         return Err(failed(&"it is a folder"));

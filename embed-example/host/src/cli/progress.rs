@@ -18,15 +18,15 @@ fn styled(bar: ProgressBar, template: &str) -> ProgressBar {
 
 /// Shows what baking is at and for how long it has been baking: nobody knows for how long it will. Disappears when
 /// dropped.
-pub struct Baking(ProgressBar);
+pub(crate) struct Baking(ProgressBar);
 
 impl Baking {
-    pub fn start() -> Self {
+    pub(crate) fn start() -> Self {
         Self(styled(ProgressBar::new_spinner(), "baking {spinner} {elapsed}  {msg}"))
     }
 
     /// `stage` begins or ends.
-    pub fn show(&self, stage: Stage) {
+    pub(crate) fn show(&self, stage: Stage) {
         self.0.set_message(stage.name());
     }
 }
@@ -38,7 +38,7 @@ impl Drop for Baking {
 }
 
 /// Shows the error so far and the time left, and ends the render on Ctrl-C.
-pub struct Rendering {
+pub(crate) struct Rendering {
     bar: ProgressBar,
     target: Target,
 }
@@ -47,7 +47,7 @@ pub struct Rendering {
 static STOP: AtomicBool = AtomicBool::new(false);
 
 impl Rendering {
-    pub fn start(target: Target) -> Self {
+    pub(crate) fn start(target: Target) -> Self {
         // Fails only if a handler is there already; then that one decides.
         let _ = ctrlc::set_handler(|| {
             if STOP.swap(true, Ordering::Relaxed) {

@@ -16,16 +16,16 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Folder with scene.json, .obj file, or baked .crp file; the built-in Cornell box if absent
-    pub scene: Option<PathBuf>,
+    pub(crate) scene: Option<PathBuf>,
     #[command(flatten)]
-    pub flags: Flags,
+    pub(crate) flags: Flags,
 }
 
 /// How to render and where to put it.
 #[derive(clap::Args)]
-pub struct Flags {
+pub(crate) struct Flags {
     /// Where the picture goes; a tone-mapped PNG goes beside it
     #[arg(short, long, value_name = "FILE", default_value = "croupier.exr", value_parser = exr_path)]
     output: PathBuf,
@@ -126,7 +126,7 @@ struct Report<'a> {
 }
 
 /// Runs the command.
-pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
+pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     let outputs = Outputs::new(&flags.output, flags.cache.cache_out.as_deref(), flags.false_color);
     // Said now, not after an hour of rendering.
     outputs.check()?;

@@ -13,7 +13,7 @@ use std::ops::Deref;
 use std::path::Path;
 
 /// A scene blob, in memory or on disk.
-pub enum SceneBytes {
+pub(crate) enum SceneBytes {
     /// A baked file, mapped: pages are read when they are touched.
     Mapped(Mmap),
     /// Baked just now.
@@ -33,7 +33,7 @@ impl Deref for SceneBytes {
 
 /// Opens a scene: a baked `.crp` file, anything that loads and bakes (a folder with `scene.json`, an `.obj`), or,
 /// without a path, the built-in one. What had to be assumed, ignored or left out is printed and returned.
-pub fn open(path: Option<&Path>) -> Result<(SceneBytes, Notes), Box<dyn Error>> {
+pub(crate) fn open(path: Option<&Path>) -> Result<(SceneBytes, Notes), Box<dyn Error>> {
     let (description, loaded) = match path {
         Some(path) if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")) => {
             return Ok((map(path)?, Notes::default()));

@@ -11,13 +11,13 @@ const MAX_PIXELS: u64 = 1 << 30;
 
 /// The settings that are given, with their texts.
 #[derive(Debug)]
-pub struct SettingsFlags {
+pub(crate) struct SettingsFlags {
     given: Vec<(&'static SettingInfo, String)>,
 }
 
 impl SettingsFlags {
     /// Options of the library: what is given, defaults for the rest.
-    pub fn options(&self) -> Result<RenderOptions, SettingError> {
+    pub(crate) fn options(&self) -> Result<RenderOptions, SettingError> {
         let given = |name: &str| self.given.iter().find(|(row, _)| row.name == name).map(|(_, text)| text);
         let mut options = match given("rrs") {
             Some(text) => RenderOptions::new(Strategy::parse(text).map_err(SettingError::Strategy)?),

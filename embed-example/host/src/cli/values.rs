@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 /// The name of an EXR file.
-pub fn exr_path(text: &str) -> Result<PathBuf, String> {
+pub(crate) fn exr_path(text: &str) -> Result<PathBuf, String> {
     path_ending_in("exr", text)
 }
 
 /// The name of a baked scene.
-pub fn crp_path(text: &str) -> Result<PathBuf, String> {
+pub(crate) fn crp_path(text: &str) -> Result<PathBuf, String> {
     path_ending_in("crp", text)
 }
 
@@ -22,7 +22,7 @@ fn path_ending_in(extension: &str, text: &str) -> Result<PathBuf, String> {
 }
 
 /// A finite number above 0.
-pub fn positive(text: &str) -> Result<f64, String> {
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
         Ok(_) => Err("must be above 0 and finite".into()),
@@ -31,7 +31,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
 }
 
 /// An exposure in stops.
-pub fn stops(text: &str) -> Result<f32, String> {
+pub(crate) fn stops(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(x) if x.abs() <= 100.0 => Ok(x),
         Ok(_) => Err("must be between -100 and 100".into()),
