@@ -1,9 +1,9 @@
-//! Builds the tree of a scene blob.
+//! Builder of the tree of a scene blob.
 //!
 //! `obvhs` builds a binary tree (PLOC with reinsertion, Meister & Bittner 2018); `collapse` turns it into 8-wide nodes
-//! over leaves of up to eight triangles at the lowest expected cost; what would be too deep is rebuilt by median
-//! splits. Nodes and leaves are numbered depth first, slots ascending: a parent comes before its children, and a walk
-//! mostly goes forward in memory.
+//! over leaves of up to eight triangles at the lowest expected cost; subtrees that would be too deep are rebuilt by
+//! median splits. Nodes and leaves are numbered depth first, slots ascending: a parent comes before its children, and a
+//! walk mostly goes forward in memory.
 
 mod binary;
 mod collapse;

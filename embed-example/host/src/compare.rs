@@ -1,4 +1,4 @@
-//! How far an image is from a reference: error, bias, perceived difference. Everything in f64.
+//! Comparison of an image with a reference: error, bias, perceived difference. Everything in f64.
 //!
 //! | figure | answers |
 //! |---|---|
@@ -10,12 +10,12 @@
 
 mod bias;
 mod equivalence;
-mod estimate;
+mod mean_image;
 mod metric;
 
 pub use bias::{Bias, BiasOptions, BlockZ, bias, block_scores};
 pub use equivalence::{Equivalence, equivalence, normal_cdf, normal_quantile};
-pub use estimate::{Estimate, ImageMean, Ratio, ratio, relmse_of, relmse_of_per_pixel};
+pub use mean_image::{ImageMean, MeanImage, Ratio, ratio, relmse_of, relmse_of_per_pixel};
 pub use metric::{CompareError, OUTLIERS, PixelError, RELMSE_EPSILON, mse, relmse, relmse_per_pixel, relmse_without};
 
 use crate::flip::{self, Viewing};
@@ -24,31 +24,31 @@ use crate::tonemap::{Curve, expose};
 use metric::{mean, same_size};
 use serde::Serialize;
 
-/// What is compared.
+/// Images to compare.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs<'a> {
     /// One image, or several independent ones of the same picture that differ in their seed.
     pub images: &'a [Rgb],
     /// Standard error per pixel of the image; not used when there are several.
     pub stderr: Option<&'a Rgb>,
-    /// The reference.
+    /// Reference image.
     pub reference: &'a Rgb,
     /// Standard error per pixel of the reference; without it the reference is taken as exact.
     pub reference_stderr: Option<&'a Rgb>,
 }
 
-/// How [`compare`] compares.
+/// Options of [`compare`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CompareOptions {
-    /// Leave nothing out of relMSE.
+    /// Whether relMSE keeps the pixels with the largest error.
     pub keep_outliers: bool,
     /// Stops of exposure before the tone mapping that FLIP sees.
     pub exposure: f32,
-    /// Tests for bias.
+    /// Options of the tests for bias.
     pub bias: BiasOptions,
 }
 
-/// Everything [`compare`] finds.
+/// Figures of a comparison.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
     /// Columns.
@@ -59,9 +59,9 @@ pub struct Comparison {
     pub images: usize,
     /// [`relmse`], averaged over the images.
     pub relmse: f64,
-    /// Pixels that it leaves out.
+    /// Pixels that `relmse` leaves out.
     pub relmse_discarded_pixels: usize,
-    /// What the noise of the reference adds to relMSE: mean of se² / (ref² + [`RELMSE_EPSILON`]).
+    /// Part of relMSE that is noise of the reference: mean of se² / (ref² + [`RELMSE_EPSILON`]).
     pub relmse_of_reference: Option<f64>,
     /// [`mse`], averaged over the images.
     pub mse: f64,
@@ -73,11 +73,11 @@ pub struct Comparison {
     pub image_mean: ImageMean,
     /// Mean of the reference.
     pub reference_mean: ImageMean,
-    /// Of these two.
+    /// Ratio of `image_mean` to `reference_mean`.
     pub ratio: Ratio,
-    /// Plain test; absent if the standard error of the image is unknown.
+    /// Plain test for bias; absent if the standard error of the image is unknown.
     pub bias: Option<Bias>,
-    /// Firefly-robust test; absent likewise.
+    /// Firefly-robust test for bias; absent if the standard error of the image is unknown.
     pub bias_robust: Option<Bias>,
 }
 
@@ -97,11 +97,11 @@ pub fn compare(inputs: &Inputs<'_>, options: &CompareOptions) -> Result<Comparis
         let map = flip::flip(width, height, &display(reference), &display(image), Viewing::default());
         perceived.push(mean(&map));
     }
-    let estimate = if images.len() > 1 { Estimate::from_seeds(images)? } else { Estimate::from_image(first, stderr)? };
-    let exact = Estimate::from_image(reference, reference_stderr)?;
-    let test = |robust| bias(&estimate, &exact, &BiasOptions { robust, ..options.bias });
+    let means = if images.len() > 1 { MeanImage::from_seeds(images)? } else { MeanImage::from_image(first, stderr)? };
+    let exact = MeanImage::from_image(reference, reference_stderr)?;
+    let test = |robust| bias(&means, &exact, &BiasOptions { robust, ..options.bias });
     let known = images.len() > 1 || stderr.is_some();
-    let (mut image_mean, reference_mean) = (estimate.image_mean(), exact.image_mean());
+    let (mut image_mean, reference_mean) = (means.image_mean(), exact.image_mean());
     image_mean.stderr = image_mean.stderr.filter(|_| known);
     Ok(Comparison {
         width: reference.width,

@@ -1,4 +1,4 @@
-//! Drives the core: memory, threads, iterations and when to stop. The core has no clock; time lives here.
+//! Memory, threads, iterations and stop conditions around the core. The core has no clock: time is measured here.
 //! [`crate::render`] is the same with pictures and names.
 
 mod calibrate;
@@ -28,30 +28,30 @@ use std::time::Instant;
 /// Rays of a shard between two calls of [`Observer::progress`] and [`Observer::stop`].
 const STEP_RAYS: u64 = 1 << 16;
 
-/// How to render.
+/// Options of the driver.
 #[derive(Clone, Copy, Debug)]
 pub struct Options<'a> {
-    /// The core's settings.
+    /// Settings of the core.
     pub settings: Settings,
-    /// When to stop.
+    /// Stop condition.
     pub target: Target,
-    /// Threads; 0 takes one per core. The picture does not depend on it.
+    /// Threads; 0 is one per processor. The image does not depend on them.
     pub threads: usize,
-    /// Pixels that strategies which learn take for the true ones, instead of the denoised picture: efficiency, not the
-    /// expectation, hangs on them.
-    pub estimate: Option<&'a [[f32; 3]]>,
-    /// A saved cache to begin with. Needs a strategy that learns from the scene.
+    /// Pixel estimate that strategies which learn use instead of the denoised picture, rgb, row by row: efficiency
+    /// depends on it, the expectation does not.
+    pub pixel_estimate: Option<&'a [[f32; 3]]>,
+    /// Saved cache to begin with. Needs a strategy that learns from the scene.
     pub cache: Option<&'a [u8]>,
-    /// Return the cache of the scene's statistics as bytes. Needs such a strategy too.
+    /// Return of the cache in the end. Needs a strategy that learns from the scene.
     pub save_cache: bool,
-    /// Measure in the end what looking up statistics and entering samples take.
+    /// Measurement, in the end, of look-ups and of recording samples.
     pub calibrate: bool,
 }
 
 impl Options<'_> {
-    /// One thread per core, the built-in estimate, an empty cache that is not saved.
+    /// Defaults: one thread per processor, the built-in pixel estimate, an empty cache that is not saved.
     pub fn new(settings: Settings, target: Target) -> Self {
-        Self { settings, target, threads: 0, estimate: None, cache: None, save_cache: false, calibrate: false }
+        Self { settings, target, threads: 0, pixel_estimate: None, cache: None, save_cache: false, calibrate: false }
     }
 }
 
@@ -87,7 +87,7 @@ pub fn drive_with<P: Profile + Send + Sync>(
     for (i, b) in blocks.iter_mut().enumerate() {
         shards.push(Shard::new(&plan, i as u32, b.as_mut())?);
     }
-    if let Some(rgb) = options.estimate {
+    if let Some(rgb) = options.pixel_estimate {
         session.give_estimate(rgb)?;
     }
     if let Some((bytes, cache)) = options.cache.zip(session.cache_mut()) {
@@ -107,7 +107,7 @@ pub fn drive_with<P: Profile + Send + Sync>(
         if samples == 0 {
             break;
         }
-        // the shards of a small picture finish in a single step, and do not ask
+        // shards of a small picture finish in a single step and never ask the observer
         if all.samples > 0 && observer.stop() {
             stopped_early = true;
             break;

@@ -1,4 +1,4 @@
-//! Rendering a scene blob to a picture: what the program asks for and gets.
+//! From a scene blob to a picture with named layers and figures.
 
 pub use crate::drive::{DriveError as RenderError, Observer, Progress, Target};
 
@@ -21,17 +21,17 @@ use std::fmt;
 pub struct RenderOptions {
     /// Settings of the core. What they leave open is the scene's own ([`Settings::with_scene`]).
     pub settings: Settings,
-    /// When to stop.
+    /// Stop condition.
     pub target: Target,
-    /// Threads; 0 is one per processor. Does not change the image.
+    /// Threads; 0 is one per processor. The image does not depend on them.
     pub threads: usize,
-    /// A saved cache to begin with. Needs a strategy that learns from the scene.
+    /// Saved cache to begin with. Needs a strategy that learns from the scene.
     pub cache: Option<Vec<u8>>,
-    /// Return the cache in the end. Needs such a strategy too.
+    /// Return of the cache in the end. Needs a strategy that learns from the scene.
     pub save_cache: bool,
-    /// Add the layer `denoised`.
+    /// Layer `denoised` besides the others.
     pub denoise: bool,
-    /// Measure what looking up and entering samples take, for [`Statistics::time`].
+    /// Measurement of look-ups and of recording samples, for [`Statistics::time`].
     pub calibrate: bool,
 }
 
@@ -74,7 +74,7 @@ impl Default for RenderOptions {
     }
 }
 
-/// Figures of a finished render.
+/// Figures of a finished render: work, speed, error.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RenderStats {
     /// Mean samples per pixel.
@@ -83,17 +83,20 @@ pub struct RenderStats {
     pub rays: u64,
     /// Wall-clock seconds of rendering.
     pub seconds: f64,
-    /// 1e-6 rays / second.
+    /// Rays of all kinds per second, in millions.
     pub mrays_per_s: f64,
     /// Estimated relMSE of the whole image; `None` below two samples per pixel.
     pub relmse_estimate: Option<f64>,
-    /// Its 95 % interval. See [`croupier::ErrorEstimate`] for what both mean with roulette and splitting.
+    /// 95 % confidence interval of the estimated relMSE. [`croupier::ErrorEstimate`] says what both mean with roulette
+    /// and splitting.
     pub relmse_interval: Option<[f64; 2]>,
-    /// Part of the eight lanes that did work, by stage.
+    /// Share of the eight lanes that did work, 0 to 1, by stage.
     pub lane_utilisation: BTreeMap<&'static str, f64>,
-    /// Events that cost quality or were mended (full rings, bad samples, ...), by name.
+    /// Counts of work and of limits that were met (full rings, contributions that are not finite, ...), by their names
+    /// in [`croupier::Counters`].
     pub counters: BTreeMap<&'static str, u64>,
-    /// Column and row of the pixel in which the first contribution was not finite, if one was. They were left out.
+    /// Column and row of the pixel with the first contribution that was not finite, if there was one. Such contributions
+    /// are left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_non_finite: Option<[u32; 2]>,
 }
@@ -101,21 +104,21 @@ pub struct RenderStats {
 /// A rendered picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderResult {
-    /// All layers.
+    /// Picture with all layers.
     pub picture: Picture,
-    /// Figures.
+    /// Figures of work, speed and error.
     pub stats: RenderStats,
-    /// More of them: paths, iterations, time.
+    /// Figures of paths, iterations and time.
     pub statistics: Statistics,
-    /// The memory it took.
+    /// Memory of the render.
     pub plan: PlanSummary,
-    /// The saved cache, if asked for.
+    /// Saved cache, if asked for.
     pub cache: Option<Vec<u8>>,
-    /// The observer ended it before its target.
+    /// Whether the observer ended the render before its target.
     pub stopped_early: bool,
 }
 
-/// What a render of a scene takes.
+/// Memory that a render of a scene takes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlanSummary {
     /// Name of the kernel profile that holds the scene's effects.
@@ -126,7 +129,7 @@ pub struct PlanSummary {
     pub shard_bytes: u64,
     /// Number of shards.
     pub shards: u32,
-    /// Those of all these bytes that would not be needed if nothing were learned.
+    /// Bytes among all these that learning needs.
     pub learning_bytes: u64,
 }
 
@@ -134,7 +137,7 @@ impl PlanSummary {
     fn new(scene: &Scene<'_>, settings: &Settings) -> Result<Self, SettingsError> {
         let plan = Plan::new(settings)?;
         let bytes = |p: &Plan| p.session().size as u64 + p.shard().size as u64 * u64::from(settings.shards);
-        let taught_nothing = Settings {
+        let without_learning = Settings {
             strategy: Strategy::None(rrs::None),
             adaptive: false,
             shadow_roulette: false,
@@ -146,23 +149,26 @@ impl PlanSummary {
             shared_bytes: plan.session().size as u64,
             shard_bytes: plan.shard().size as u64,
             shards: settings.shards,
-            learning_bytes: bytes(&plan).saturating_sub(bytes(&Plan::new(&taught_nothing)?)),
+            learning_bytes: bytes(&plan).saturating_sub(bytes(&Plan::new(&without_learning)?)),
         })
     }
 }
 
-/// The memory, for people.
+/// The memory in words.
 impl fmt::Display for PlanSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { shared_bytes, shards, shard_bytes, learning_bytes, .. } = self;
         write!(
             f,
-            "{shared_bytes} bytes shared + {shards} shards of {shard_bytes} bytes, {learning_bytes} bytes of it to learn"
+            "{shared_bytes} bytes shared + {shards} shards of {shard_bytes} bytes, of which {learning_bytes} bytes for learning"
         )
     }
 }
 
-/// Fails if the options make no sense whatever the scene: known before one is loaded.
+/// Checks what can be checked before a scene is loaded.
+///
+/// # Errors
+/// Options that no scene can be rendered with.
 pub fn check(options: &RenderOptions) -> Result<(), RenderError> {
     let mut settings = options.settings;
     // the least that a scene could choose
@@ -211,14 +217,14 @@ pub fn render_scene(
     })
 }
 
-/// What [`render_scene`] would take, without rendering.
+/// Memory that [`render_scene`] would take.
 pub fn plan(scene: &Scene<'_>, options: &RenderOptions) -> Result<PlanSummary, RenderError> {
     Ok(PlanSummary::new(scene, &options.settings.with_scene(scene))?)
 }
 
 const RGB: [&str; 3] = ["R", "G", "B"];
 
-/// The built-in denoiser's guess at the picture, by the final film and what the first hits look like.
+/// Picture denoised by the built-in denoiser, with albedo and normals of the first hits.
 fn denoised(r: &Rendered) -> Vec<[f32; 3]> {
     let features = !r.aovs.is_empty();
     let mut memory = vec![0.0; Planes::len(r.size, features)];
@@ -232,7 +238,7 @@ fn denoised(r: &Rendered) -> Vec<[f32; 3]> {
     done.expect("memory of the sizes asked for")
 }
 
-/// All layers that the film holds.
+/// Picture with all layers that the film holds.
 fn picture(r: &Rendered) -> Picture {
     let mut picture = Picture::new(r.size[0] as usize, r.size[1] as usize);
     picture.add3("", RGB, &r.image());
@@ -312,9 +318,9 @@ mod tests {
         assert_eq!(found, [None, Some([0, 0]), Some([4, 0]), Some([0, 1]), Some([4, 2])]);
     }
 
-    /// Killed by: a pixel that the core found and nobody is told of.
+    /// Killed by: a pixel that the core finds and the figures leave out.
     #[test]
-    fn the_first_pixel_that_is_not_finite_is_told() {
+    fn the_first_pixel_that_is_not_finite_is_reported() {
         let scene = crate::bake::bake(&crate::builtin::cornell_box(), &Default::default(), |_, _| ()).unwrap();
         let scene = Scene::from_bytes(&scene.bytes).unwrap();
         let settings = Settings { size: [5, 3], ..Settings::for_scene(&scene) };

@@ -7,7 +7,7 @@ use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
-/// How hard to try.
+/// Effort of building a tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Effort {
     /// Previews: fewest passes.
@@ -19,7 +19,7 @@ pub enum Effort {
     Slow,
 }
 
-/// A box.
+/// Axis-aligned box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bounds {
     pub(super) min: [f32; 3],
@@ -27,7 +27,7 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// Holds nothing.
+    /// Empty box.
     pub(super) const EMPTY: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
 
     /// The box of a triangle; exact.

@@ -27,7 +27,7 @@ pub struct Tree {
     pub depth: u32,
 }
 
-/// What the dynamic programme decided for one binary node.
+/// Decision of the dynamic programme for one binary node.
 #[derive(Clone, Copy)]
 struct Plan {
     /// Least cost as at most j + 1 siblings.
@@ -118,7 +118,7 @@ fn wide_children(tree: &[Binary], plans: &[Plan], i: usize, out: &mut Vec<usize>
     }
 }
 
-/// What becomes of a subtree.
+/// Source of a wide node's children.
 enum Source {
     /// As planned.
     Binary(usize),

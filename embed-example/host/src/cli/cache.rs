@@ -4,20 +4,20 @@ use croupier_host::render::{RenderError, RenderOptions};
 use std::error::Error;
 use std::path::PathBuf;
 
-/// Flags about saved statistics.
+/// Flags of saved statistics.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Learning")]
 pub(crate) struct CacheFlags {
     /// Begin with statistics that a render of this scene with the same objective has saved
     #[arg(long, value_name = "FILE")]
     cache_in: Option<PathBuf>,
-    /// Save the statistics of the scene in the end
+    /// Save the statistics of the scene when the render has ended
     #[arg(long, value_name = "FILE")]
     pub(crate) cache_out: Option<PathBuf>,
 }
 
 impl CacheFlags {
-    /// Puts them into `options`, and reads the saved statistics.
+    /// Puts the flags into `options`, and reads the saved statistics.
     pub(crate) fn apply(&self, options: &mut RenderOptions) -> Result<(), Box<dyn Error>> {
         let read = |p: &PathBuf| std::fs::read(p).map_err(|e| format!("cannot read {}: {e}", p.display()));
         options.cache = self.cache_in.as_ref().map(read).transpose()?;

@@ -1,9 +1,9 @@
-//! What commands print, and how they end.
+//! Output of commands, and how they end.
 
 use std::error::Error;
 use std::io::{self, Write};
 
-/// How a command ends: an error is printed as one line.
+/// Result of a command; an error is printed as one line.
 pub(crate) type Outcome = Result<(), Box<dyn Error>>;
 
 /// Prints one line on stderr, whatever the text holds.
@@ -12,7 +12,7 @@ pub(crate) fn complain(text: &str) {
     let _ = writeln!(io::stderr(), "croupier: {text}");
 }
 
-/// Prints what is no error, but may not be what the user expects.
+/// Prints a note: no error, but perhaps not what the user expects.
 pub(crate) fn note(text: &str) {
     complain(&format!("note: {text}"));
 }

@@ -36,11 +36,11 @@ struct Facts {
     lights: usize,
     bounds: [[f32; 3]; 2],
     size: [u32; 2],
-    /// The scene's own number, and the most segments that a path gets.
+    /// Path segments that the scene asks for, and the most that a path gets.
     max_depth: u32,
     longest_path: u32,
     effects: Vec<&'static str>,
-    /// Absent in builds that cannot render.
+    /// Memory of a render; absent in builds that cannot render.
     plan: Option<PlanSummary>,
     #[serde(flatten)]
     notes: Notes,

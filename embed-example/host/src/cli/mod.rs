@@ -33,11 +33,11 @@ struct Cli {
 enum Command {
     /// Render a scene to an EXR file with all layers and a PNG beside it
     Render(render::Args),
-    /// Bake a scene into one file that loads at once
+    /// Bake a scene into one file that is mapped instead of loaded
     Bake(bake::Args),
-    /// Say what a scene holds, calls for and takes
+    /// Print what a scene contains, the effects it needs and the memory a render takes
     Info(info::Args),
-    /// Measure how far an image is from a reference
+    /// Compare an image with a reference: error, bias, perceived difference
     Compare(compare::Args),
 }
 

@@ -1,5 +1,5 @@
-//! What loading and baking assumed, ignored or left out: printed on stderr, and part of every JSON report about a
-//! scene.
+//! Notes on what loading and baking assumed, ignored or left out: printed on stderr, and part of every JSON report
+//! about a scene.
 
 use super::console::note;
 use croupier_host::bake::BakeReport;
@@ -9,19 +9,20 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::Path;
 
-/// Notes that are printed; JSON has them all.
+/// Most notes that are printed; JSON has them all.
 const PRINTED: usize = 20;
 
-/// One sentence each, and how many of what. Nothing is known of a baked file: it was said when the file was baked.
+/// Notes of one sentence each, and counts by name. There are none about a baked file: they were printed when it was
+/// baked.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct Notes {
     notes: Vec<String>,
-    /// By name; only those that are there.
+    /// Counts above 0, by name.
     scene_counts: BTreeMap<&'static str, u32>,
 }
 
 impl Notes {
-    /// Of a scene that was loaded and baked just now.
+    /// Notes of a scene that was loaded and baked just now.
     pub(crate) fn of(load: &LoadReport, bake: &BakeReport) -> Self {
         let counts = [
             ("split_polygons", "faces of more than three corners, split into triangles", load.polygons),
@@ -38,13 +39,13 @@ impl Notes {
         all
     }
 
-    /// Adds one, and prints it.
+    /// Adds a note, and prints it.
     pub(crate) fn add(&mut self, path: Option<&Path>, text: String) {
         note(&about(path)(&text));
         self.notes.push(text);
     }
 
-    /// Prints them, with the scene's name in front.
+    /// Prints all notes, with the scene's name in front.
     pub(crate) fn print(&self, path: Option<&Path>) {
         self.notes.iter().take(PRINTED).for_each(|text| note(&about(path)(text)));
         if let Some(more @ 1..) = self.notes.len().checked_sub(PRINTED) {

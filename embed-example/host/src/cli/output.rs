@@ -1,5 +1,5 @@
-//! The files of a render: checked before it begins, and every one of them written when it has ended, whatever happens
-//! to the others. An hour of rendering must not be lost to a full disk or a mistyped name.
+//! Files of a render: checked before it begins, and every one of them written when it has ended, whatever happens to
+//! the others. An hour of rendering must not be lost to a full disk or a mistyped name.
 
 use croupier_host::false_color::{Scale, draw};
 use croupier_host::image::{ImageError, Picture, part_name, write_png, write_whole};
@@ -18,25 +18,25 @@ const FALSE_COLOR: [(&str, &str); 6] = [
     ("paths", "paths"),
 ];
 
-/// Where everything goes.
+/// Paths of all files of a render.
 #[derive(Debug)]
 pub(crate) struct Outputs<'a> {
-    /// All layers.
+    /// EXR file with all layers.
     pub(crate) exr: &'a Path,
-    /// The tone-mapped picture, beside the EXR.
+    /// Tone-mapped picture, beside the EXR.
     pub(crate) png: PathBuf,
-    /// What was learned, if asked for.
+    /// Saved cache, if asked for.
     pub(crate) cache: Option<&'a Path>,
-    /// A picture for each of [`FALSE_COLOR`], or nothing.
+    /// Pictures of the layers in [`FALSE_COLOR`], if asked for.
     pub(crate) false_color: Vec<PathBuf>,
 }
 
-/// What became of them.
+/// Files that were written, and the first error.
 #[derive(Debug, Default)]
 pub(crate) struct Written {
-    /// Files that are complete, in the order in which they were written.
+    /// Complete files, in the order in which they were written.
     pub(crate) files: Vec<PathBuf>,
-    /// Why the first of the others is not.
+    /// Error of the first file that is not complete.
     pub(crate) error: Option<ImageError>,
 }
 
@@ -57,7 +57,7 @@ impl<'a> Outputs<'a> {
         Self { exr, png: exr.with_extension("png"), cache, false_color }
     }
 
-    /// Fails unless all of them can be written, none over another.
+    /// Checks that all files can be written, none over another.
     pub(crate) fn check(&self) -> Result<(), String> {
         let pictures = [self.exr, &self.png].into_iter().chain(self.false_color.iter().map(PathBuf::as_path));
         if let Some(cache) = self.cache.filter(|c| pictures.clone().any(|p| p == *c)) {
@@ -91,7 +91,7 @@ impl<'a> Outputs<'a> {
     }
 }
 
-/// Fails unless a file of this name can be written: makes and removes the temporary one that comes first.
+/// Checks that a file of this name can be written: makes and removes the temporary file that is written first.
 pub(crate) fn writable(path: &Path) -> Result<(), String> {
     let failed = |why: &dyn std::fmt::Display| format!("cannot write {}: {why}", path.display());
     if path.is_dir() {
@@ -108,7 +108,7 @@ pub(crate) fn writable(path: &Path) -> Result<(), String> {
 mod tests {
     use super::*;
 
-    /// Folders that vanish while a render runs take nothing else with them. Killed by: giving up at the first error,
+    /// A folder that vanishes while a render runs costs no other file. Killed by: giving up at the first error,
     /// returning the last one or none, leaving out a file that could be written.
     #[test]
     fn one_error_does_not_stop_the_rest() {

@@ -23,30 +23,30 @@ pub(crate) struct Args {
     pub(crate) flags: Flags,
 }
 
-/// How to render and where to put it.
+/// Flags of a render.
 #[derive(clap::Args)]
 pub(crate) struct Flags {
-    /// Where the picture goes; a tone-mapped PNG goes beside it
+    /// EXR file of the picture; a tone-mapped PNG is written beside it
     #[arg(short, long, value_name = "FILE", default_value = "croupier.exr", value_parser = exr_path)]
     output: PathBuf,
     #[command(flatten)]
     settings: SettingsFlags,
     #[command(flatten)]
     until: Until,
-    /// Threads, 0 for one per processor; the image does not depend on them
+    /// Threads, 0 for one per processor; the image does not depend on their number
     #[arg(long, value_name = "N", default_value_t = RenderOptions::default().threads)]
     threads: usize,
-    /// Stops of exposure for the PNG; 0 if absent, 1 for the built-in scene
+    /// Exposure of the PNG in stops, -100 to 100; 0 if absent, 1 for the built-in scene
     #[arg(long, value_name = "STOPS", value_parser = stops, allow_negative_numbers = true)]
     exposure: Option<f32>,
-    /// Add the denoised picture as layer `denoised`, and make the PNG from it
+    /// Add the denoised picture as layer `denoised`, and tone-map it for the PNG
     #[arg(long)]
     denoise: bool,
-    /// Also write roulette factors, costs and paths as pictures with legends: NAME.factor1.png to NAME.factor4.png,
-    /// NAME.cost.png, NAME.paths.png
+    /// Also write roulette factors, rays per sample and paths per sample as false-colour pictures with legends:
+    /// NAME.factor1.png to NAME.factor4.png, NAME.cost.png, NAME.paths.png
     #[arg(long)]
     false_color: bool,
-    /// Print what paths, iterations and learning took
+    /// Print statistics of paths, iterations and time
     #[arg(long)]
     stats: bool,
     /// Print the figures as one line of JSON
@@ -57,21 +57,24 @@ pub(crate) struct Flags {
     cache: CacheFlags,
 }
 
-/// When to stop; 64 samples per pixel if nothing is given.
+/// Stop condition; 64 samples per pixel if none is given.
 #[derive(clap::Args)]
 #[group(multiple = false)]
 struct Until {
-    /// Stop after this many samples per pixel
+    /// Stop after this many samples per pixel, at least 1 [default: 64]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
-    /// Stop after this time, loading and writing not counted: no iteration begins that would pass it at the speed so
-    /// far, one that has begun is finished, and the first, a sample per pixel, is rendered in any case
+    /// Stop after this many seconds of rendering, above 0, without loading and writing: no iteration begins that would
+    /// pass them at the speed so far, one that has begun is finished, and the first, a sample per pixel, is rendered in
+    /// any case
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     seconds: Option<f64>,
-    /// Stop after this many rays: no iteration begins that would pass them at the cost so far, but for the first
+    /// Stop after this many rays of all kinds, at least 1: no iteration but the first begins that would pass them at
+    /// the cost so far
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     rays: Option<u64>,
-    /// Stop after the iteration that brings the estimated relMSE to this, with 4 samples per pixel at least
+    /// Stop after the iteration that brings the estimated relMSE down to this, above 0, with 4 samples per pixel at
+    /// least
     #[arg(long, value_name = "E", value_parser = positive, allow_negative_numbers = true)]
     until_error: Option<f64>,
 }
@@ -85,7 +88,7 @@ impl Until {
 }
 
 impl Flags {
-    /// The same for the library.
+    /// Options for the library.
     fn options(&self) -> Result<RenderOptions, Box<dyn Error>> {
         let mut options = RenderOptions {
             target: self.until.target(),
@@ -121,7 +124,7 @@ struct Report<'a> {
     false_color: &'a [PathBuf],
     #[serde(skip_serializing_if = "Option::is_none")]
     cache_out: Option<&'a Path>,
-    /// Those of the files above that are complete.
+    /// Complete files.
     written: &'a [PathBuf],
 }
 
@@ -145,7 +148,7 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
         let count = stats.counters.get("non_finite").unwrap_or(&1);
         notes.add(path, format!("{count} contributions were not finite and left out, the first in pixel ({x}, {y})"));
     }
-    // Its lamp lights the walls to about a fifth of white.
+    // Its area light brings the walls to about a fifth of white.
     let exposure = flags.exposure.unwrap_or(if path.is_none() { 1.0 } else { 0.0 });
     let image = if flags.denoise { "denoised" } else { "" };
     let written = outputs.write(picture, cache.as_deref(), image, exposure);
@@ -174,7 +177,7 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     written.error.map_or(Ok(()), |e| Err(e.into()))
 }
 
-/// What to say if paths end before the scene wants them to, and nobody asked for it.
+/// Note that paths end earlier than the scene asks for, if no flag asked for it.
 fn shortened(scene: &Scene<'_>, given: u32) -> Option<String> {
     let wanted = scene.info.max_depth;
     let text = || format!("paths end after {MAX_PATH_LENGTH} segments, the scene asks for {wanted}");

@@ -1,4 +1,4 @@
-//! From a path to scene bytes.
+//! Scene bytes of a path.
 
 use super::notes::{Notes, about};
 use super::progress;
@@ -14,9 +14,9 @@ use std::path::Path;
 
 /// A scene blob, in memory or on disk.
 pub(crate) enum SceneBytes {
-    /// A baked file, mapped: pages are read when they are touched.
+    /// Mapped baked file: pages are read when they are touched.
     Mapped(Mmap),
-    /// Baked just now.
+    /// Scene that was baked just now.
     Baked(bake::Baked),
 }
 

@@ -9,14 +9,14 @@ use std::fmt::Write;
 /// Most pixels of a picture that the program renders and writes.
 const MAX_PIXELS: u64 = 1 << 30;
 
-/// The settings that are given, with their texts.
+/// Settings given on the command line, with their texts.
 #[derive(Debug)]
 pub(crate) struct SettingsFlags {
     given: Vec<(&'static SettingInfo, String)>,
 }
 
 impl SettingsFlags {
-    /// Options of the library: what is given, defaults for the rest.
+    /// Options for the library: given settings, and defaults for the others.
     pub(crate) fn options(&self) -> Result<RenderOptions, SettingError> {
         let given = |name: &str| self.given.iter().find(|(row, _)| row.name == name).map(|(_, text)| text);
         let mut options = match given("rrs") {
@@ -33,7 +33,7 @@ impl SettingsFlags {
     }
 }
 
-/// Values that the program accepts: those of the core, but for what would be cut or could not be written.
+/// Values that the program accepts: fewer than the core's where the core would cut a value without a word.
 fn range(row: &SettingInfo) -> SettingRange {
     match row.name {
         "max-depth" => SettingRange::Integers { min: 1, max: MAX_PATH_LENGTH.into() },
@@ -53,7 +53,7 @@ fn check(row: &'static SettingInfo, text: &str) -> Result<String, String> {
     }
 }
 
-/// The default in words.
+/// Default of a setting in words.
 fn default(row: &SettingInfo) -> String {
     let usual = RenderOptions::default().settings;
     match row.name {

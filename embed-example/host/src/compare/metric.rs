@@ -4,12 +4,12 @@ use crate::image::Rgb;
 use serde::Serialize;
 use std::{error, fmt};
 
-/// Keeps the relative error of dark pixels finite: the `1e-2` of the definition of relMSE.
+/// Term that keeps the relative error of dark pixels finite: the `1e-2` of the definition of relMSE.
 pub const RELMSE_EPSILON: f64 = 1e-2;
 /// Part of the pixels, those with the largest error, that [`relmse`] leaves out unless told to keep them.
 pub const OUTLIERS: f64 = 1e-4;
 
-/// What cannot be compared.
+/// Reason why images cannot be compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CompareError {
@@ -37,7 +37,7 @@ impl fmt::Display for CompareError {
 
 impl error::Error for CompareError {}
 
-/// A mean error over the pixels of an image.
+/// Mean error over the pixels of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PixelError {
     /// Mean over pixels and channels. Infinite if a pixel that counts is not finite.
@@ -56,7 +56,7 @@ pub fn relmse(image: &Rgb, reference: &Rgb, keep_outliers: bool) -> Result<Pixel
     relmse_without(image, reference, if keep_outliers { 0.0 } else { OUTLIERS })
 }
 
-/// [`relmse`] with another part of the pixels left out, in [0, 1): the more, the less a few fireflies count.
+/// [`relmse`] without another share of the pixels, in [0, 1): the larger it is, the less a few fireflies count.
 pub fn relmse_without(image: &Rgb, reference: &Rgb, outliers: f64) -> Result<PixelError, CompareError> {
     mean_error(image, relmse_per_pixel(image, reference)?, outliers)
 }
@@ -66,7 +66,7 @@ pub fn mse(image: &Rgb, reference: &Rgb) -> Result<PixelError, CompareError> {
     mean_error(image, per_pixel(image, reference, |x, r| (x - r) * (x - r))?, 0.0)
 }
 
-/// What every pixel adds to relMSE, mean over its channels; infinite where the image is not finite.
+/// Contribution of every pixel to relMSE, mean over its channels; infinite where the image is not finite.
 pub fn relmse_per_pixel(image: &Rgb, reference: &Rgb) -> Result<Vec<f64>, CompareError> {
     per_pixel(image, reference, |x, r| (x - r) * (x - r) / (r * r + RELMSE_EPSILON))
 }

@@ -1,10 +1,10 @@
-//! Why a render fails.
+//! Errors of a render.
 
 use croupier::learn::cache::CacheError;
 use croupier::{SceneError, SessionError, SettingsError, ShardError};
 use std::fmt;
 
-/// Why nothing could be rendered.
+/// Reason why nothing is rendered.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum DriveError {
@@ -18,21 +18,21 @@ pub enum DriveError {
     Shard(ShardError),
     /// The saved cache cannot be loaded, or the cache not be saved.
     Cache(CacheError),
-    /// A cache is to be loaded or saved with this strategy, which learns nothing of the scene.
+    /// A cache is to be loaded or saved, but this strategy learns nothing from the scene.
     NoCache(&'static str),
-    /// A block of so many bytes is not to be had.
+    /// No memory for a block of so many bytes.
     Memory(usize),
     /// The thread pool cannot start.
     Threads(rayon::ThreadPoolBuildError),
 }
 
 impl DriveError {
-    /// Is it about a saved cache?
+    /// Whether the error is about a saved cache.
     pub fn is_about_cache(&self) -> bool {
         matches!(self, Self::Cache(_))
     }
 
-    /// Would more memory for the cache have avoided it?
+    /// Whether more memory for the cache would avoid the error.
     pub fn calls_for_cache_bytes(&self) -> bool {
         matches!(self, Self::Cache(CacheError::Full { .. }))
     }
@@ -50,7 +50,7 @@ impl fmt::Display for DriveError {
             Self::NoCache(strategy) => {
                 write!(
                     f,
-                    "roulette strategy `{strategy}` learns nothing of the scene: there is no cache to load or save"
+                    "roulette strategy `{strategy}` learns nothing from the scene: there is no cache to load or save"
                 )
             }
             Self::Memory(bytes) => write!(f, "no memory for a block of {bytes} bytes"),

@@ -1,4 +1,4 @@
-//! What a render gives: sums of the pixels, and a record of every iteration.
+//! Results of a render: sums of the pixels, and a record of every iteration.
 
 use super::calibrate::Calibration;
 use super::schedule::Work;
@@ -11,7 +11,7 @@ use croupier::{Counters, ErrorEstimate};
 pub struct IterationRecord {
     /// Camera samples per pixel, rays, and seconds with all phases.
     pub work: Work,
-    /// What happened in it.
+    /// Counters of the iteration.
     pub counters: Counters,
     /// Seconds of tracing.
     pub tracing: f64,
@@ -23,9 +23,9 @@ pub struct IterationRecord {
     pub learning: f64,
     /// Error and cost of a camera sample; `None` unless something learns from the picture.
     pub picture: Option<PictureStatistics>,
-    /// Leaves of the cache after it, and splits for which there was no room until then.
+    /// Size of the cache after the iteration, if there is one.
     pub cache: Option<CacheRecord>,
-    /// Estimated error of the picture after it.
+    /// Error estimate of the picture after the iteration.
     pub error: ErrorEstimate,
 }
 
@@ -34,8 +34,8 @@ pub struct IterationRecord {
 pub struct CacheRecord {
     /// Leaves in use.
     pub leaves: u32,
-    /// Splits for which there was no room, in all iterations so far. A leaf that remains too large counts again in
-    /// each.
+    /// Subdivisions of leaves for which there was no room, in all iterations so far. A leaf that remains too large
+    /// counts again in each.
     pub subdivisions_refused: u64,
 }
 
@@ -48,9 +48,9 @@ pub struct Rendered {
     pub pixels: Vec<PixelStats>,
     /// Auxiliary sums; empty if not asked for.
     pub aovs: Vec<PixelAov>,
-    /// What happened.
+    /// Counters of the whole render.
     pub counters: Counters,
-    /// Estimated error.
+    /// Error estimate of the picture.
     pub error: ErrorEstimate,
     /// Camera samples per pixel of the finished iterations.
     pub spp: u32,
@@ -60,15 +60,15 @@ pub struct Rendered {
     pub profile: &'static str,
     /// Bytes of the shared block and of all shards.
     pub memory: [usize; 2],
-    /// The observer asked to stop before the target.
+    /// Whether the observer ended the render before its target.
     pub stopped_early: bool,
     /// Threads that traced.
     pub threads: usize,
-    /// Every iteration, the one that was stopped too.
+    /// Records of all iterations, the one that was stopped included.
     pub iterations: Vec<IterationRecord>,
-    /// The saved cache, if asked for.
+    /// Saved cache, if asked for.
     pub cache: Option<Vec<u8>>,
-    /// What look-ups take, if asked for and anything is looked up.
+    /// Seconds of a look-up and of recording a sample, if asked for and anything is looked up.
     pub calibration: Option<Calibration>,
 }
 
@@ -78,7 +78,7 @@ impl Rendered {
         self.pixels.iter().map(|p| p.mean().map(|x| x as f32)).collect()
     }
 
-    /// Standard error of the mean.
+    /// Standard error of the mean radiance, row by row, rgb.
     pub fn stderr(&self) -> Vec<[f32; 3]> {
         self.pixels.iter().map(|p| p.variance_of_mean().map(|v| v.sqrt() as f32)).collect()
     }

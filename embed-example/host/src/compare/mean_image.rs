@@ -1,24 +1,24 @@
-//! Images of means with their variances, and what follows from both.
+//! Images of means with their variances, and figures that follow from both.
 
 use super::metric::{CompareError, RELMSE_EPSILON, mean, same_size};
 use crate::image::Rgb;
 use serde::Serialize;
 
-/// An image of means with the variance of each mean: what the tests for bias compare.
+/// Image of means with the variance of each mean: the input of the tests for bias.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Estimate {
+pub struct MeanImage {
     /// Columns.
     pub width: usize,
     /// Rows.
     pub height: usize,
     /// Mean per pixel and channel.
     pub mean: Vec<[f64; 3]>,
-    /// Variance of that mean.
+    /// Variance of the mean per pixel and channel.
     pub variance: Vec<[f64; 3]>,
 }
 
-impl Estimate {
-    /// From an image and the standard error of its pixels; without one the image is taken as exact.
+impl MeanImage {
+    /// Means from an image and the standard error of its pixels; without one the image is taken as exact.
     pub fn from_image(image: &Rgb, stderr: Option<&Rgb>) -> Result<Self, CompareError> {
         if image.pixels.is_empty() {
             return Err(CompareError::Empty);
@@ -34,17 +34,16 @@ impl Estimate {
         Ok(Self { width: image.width, height: image.height, mean, variance })
     }
 
-    /// From independent images of one picture that differ in their seed only: their mean, and its variance from their
-    /// spread. With fewer than two the variance is unknown and stays 0.
+    /// Means of independent images of one picture that differ in their seed only, and variances from their spread. With fewer than two the variance is unknown and stays 0.
     pub fn from_seeds(images: &[Rgb]) -> Result<Self, CompareError> {
         let first = images.first().ok_or(CompareError::Empty)?;
-        let mut estimate = Self::from_image(first, None)?;
-        let mut squares = estimate.variance.clone();
+        let mut means = Self::from_image(first, None)?;
+        let mut squares = means.variance.clone();
         // Welford's update: the spread may be 1e-6 of the mean.
         for (i, image) in images.iter().enumerate().skip(1) {
             same_size(first, image)?;
             let n = (i + 1) as f64;
-            for ((m, s), p) in estimate.mean.iter_mut().zip(&mut squares).zip(&image.pixels) {
+            for ((m, s), p) in means.mean.iter_mut().zip(&mut squares).zip(&image.pixels) {
                 for ((m, s), &x) in m.iter_mut().zip(s).zip(p) {
                     let d = f64::from(x) - *m;
                     *m += d / n;
@@ -54,8 +53,8 @@ impl Estimate {
         }
         let n = images.len() as f64;
         let scale = if n > 1.0 { 1.0 / (n * (n - 1.0)) } else { 0.0 };
-        estimate.variance = squares.iter().map(|s| s.map(|s| s * scale)).collect();
-        Ok(estimate)
+        means.variance = squares.iter().map(|s| s.map(|s| s * scale)).collect();
+        Ok(means)
     }
 
     /// Mean of the whole image per channel, and its standard error (pixels are taken as independent: box filter).
@@ -73,9 +72,9 @@ impl Estimate {
 /// Mean of a whole image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ImageMean {
-    /// Per channel.
+    /// Mean per channel.
     pub mean: [f64; 3],
-    /// Standard error of each, if known.
+    /// Standard error per channel, if known.
     pub stderr: Option<[f64; 3]>,
 }
 
@@ -84,7 +83,7 @@ pub struct ImageMean {
 pub struct Ratio {
     /// Sum of all pixels and channels over that of the reference.
     pub value: f64,
-    /// Its standard error to first order, if those of both are known. The three channels of a pixel see the same paths:
+    /// Standard error of the ratio to first order, if those of both means are known. The three channels of a pixel see the same paths:
     /// they are taken as wholly correlated, which can only overstate it.
     pub stderr: Option<f64>,
 }
@@ -98,14 +97,14 @@ pub fn ratio(image: &ImageMean, reference: &ImageMean) -> Ratio {
     Ratio { value, stderr }
 }
 
-/// Expected relMSE of an estimate against the truth, from its variance, over all pixels.
-pub fn relmse_of(estimate: &Estimate) -> f64 {
-    mean(&relmse_of_per_pixel(estimate))
+/// Expected relMSE of an image of means against its expectation, from its variances, over all pixels.
+pub fn relmse_of(image: &MeanImage) -> f64 {
+    mean(&relmse_of_per_pixel(image))
 }
 
-/// What the noise of every pixel adds to [`relmse_of`].
-pub fn relmse_of_per_pixel(estimate: &Estimate) -> Vec<f64> {
+/// Contribution of every pixel to [`relmse_of`].
+pub fn relmse_of_per_pixel(image: &MeanImage) -> Vec<f64> {
     let of_pixel =
         |(m, v): (&[f64; 3], &[f64; 3])| m.iter().zip(v).map(|(m, v)| v / (m * m + RELMSE_EPSILON)).sum::<f64>() / 3.0;
-    estimate.mean.iter().zip(&estimate.variance).map(of_pixel).collect()
+    image.mean.iter().zip(&image.variance).map(of_pixel).collect()
 }
