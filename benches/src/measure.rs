@@ -83,8 +83,8 @@ pub fn render(
     let size = [subject.image.width as u32, subject.image.height as u32];
     let settings = Settings { size, seed, shards: 16, aovs: true, ..Settings::for_scene(&scene) };
     let watch = Watch { subject, outliers, start: cpu_seconds(), state: Mutex::default() };
-    let estimate = variant.truth().then_some(&*subject.image.pixels);
-    let options = Options { threads: 1, estimate, ..Options::new(variant.apply(settings), target) };
+    let pixel_estimate = variant.truth().then_some(&*subject.image.pixels);
+    let options = Options { threads: 1, pixel_estimate, ..Options::new(variant.apply(settings), target) };
     drive_scene(scene, &options, &watch)?;
     let snapshots = watch.state.into_inner().unwrap_or_else(PoisonError::into_inner).snapshots;
     let snapshots = snapshots.into_iter().collect::<Result<Vec<_>, _>>()?;

@@ -61,7 +61,7 @@ impl Variant {
         if self.has("small") {
             (s.shards, s.ring) = (1, 128);
             s.learning =
-                Learning { cache_bytes: 152 << 10, ledger: 256, estimate: PixelEstimator::Blocks, ..s.learning };
+                Learning { cache_bytes: 152 << 10, ledger: 256, pixel_estimator: PixelEstimator::Blocks, ..s.learning };
         }
         s
     }

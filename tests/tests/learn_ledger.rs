@@ -21,7 +21,7 @@ fn whole_leaves(scene: &[u8], max_depth: u32) -> Settings {
     let learning = Learning {
         cache_bytes: 16_000,
         ledger: 1 << 14,
-        estimate: PixelEstimator::Blocks,
+        pixel_estimator: PixelEstimator::Blocks,
         objective: Objective::Absolute,
         samples: u32::MAX,
         ..s.learning

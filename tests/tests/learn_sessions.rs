@@ -330,7 +330,7 @@ fn everything_fits_in_little_memory() {
     let scene = blob(&cornell([32, 32]));
     let mut s = learns(&scene, "ears", 6);
     (s.adaptive, s.shadow_roulette, s.control_variate, s.ring) = (true, true, ControlVariate::Cached, 128);
-    let small = Learning { cache_bytes: 96 << 10, ledger: 256, estimate: PixelEstimator::Blocks, ..s.learning };
+    let small = Learning { cache_bytes: 96 << 10, ledger: 256, pixel_estimator: PixelEstimator::Blocks, ..s.learning };
     let s = Settings { learning: small, ..s };
     let plan = Plan::new(&s).unwrap();
     let pixels = 32 * 32;

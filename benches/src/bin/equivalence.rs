@@ -134,8 +134,12 @@ impl Trial {
             Self::Budget => s.split_budget = 4,
             Self::Small => {
                 (s.ring, s.shadow_roulette, s.control_variate) = (MIN_RING, true, ControlVariate::Cached);
-                s.learning =
-                    Learning { ledger: 4, cache_bytes: 16 << 10, estimate: PixelEstimator::Blocks, ..s.learning };
+                s.learning = Learning {
+                    ledger: 4,
+                    cache_bytes: 16 << 10,
+                    pixel_estimator: PixelEstimator::Blocks,
+                    ..s.learning
+                };
             }
         }
     }
