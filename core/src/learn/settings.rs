@@ -4,7 +4,7 @@ use super::cache::CacheSize;
 use super::estimate::PixelEstimator;
 use crate::rrs::{Learned8, MAX_FACTOR, MIN_FACTOR, Norm, Space};
 use core::fmt;
-use croupier_simd::{F32x8, Vec3x8};
+use croupier_simd::Vec3x8;
 
 /// Which error is to be small.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -53,7 +53,7 @@ impl ControlVariate {
     pub(crate) fn of(self, learned: &Learned8) -> Option<Vec3x8> {
         match self {
             Self::Off => None,
-            Self::Cached => Some(learned.mean * (learned.count / (learned.count + F32x8::splat(CONSTANT_TRUST)))),
+            Self::Cached => Some(learned.local.mean * learned.local.trust(CONSTANT_TRUST)),
             Self::Number(x) => Some(Vec3x8::splat(x, x, x)),
         }
     }
