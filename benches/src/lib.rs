@@ -1,7 +1,10 @@
-//! What the benchmarks share: scenes with their references, CPU time, watched renders, medians.
+//! What the benchmarks share: scenes with their references, CPU time, watched renders, medians, generated results.
 
 pub mod clock;
 pub mod measure;
+pub mod provenance;
+pub mod results;
+pub mod serial;
 pub mod stats;
 pub mod subject;
 pub mod variant;

@@ -6,11 +6,13 @@
 //! For flat-shaded scenes of area lights without textures, lens and environment, and the absolute objective.
 
 use crate::cache::Sums;
-use croupier::accel::{Intersector, Ray8, WideBvh, offset, shadow_ray, surface_point};
+use crate::hit::{area_pdf, area_radiance, surface_point};
+use croupier::accel::{Intersector, WideBvh};
 use croupier::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
 use croupier::cost::COST_SHADOW;
+use croupier::geometry::{Ray8, offset, shadow_ray};
 use croupier::learn::cache::{Cache, VertexKind, VertexKind8};
-use croupier::light::{LightSample8, PowerSelector, area_pdf, area_radiance, power_heuristic, sample};
+use croupier::light::{LightSample8, PowerSelector, power_heuristic, sample};
 use croupier::rng::Key8;
 use croupier::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind};
 use croupier::simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};

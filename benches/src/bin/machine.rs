@@ -6,7 +6,6 @@
 //! runs of all rows take turns, and a run's time is the CPU time of this thread where the system tells it.
 
 use clap::Parser;
-use croupier::accel::WideBvh;
 use croupier::profile::{AnyProfile, DiffuseOnly, Full, Profile};
 use croupier::{BYTES_PER_PATH, Budget, Counters, Plan, Scene, Session, Settings, Shard, StepResult, Strategy};
 use croupier_benches::clock::Clock;
@@ -102,7 +101,7 @@ impl<'a> Row<'a> {
         let (plan, scene) = (&self.plan, self.blob);
         let mut shared = AlignedBytes::zeroed(plan.session().size);
         let mut blocks: Vec<_> = (0..SHARDS).map(|_| AlignedBytes::zeroed(plan.shard().size)).collect();
-        let mut session = Session::<P, _>::new(scene, WideBvh::new(&scene), plan, shared.as_mut())?;
+        let mut session = Session::builder(scene).profile::<P>().build(plan, shared.as_mut())?;
         let shards = blocks.iter_mut().zip(0..).map(|(b, i)| Shard::new(plan, i, b.as_mut()));
         let mut shards = shards.collect::<Result<Vec<_>, _>>()?;
         let clock = Clock::start();

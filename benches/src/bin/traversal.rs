@@ -9,7 +9,8 @@
 //! its Bvh2 on closest hits. The first line of the output says which it is.
 
 use clap::Parser;
-use croupier::accel::{Hit8, Intersector, Ray8, WideBvh};
+use croupier::accel::{Intersector, WideBvh};
+use croupier::geometry::{Hit8, Ray8};
 use croupier::simd::{F32x8, Mask8, Vec3x8};
 use croupier_benches::clock::Clock;
 use croupier_host::bvh::{self, Effort};

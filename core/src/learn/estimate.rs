@@ -1,22 +1,11 @@
 //! The estimate of every pixel that errors are weighed by: a picture's relative error cannot be known without the
 //! picture.
 
-use super::settings::{Learning, Objective};
+use super::settings::{Learning, Objective, PixelEstimator};
 use crate::denoise::{self, Planes};
 use crate::film::{Film, REL_MSE_EPSILON};
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::tiles::BlockGrid;
-
-/// How the estimate of the pixels is made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PixelEstimator {
-    /// By the built-in denoiser, which looks at albedo and normals if [`crate::Settings::aovs`] has them gathered;
-    /// takes about 140 bytes a pixel, scratch included.
-    #[default]
-    Denoised,
-    /// Means over squares of 8x8 pixels: 12 bytes for 64 pixels.
-    Blocks,
-}
 
 /// Where the values are.
 #[derive(Debug)]

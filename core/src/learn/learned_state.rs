@@ -3,8 +3,9 @@
 use super::adaptive::SampleAllocation;
 use super::cache::{BINS, Cache, NO_BIN, Training, VertexKind8};
 use super::estimate::Pixels;
+use super::needs::Needs;
 use super::picture::{Picture, PictureStatistics, Visit};
-use super::settings::{Learning, Needs, Objective};
+use super::settings::{Learning, Objective};
 use crate::cost::COST_BOUNCE;
 use crate::counters::Counters;
 use crate::film::Film;
@@ -19,7 +20,7 @@ const DEPTHS: u32 = BINS as u32;
 
 /// Everything learned.
 #[derive(Debug)]
-pub(crate) struct LearnedState<'m> {
+pub struct LearnedState<'m> {
     learning: Learning,
     size: [u32; 2],
     cache: Option<Cache<'m>>,

@@ -10,11 +10,11 @@ mod adaptive;
 pub mod cache;
 mod estimate;
 mod learned_state;
+mod needs;
 mod picture;
 mod settings;
 
-pub use estimate::PixelEstimator;
-pub(crate) use learned_state::LearnedState;
+pub use learned_state::LearnedState;
+pub(crate) use needs::Needs;
 pub use picture::PictureStatistics;
-pub(crate) use settings::Needs;
-pub use settings::{ControlVariate, Learning, Objective};
+pub use settings::{ControlVariate, Learning, Objective, PixelEstimator};

@@ -118,7 +118,7 @@ impl LightSample8 {
 ///     block: &'m mut [u8],
 /// ) -> Result<Session<'s, 'm, Full, WideBvh<'s>, Uniform>, SessionError> {
 ///     let uniform = Uniform(scene.lights.len() as u32);
-///     Session::with_selector(scene, WideBvh::new(&scene), uniform, plan, block)
+///     Session::builder(scene).light_selector(uniform).build(plan, block)
 /// }
 /// ```
 pub trait LightSelector {

@@ -1,5 +1,6 @@
 //! What strategies may know from earlier iterations.
 
+use crate::names::names;
 use croupier_simd::{F32x8, LUMINANCE, Vec3x8};
 
 /// How a colour becomes a number.
@@ -38,14 +39,11 @@ impl Norm {
     }
 
     pub(super) fn parse(text: &str) -> Option<Self> {
-        match text {
-            "" | "max" => Some(Self::Max),
-            "luminance" => Some(Self::Luminance),
-            "mean" => Some(Self::Mean),
-            _ => None,
-        }
+        if text.is_empty() { Some(Self::default()) } else { Self::from_name(text) }
     }
 }
+
+names!(Norm: Mean = "mean", Luminance = "luminance", Max = "max");
 
 /// Over what local statistics are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,0 +1,265 @@
+//! Instructions per ray, counted by callgrind: a figure of speed that does not depend on the machine and its load.
+//!
+//! Every row is a small render on one thread, made by this program under valgrind. Two parts are counted, and nothing
+//! else: stepping the shards (paths, rays, learning's records), and ending iterations (merging, denoising, learning).
+//! The same build gives the same counts; another compiler may give others, and so may another C library, whose `memcpy`
+//! chooses its instructions when it runs. `--check` compares with `benches/results/instructions.md` and fails when a row
+//! has risen.
+//!
+//! Not made with gungraun (once iai-callgrind): it compares with runs that it keeps below `target/`, where this needs a
+//! committed table and figures per ray, and it needs a runner of its own version installed beside cargo.
+
+use clap::Parser;
+use croupier::{Plan, Scene, Settings};
+use croupier_benches::results::{Results, Table};
+use croupier_benches::variant::Variant;
+use croupier_benches::{provenance, serial};
+use croupier_host::bake::{BakeOptions, bake};
+use croupier_host::blob::AlignedBytes;
+use croupier_host::{builtin, load};
+use serde_json::{Value, json};
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+#[derive(Parser)]
+#[command(about = "Instructions per ray, counted by callgrind")]
+struct Args {
+    /// Folder with the scenes `cbox` and `kitchen`; what is not there is skipped.
+    #[arg(long, default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/scenes"))]
+    scenes: PathBuf,
+    /// Only rows whose `SCENE STRATEGY` contains this.
+    #[arg(long, default_value = "")]
+    only: String,
+    /// Compare with benches/results/instructions.md; exit status 1 if a row has risen by more than `--tolerance`.
+    #[arg(long)]
+    check: bool,
+    /// Per cent by which a row may rise.
+    #[arg(long, value_name = "PERCENT", default_value_t = 2.0)]
+    tolerance: f64,
+    /// Write benches/results/instructions.md.
+    #[arg(long, conflicts_with_all = ["check", "only"])]
+    write: bool,
+    /// Render this blob with `--strategy` and print its rays: what the program runs under valgrind.
+    #[arg(long, hide = true, requires = "strategy")]
+    blob: Option<PathBuf>,
+    #[arg(long, hide = true)]
+    strategy: Option<String>,
+}
+
+const NAME: &str = "instructions";
+const SCENES: [&str; 3] = ["built-in", "cbox", "kitchen"];
+/// `ears+shadow` is what the program calls `ears`.
+const STRATEGIES: [&str; 3] = ["classic", "ears", "ears+shadow"];
+/// Samples per pixel of the iterations: learned factors are in use from the second on.
+const ITERATIONS: [u32; 4] = [1, 1, 2, 4];
+/// Pixels of the pictures, about.
+const PIXELS: f64 = 9216.0;
+const SHARDS: u32 = 2;
+const COLUMNS: &str =
+    "scene, strategy, rays, instructions in step, in end_iteration, step per ray, end_iteration per ray";
+
+/// What was counted in a render.
+#[derive(Clone, Copy)]
+struct Row {
+    scene: &'static str,
+    strategy: &'static str,
+    rays: u64,
+    /// In stepping, and in ending iterations.
+    instructions: [u64; 2],
+}
+
+impl Row {
+    fn per_ray(&self) -> [f64; 2] {
+        self.instructions.map(|n| n as f64 / self.rays as f64)
+    }
+
+    fn cells(&self) -> Vec<String> {
+        let [step, end] = self.instructions;
+        let [step_per_ray, end_per_ray] = self.per_ray().map(|x| format!("{x:.2}"));
+        let counts = [self.rays, step, end].map(|n| n.to_string());
+        let names = [self.scene, self.strategy].map(String::from);
+        names.into_iter().chain(counts).chain([step_per_ray, end_per_ray]).collect()
+    }
+}
+
+/// A folder that is removed in the end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new() -> std::io::Result<Self> {
+        let path = std::env::temp_dir().join(format!("croupier-{NAME}-{}", std::process::id()));
+        std::fs::create_dir_all(&path)?;
+        Ok(Self(path))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // what is left in a temporary folder does no harm
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// The render of a row, and its rays.
+fn render(blob: &Path, strategy: &str) -> Result<Value, Box<dyn Error>> {
+    let read = std::fs::read(blob)?;
+    let mut bytes = AlignedBytes::zeroed(read.len());
+    bytes.as_mut().copy_from_slice(&read);
+    let scene = Scene::from_bytes(&bytes)?;
+    let [width, height] = scene.camera.size.map(f64::from);
+    let scale = (PIXELS / (width * height)).sqrt();
+    let size = [width, height].map(|x| (x * scale).round() as u32);
+    // features for the denoiser, as the program renders
+    let settings = Settings { size, shards: SHARDS, aovs: true, ..Settings::for_scene(&scene) };
+    let plan = Plan::new(&Variant::parse(strategy)?.apply(settings))?;
+    let (counters, _) = serial::render(scene, &plan, &ITERATIONS)?;
+    Ok(json!({ "rays": counters.rays() }))
+}
+
+/// Bakes a scene into the folder; `None` if it is not there.
+fn bake_into(folder: &Path, name: &str, scenes: &Path) -> Result<Option<PathBuf>, Box<dyn Error>> {
+    let source = scenes.join(name);
+    let description = match name {
+        "built-in" => builtin::cornell_box(),
+        _ if source.join("scene.json").exists() => load::load(&source)?.0,
+        _ => {
+            println!("skipped {name}: there is no {}", source.display());
+            return Ok(None);
+        }
+    };
+    let path = folder.join(name).with_extension("crp");
+    std::fs::write(&path, &*bake(&description, &BakeOptions::default(), |_, _| {})?.bytes)?;
+    Ok(Some(path))
+}
+
+/// Counts one row under callgrind.
+fn count(folder: &Path, blob: &Path, scene: &'static str, strategy: &'static str) -> Result<Row, Box<dyn Error>> {
+    let out = folder.join(format!("{scene}.{strategy}.out"));
+    let functions = [serial::STEP, serial::END];
+    let mut valgrind = Command::new("valgrind");
+    valgrind.args(["--tool=callgrind", "--quiet", "--compress-strings=no", "--collect-atstart=no"]);
+    valgrind.args(functions.map(|f| format!("--toggle-collect=*{f}*")));
+    valgrind.arg(format!("--callgrind-out-file={}", out.display()));
+    valgrind.arg(std::env::current_exe()?).arg("--blob").arg(blob).args(["--strategy", strategy]);
+    let output = valgrind.output().map_err(|e| {
+        format!("cannot run valgrind: {e}; Debian has it as `apt-get install valgrind`, other systems alike")
+    })?;
+    if !output.status.success() {
+        return Err(format!("{scene}, {strategy}: {}", String::from_utf8_lossy(&output.stderr)).into());
+    }
+    let rays: Value = serde_json::from_slice(&output.stdout)?;
+    let rays = rays["rays"].as_u64().filter(|&n| n > 0).ok_or("a render without rays")?;
+    let profile = std::fs::read_to_string(&out).map_err(|e| format!("{}: {e}", out.display()))?;
+    let instructions = functions.map(|f| inclusive(&profile, f));
+    let total = profile.lines().find_map(|l| l.strip_prefix("totals: ")?.trim().parse::<u64>().ok());
+    if instructions.contains(&0) || total != Some(instructions.iter().sum()) {
+        return Err(format!("callgrind counted {instructions:?} in {functions:?}, and {total:?} in all").into());
+    }
+    Ok(Row { scene, strategy, rays, instructions })
+}
+
+/// Instructions in all calls of a function, with all that it calls. A profile has three lines for the calls from one
+/// place: `cfn=` with the name, `calls=` with their number, the caller's line with the instructions.
+fn inclusive(profile: &str, function: &str) -> u64 {
+    let mut lines = profile.lines();
+    let mut sum = 0;
+    while let Some(line) = lines.next() {
+        if line.strip_prefix("cfn=").is_some_and(|name| name.contains(function)) {
+            let cost = lines.by_ref().nth(1).and_then(|l| l.split(' ').nth(1));
+            sum += cost.and_then(|c| c.parse::<u64>().ok()).unwrap_or(0);
+        }
+    }
+    sum
+}
+
+/// Prints each row beside the committed one; how many have risen.
+fn check(rows: &[Row], tolerance: f64) -> Result<usize, Box<dyn Error>> {
+    let committed = Results::read(NAME)?;
+    let table = committed.tables.first().ok_or("no table in the committed results")?;
+    let compiler = committed.header("compiler").unwrap_or("unknown");
+    if compiler != provenance::COMPILER {
+        println!("the committed counts are of {compiler}, these of {}: they may differ for that", provenance::COMPILER);
+    }
+    let column = |name: &str| table.column(name).ok_or_else(|| format!("no column '{name}' in the committed results"));
+    let columns = [column("step per ray")?, column("end_iteration per ray")?];
+    let rays = column("rays")?;
+    let mut risen = 0;
+    for row in rows {
+        let key = [row.scene, row.strategy];
+        let old = table.row(&key).ok_or_else(|| format!("{key:?}: not in the committed results"))?;
+        print!("{:<10}{:<13}", row.scene, row.strategy);
+        for ((name, new), k) in ["step", "end_iteration"].iter().zip(row.per_ray()).zip(columns) {
+            let old: f64 = old[k].parse()?;
+            // the committed figure is rounded
+            let too_much = new > old * (1.0 + tolerance / 100.0) + 0.005;
+            risen += usize::from(too_much);
+            let change = 100.0 * (new / old - 1.0);
+            print!("{name} {old:9.2} -> {new:9.2} ({change:+.2} %){}  ", if too_much { " RISEN" } else { "" });
+        }
+        println!("{}", if old[rays] == row.rays.to_string() { "" } else { "(other rays: the paths have changed)" });
+    }
+    Ok(risen)
+}
+
+fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
+    if let (Some(blob), Some(strategy)) = (&args.blob, &args.strategy) {
+        println!("{}", render(blob, strategy)?);
+        return Ok(true);
+    }
+    if args.check {
+        let committed = Results::read(NAME)?;
+        let set = provenance::instruction_set();
+        for (key, this) in [("instruction set", &*set), ("arithmetic", provenance::ARITHMETIC)] {
+            let theirs = committed.header(key).unwrap_or("unknown");
+            if theirs != this {
+                println!("skipped: the committed counts are of {key} {theirs}, this build is of {this}");
+                return Ok(true);
+            }
+        }
+    }
+    let folder = Folder::new()?;
+    let mut rows = Vec::new();
+    let mut table = Table::new("", COLUMNS);
+    for scene in SCENES {
+        let wanted = STRATEGIES.into_iter().filter(|s| format!("{scene} {s}").contains(&args.only));
+        let wanted: Vec<_> = wanted.collect();
+        let blob = if wanted.is_empty() { None } else { bake_into(&folder.0, scene, &args.scenes)? };
+        let Some(blob) = blob else { continue };
+        for strategy in wanted {
+            let row = count(&folder.0, &blob, scene, strategy)?;
+            eprintln!("{}", row.cells().join(", "));
+            table.rows.push(row.cells());
+            rows.push(row);
+        }
+    }
+    if args.check {
+        let risen = check(&rows, args.tolerance)?;
+        println!("{} rows of benches/results/{NAME}.md checked, {risen} figures above it", rows.len());
+        if risen > 0 {
+            println!("if that is meant: cargo run --release -p croupier-benches --bin {NAME} -- --write");
+        }
+        return Ok(risen == 0);
+    }
+    print!("{table}");
+    if args.write {
+        if rows.len() < SCENES.len() * STRATEGIES.len() {
+            return Err("only a run of all scenes may replace the committed results".into());
+        }
+        let mut header = provenance::of_this_run(NAME);
+        header.push(("valgrind".into(), provenance::version_of("valgrind")));
+        println!("wrote {}", Results { header, tables: vec![table] }.write(NAME)?.display());
+    }
+    Ok(true)
+}
+
+fn main() -> ExitCode {
+    match run(&Args::parse()) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(e) => {
+            eprintln!("{NAME}: {e}");
+            ExitCode::FAILURE
+        }
+    }
+}

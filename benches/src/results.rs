@@ -1,0 +1,131 @@
+//! Generated results, `benches/results/NAME.md`: one file per benchmark, written whole by one run, so that no table
+//! mixes versions. A file states its provenance, then holds tables; prose about them is in `benches/README.md`.
+//!
+//! The format is Markdown with one row per line, which reads well on a web page and in a diff; [`Results::read`] reads
+//! it back for checks.
+
+use std::error::Error;
+use std::fmt::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// A table with a title; all rows have as many cells as there are columns.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Table {
+    /// Heading; the first table of a file may have none.
+    pub title: String,
+    /// Names of the columns.
+    pub columns: Vec<String>,
+    /// Cells, row by row.
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// A table without rows; `columns` are separated by commas.
+    pub fn new(title: &str, columns: &str) -> Self {
+        let columns = columns.split(',').map(|c| c.trim().into()).collect();
+        Self { title: title.into(), columns, rows: Vec::new() }
+    }
+
+    /// Index of a column.
+    pub fn column(&self, name: &str) -> Option<usize> {
+        self.columns.iter().position(|c| c == name)
+    }
+
+    /// The first row that begins with these cells.
+    pub fn row(&self, key: &[&str]) -> Option<&[String]> {
+        self.rows.iter().find(|r| key.iter().zip(*r).all(|(k, c)| k == c)).map(|r| &**r)
+    }
+}
+
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.title.is_empty() {
+            writeln!(f, "## {}\n", self.title)?;
+        }
+        writeln!(f, "| {} |", self.columns.join(" | "))?;
+        writeln!(f, "|{}", "---|".repeat(self.columns.len()))?;
+        self.rows.iter().try_for_each(|r| writeln!(f, "| {} |", r.join(" | ")))
+    }
+}
+
+/// A file of results.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Results {
+    /// Provenance and other facts that hold for all tables: (key, value).
+    pub header: Vec<(String, String)>,
+    /// The tables.
+    pub tables: Vec<Table>,
+}
+
+impl Results {
+    /// Reads a file of results, by the name of its benchmark.
+    pub fn read(name: &str) -> Result<Self, Box<dyn Error>> {
+        let path = path(name);
+        let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        Ok(Self::parse(&text))
+    }
+
+    /// Reads the text of a file; lines that are neither header nor table are left out.
+    pub fn parse(text: &str) -> Self {
+        let mut results = Self::default();
+        let mut title = String::new();
+        // a table ends at the first line that is no row
+        let mut open = false;
+        for line in text.lines() {
+            if let Some(cells) = line.strip_prefix('|').and_then(|l| l.strip_suffix('|')) {
+                let cells: Vec<String> = cells.split('|').map(|c| c.trim().into()).collect();
+                match results.tables.last_mut() {
+                    Some(_) if cells.iter().all(|c| c == "---") => (),
+                    Some(table) if open => table.rows.push(cells),
+                    _ => {
+                        let title = std::mem::take(&mut title);
+                        results.tables.push(Table { title, columns: cells, rows: Vec::new() });
+                    }
+                }
+                open = true;
+                continue;
+            }
+            open = false;
+            if let Some(heading) = line.strip_prefix("## ") {
+                title = heading.into();
+            } else if let Some((key, value)) = line.strip_prefix("- ").and_then(|l| l.split_once(": "))
+                && results.tables.is_empty()
+            {
+                results.header.push((key.into(), value.into()));
+            }
+        }
+        results
+    }
+
+    /// Value of a line of the header.
+    pub fn header(&self, key: &str) -> Option<&str> {
+        self.header.iter().find(|(k, _)| k == key).map(|(_, v)| &**v)
+    }
+
+    /// The table with this title.
+    pub fn table(&self, title: &str) -> Option<&Table> {
+        self.tables.iter().find(|t| t.title == title)
+    }
+
+    /// The whole text of the file.
+    pub fn text(&self, name: &str) -> Result<String, fmt::Error> {
+        let mut text =
+            format!("# Results of `{name}`\n\nGenerated, do not edit; explained in [README.md](../README.md).\n\n");
+        for (key, value) in &self.header {
+            writeln!(text, "- {key}: {value}")?;
+        }
+        self.tables.iter().try_for_each(|t| write!(text, "\n{t}"))?;
+        Ok(text)
+    }
+
+    /// Writes the file; where it is.
+    pub fn write(&self, name: &str) -> Result<PathBuf, Box<dyn Error>> {
+        let path = path(name);
+        std::fs::write(&path, self.text(name)?).map_err(|e| format!("{}: {e}", path.display()))?;
+        Ok(path)
+    }
+}
+
+fn path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("results").join(name).with_extension("md")
+}
