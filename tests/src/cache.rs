@@ -3,7 +3,8 @@
 use crate::stats::SplitMix;
 use bytemuck::{Pod, Zeroable};
 use croupier::learn::Objective;
-use croupier::learn::cache::{Cache, CacheSize, Local8, Training, VertexKind, VertexKind8};
+use croupier::learn::cache::{Cache, CacheSize, Training, VertexKind, VertexKind8};
+use croupier::rrs::Local8;
 use croupier::scene::blob::content_hash;
 use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
 

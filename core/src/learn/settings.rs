@@ -4,7 +4,7 @@ use crate::names::names;
 use crate::rrs::{Learned8, MAX_FACTOR, MIN_FACTOR, Norm};
 use crate::setting::{SettingRange, SettingValue, Unreadable, Value, named_values, settings};
 use core::fmt;
-use croupier_simd::{F32x8, Vec3x8};
+use croupier_simd::Vec3x8;
 
 /// Error of the picture that learning minimises.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -67,7 +67,7 @@ impl ControlVariate {
     pub(crate) fn of(self, learned: &Learned8) -> Option<Vec3x8> {
         match self {
             Self::Off => None,
-            Self::Cached => Some(learned.mean * (learned.count / (learned.count + F32x8::splat(MEAN_TRUST)))),
+            Self::Cached => Some(learned.local.mean * learned.local.trust(MEAN_TRUST)),
             Self::Number(x) => Some(Vec3x8::splat(x, x, x)),
         }
     }
