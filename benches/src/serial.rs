@@ -4,7 +4,6 @@
 //! ([`STEP`], [`END`]).
 
 use crate::clock::Clock;
-use croupier::accel::WideBvh;
 use croupier::profile::{AnyProfile, DiffuseOnly, Full, Profile};
 use croupier::{Budget, Counters, Plan, Scene, Session, SessionError, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
@@ -15,7 +14,7 @@ pub const STEP: &str = "bench_step_shards";
 /// The function that ends an iteration: merging, denoising, learning.
 pub const END: &str = "bench_end_iteration";
 
-type Tracer<'s, 'm, P> = Session<'s, 'm, P, WideBvh<'s>>;
+type Tracer<'s, 'm, P> = Session<'s, 'm, P>;
 
 /// Renders one iteration for each number of samples per pixel; counters of the whole render, and the seconds of its
 /// iterations.
@@ -34,7 +33,7 @@ fn render_with<P: Profile>(
     let mut shared = AlignedBytes::zeroed(plan.session().size);
     let shards = plan.settings().shards;
     let mut blocks: Vec<_> = (0..shards).map(|_| AlignedBytes::zeroed(plan.shard().size)).collect();
-    let mut session = Tracer::<P>::new(scene, WideBvh::new(&scene), plan, shared.as_mut())?;
+    let mut session = Session::builder(scene).profile::<P>().build(plan, shared.as_mut())?;
     let shards = blocks.iter_mut().zip(0..).map(|(b, i)| Shard::new(plan, i, b.as_mut()));
     let mut shards = shards.collect::<Result<Vec<_>, _>>()?;
     let clock = Clock::start();

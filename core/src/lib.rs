@@ -18,14 +18,14 @@
 //! A host asks how much memory is needed, hands it over, and steps the shards from as many threads as it likes:
 //!
 //! ```
-//! use croupier::{Budget, Plan, StepResult, Scene, Session, Settings, Shard, accel::WideBvh, profile::Full};
+//! use croupier::{Budget, Plan, Scene, Session, Settings, Shard, StepResult};
 //!
 //! /// Renders 16 samples per pixel and returns the estimated relMSE.
 //! fn render(blob: &[u8], shared: &mut [u8], block: &mut [u8]) -> Result<f64, Box<dyn core::error::Error>> {
 //!     let scene = Scene::from_bytes(blob)?;
 //!     // `plan.session()` and `plan.shard()` are the sizes of the two blocks; see `BLOCK_ALIGN` for their alignment.
 //!     let plan = Plan::new(&Settings::for_scene(&scene))?;
-//!     let mut session = Session::<Full, _>::new(scene, WideBvh::new(&scene), &plan, shared)?;
+//!     let mut session = Session::new(scene, &plan, shared)?;
 //!     let mut shard = Shard::new(&plan, 0, block)?;
 //!     session.begin_iteration(16);
 //!     while shard.step(&session, Budget { rays: 10_000 }) == StepResult::More {}
@@ -51,19 +51,26 @@ pub mod cost;
 mod counters;
 pub mod denoise;
 pub mod film;
+pub mod geometry;
 pub mod learn;
 pub mod light;
 mod memory;
+mod names;
 mod plan;
 pub mod profile;
 pub mod rng;
 pub mod rrs;
+mod sampler;
 pub mod scene;
 mod session;
+mod setting;
 mod settings;
+#[cfg(test)]
+mod testing;
 pub mod texture;
 mod tiles;
 mod tracer;
+mod world;
 
 pub use counters::{Counters, Utilisation};
 pub use croupier_simd as simd;
@@ -72,6 +79,8 @@ pub use memory::{BLOCK_ALIGN, Layout, MemoryError};
 pub use plan::Plan;
 pub use rrs::Strategy;
 pub use scene::{Effects, Scene, SceneError};
-pub use session::{Iteration, Phase, Session, SessionError};
+pub use session::{Phase, Session, SessionBuilder, SessionError};
+pub use setting::{SettingError, SettingInfo, SettingRange, SettingValue};
 pub use settings::{MAX_PATH_LENGTH, MIN_RING, Settings, SettingsError};
 pub use tracer::{BYTES_PER_PATH, Budget, Shard, ShardError, StepResult};
+pub use world::{Iteration, World};

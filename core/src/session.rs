@@ -1,6 +1,6 @@
 //! What all shards share: frozen while they work, changed between iterations.
 
-use crate::accel::Intersector;
+use crate::accel::{Intersector, WideBvh};
 use crate::counters::Counters;
 use crate::film::{Film, PixelSums};
 use crate::learn::cache::Cache;
@@ -8,10 +8,12 @@ use crate::learn::{LearnedState, PictureStatistics};
 use crate::light::{LightSelector, PowerSelector};
 use crate::memory::{Carver, MemoryError};
 use crate::plan::Plan;
-use crate::profile::Profile;
+use crate::profile::{Full, Profile};
 use crate::scene::{Effects, Scene};
 use crate::settings::MAX_PATH_LENGTH;
 use crate::tracer::Shard;
+use crate::world::sealed::Sealed;
+use crate::world::{Iteration, World};
 use core::fmt;
 use core::marker::PhantomData;
 
@@ -74,17 +76,6 @@ impl fmt::Display for SessionError {
 
 impl core::error::Error for SessionError {}
 
-/// One round of camera samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Iteration {
-    /// 1 for the first; 0 before it.
-    pub number: u64,
-    /// Camera samples per pixel before it.
-    pub first_sample: u32,
-    /// Camera samples per pixel in it.
-    pub samples: u32,
-}
-
 /// What the end of an iteration consists of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
@@ -96,9 +87,10 @@ pub enum Phase {
     Learned,
 }
 
-/// The shared side of a render: scene, intersector, light choice and film.
+/// The shared side of a render: scene, kernels, learned state and film. Frozen while shards step, changed between
+/// iterations.
 #[derive(Debug)]
-pub struct Session<'s, 'm, P: Profile, I: Intersector, L: LightSelector = PowerSelector<'s>> {
+pub struct Session<'s, 'm, P: Profile = Full, I: Intersector = WideBvh<'s>, L: LightSelector = PowerSelector<'s>> {
     scene: Scene<'s>,
     plan: Plan,
     intersector: I,
@@ -112,29 +104,47 @@ pub struct Session<'s, 'm, P: Profile, I: Intersector, L: LightSelector = PowerS
     profile: PhantomData<P>,
 }
 
-impl<'s, 'm, P: Profile, I: Intersector> Session<'s, 'm, P, I> {
-    /// Carves the shared block of at least `plan.session()`. Lights are chosen by power.
-    pub fn new(scene: Scene<'s>, intersector: I, plan: &Plan, block: &'m mut [u8]) -> Result<Self, SessionError> {
-        Self::with_selector(scene, intersector, PowerSelector(scene), plan, block)
-    }
+/// The replaceable parts of a session; see [`Session::builder`].
+#[derive(Clone, Copy, Debug)]
+pub struct SessionBuilder<'s, P: Profile = Full, I: Intersector = WideBvh<'s>, L: LightSelector = PowerSelector<'s>> {
+    scene: Scene<'s>,
+    intersector: I,
+    selector: L,
+    profile: PhantomData<P>,
 }
 
-impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I, L> {
-    /// [`Session::new`] with another choice of lights.
-    pub fn with_selector(
-        scene: Scene<'s>,
-        intersector: I,
-        selector: L,
-        plan: &Plan,
-        block: &'m mut [u8],
-    ) -> Result<Self, SessionError> {
+impl<'s, P: Profile, I: Intersector, L: LightSelector> SessionBuilder<'s, P, I, L> {
+    /// Kernels of another profile: those of `Q` and no more are compiled in.
+    pub fn profile<Q: Profile>(self) -> SessionBuilder<'s, Q, I, L> {
+        let Self { scene, intersector, selector, .. } = self;
+        SessionBuilder { scene, intersector, selector, profile: PhantomData }
+    }
+
+    /// Another intersector than the scene's own tree.
+    pub fn intersector<J: Intersector>(self, intersector: J) -> SessionBuilder<'s, P, J, L> {
+        let Self { scene, selector, profile, .. } = self;
+        SessionBuilder { scene, intersector, selector, profile }
+    }
+
+    /// Another choice of lights than by power.
+    pub fn light_selector<M: LightSelector>(self, selector: M) -> SessionBuilder<'s, P, I, M> {
+        let Self { scene, intersector, profile, .. } = self;
+        SessionBuilder { scene, intersector, selector, profile }
+    }
+
+    /// Carves the shared block of at least [`Plan::session`] bytes.
+    ///
+    /// # Errors
+    /// A scene that calls for effects outside the profile, or a block that does not fit.
+    pub fn build<'m>(self, plan: &Plan, block: &'m mut [u8]) -> Result<Session<'s, 'm, P, I, L>, SessionError> {
+        let Self { scene, intersector, selector, profile } = self;
         if !P::EFFECTS.contains(scene.effects) {
             return Err(SessionError::Profile { missing: Effects(scene.effects.0 & !P::EFFECTS.0) });
         }
         let mut c = Carver::new(block, plan.session()).map_err(SessionError::Memory)?;
         let s = plan.settings();
         let pixels = s.size[0] as usize * s.size[1] as usize;
-        Ok(Self {
+        Ok(Session {
             scene,
             plan: *plan,
             intersector,
@@ -149,10 +159,67 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
             iteration: Iteration::default(),
             running: false,
             max_depth: s.max_depth.min(MAX_PATH_LENGTH),
-            profile: PhantomData,
+            profile,
         })
     }
+}
 
+impl<'s, 'm> Session<'s, 'm> {
+    /// A session with all kernels, the scene's own tree and lights chosen by power, in a shared block of at least
+    /// [`Plan::session`] bytes.
+    ///
+    /// # Errors
+    /// A block that does not fit.
+    pub fn new(scene: Scene<'s>, plan: &Plan, block: &'m mut [u8]) -> Result<Self, SessionError> {
+        Self::builder(scene).build(plan, block)
+    }
+
+    /// A session whose parts can be replaced before it is built; at first they are those of [`Session::new`].
+    pub fn builder(scene: Scene<'s>) -> SessionBuilder<'s> {
+        let (intersector, selector) = (WideBvh::new(&scene), PowerSelector(scene));
+        SessionBuilder { scene, intersector, selector, profile: PhantomData }
+    }
+}
+
+impl<P: Profile, I: Intersector, L: LightSelector> Sealed for Session<'_, '_, P, I, L> {}
+
+impl<P: Profile, I: Intersector, L: LightSelector> World for Session<'_, '_, P, I, L> {
+    const EFFECTS: Effects = P::EFFECTS;
+    type Intersector = I;
+    type Lights = L;
+
+    #[inline(always)]
+    fn scene(&self) -> &Scene<'_> {
+        &self.scene
+    }
+
+    #[inline(always)]
+    fn intersector(&self) -> &I {
+        &self.intersector
+    }
+
+    #[inline(always)]
+    fn lights(&self) -> &L {
+        &self.selector
+    }
+
+    #[inline(always)]
+    fn learned(&self) -> &LearnedState<'_> {
+        &self.learned
+    }
+
+    #[inline(always)]
+    fn iteration(&self) -> Iteration {
+        self.iteration
+    }
+
+    #[inline(always)]
+    fn max_depth(&self) -> u32 {
+        self.max_depth
+    }
+}
+
+impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I, L> {
     /// Begins a round of `samples` camera samples per pixel. Shards notice at their next step.
     pub fn begin_iteration(&mut self, samples: u32) {
         let i = self.iteration;
@@ -182,15 +249,15 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
         }
         let mut expected = 0;
         for s in shards.clone() {
-            if s.index != expected {
+            if s.index() != expected {
                 return Err(SessionError::Shards { expected });
             }
             // its sums would go to the wrong pixels
             if s.settings() != self.plan.settings() {
-                return Err(SessionError::Plan { shard: s.index });
+                return Err(SessionError::Plan { shard: s.index() });
             }
-            if !s.is_done(self.identity()) {
-                return Err(SessionError::Unfinished { shard: s.index });
+            if !s.is_done(World::identity(self)) {
+                return Err(SessionError::Unfinished { shard: s.index() });
             }
             expected += 1;
         }
@@ -214,7 +281,7 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
         passed(Phase::Merged);
         self.learned.learn_picture(&self.film, &counters, visit);
         passed(Phase::Estimated);
-        self.learned.learn_scene(shards.into_iter().filter_map(|s| s.training.as_ref()));
+        self.learned.learn_scene(shards.into_iter().filter_map(Shard::training));
         passed(Phase::Learned);
         self.running = false;
         Ok(())
@@ -260,10 +327,6 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
         Ok(())
     }
 
-    pub(crate) fn learned(&self) -> &LearnedState<'m> {
-        &self.learned
-    }
-
     /// Counts of all finished iterations.
     pub fn counters(&self) -> &Counters {
         &self.counters
@@ -277,23 +340,5 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
     /// The scene.
     pub fn scene(&self) -> &Scene<'s> {
         &self.scene
-    }
-
-    /// What tells a shard that its sums belong here.
-    pub(crate) fn identity(&self) -> (u64, Iteration) {
-        (self.scene.hash, self.iteration)
-    }
-
-    pub(crate) fn intersector(&self) -> &I {
-        &self.intersector
-    }
-
-    pub(crate) fn selector(&self) -> &L {
-        &self.selector
-    }
-
-    /// Path segments at which every path ends.
-    pub(crate) fn max_depth(&self) -> u32 {
-        self.max_depth
     }
 }

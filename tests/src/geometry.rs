@@ -1,6 +1,6 @@
 //! Meshes, random rays and an f64 brute-force oracle for traversal.
 
-use croupier::accel::Ray8;
+use croupier::geometry::Ray8;
 use croupier::scene::blob::{Camera, NONE, SceneInfo, Triangle, Vertex};
 use croupier::scene::{Effects, Records, Scene};
 use croupier::simd::{F32x8, Vec3x8};

@@ -4,6 +4,7 @@ pub mod blob;
 pub mod bsdf;
 pub mod cache;
 pub mod geometry;
+pub mod hit;
 pub mod jacobian;
 pub mod light_oracle;
 pub mod light_scene;

@@ -190,7 +190,11 @@ fn learning_with<P: Profile + Sync, I: Intersector + Sync>(
     let plan = Plan::new(settings).expect("settings that can be used");
     let mut shared = used_memory(plan.session().size);
     let mut blocks: Vec<_> = (0..settings.shards).map(|_| used_memory(plan.shard().size)).collect();
-    let mut session = Session::<P, _>::new(scene, intersector, &plan, shared.as_mut()).expect("a session");
+    let mut session = Session::builder(scene)
+        .profile::<P>()
+        .intersector(intersector)
+        .build(&plan, shared.as_mut())
+        .expect("a session");
     let shards = blocks.iter_mut().enumerate().map(|(i, b)| Shard::new(&plan, i as u32, b.as_mut()));
     let mut shards: Vec<_> = shards.collect::<Result<_, _>>().expect("shards");
     for (i, spp) in iterations.iter().enumerate() {

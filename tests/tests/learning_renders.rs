@@ -5,7 +5,7 @@ use croupier::denoise::{Planes, scratch_len};
 use croupier::learn::cache::CacheSize;
 use croupier::learn::{ControlVariate, Learning, Objective};
 use croupier::rrs::Norm;
-use croupier::{Scene, Settings};
+use croupier::{Scene, Settings, Strategy};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::builtin;
 use croupier_host::drive::{DriveError, Options, Unobserved, drive};
@@ -25,14 +25,16 @@ fn scene() -> &'static [u8] {
 }
 
 fn options(strategy: &str, spp: u32) -> RenderOptions {
-    RenderOptions {
-        strategy: strategy.into(),
-        target: Target::Spp(spp),
-        threads: 1,
-        shards: 2,
-        learning: Learning { cache_bytes: 1 << 20, subdivide_count: 1000.0, ..Learning::default() },
-        ..RenderOptions::default()
-    }
+    let o = RenderOptions::new(Strategy::parse(strategy).unwrap());
+    let learning = Learning { cache_bytes: 1 << 20, subdivide_count: 1000.0, ..o.settings.learning };
+    let settings = Settings { shards: 2, learning, ..o.settings };
+    RenderOptions { settings, target: Target::Spp(spp), threads: 1, ..o }
+}
+
+/// The options with other settings.
+fn with(mut options: RenderOptions, change: impl Fn(&mut Settings)) -> RenderOptions {
+    change(&mut options.settings);
+    options
 }
 
 /// Bytes of a cache that cannot split.
@@ -93,7 +95,7 @@ fn statistics_are_saved_and_begun_with() {
 fn wrong_statistics_are_errors() {
     let good = rendered(&RenderOptions { save_cache: true, ..options("ears", 12) }).cache.unwrap();
     let refused = |scene: &[u8], options: &RenderOptions| render(scene, options, &Stop(false)).expect_err("an error");
-    let with = |cache: &[u8]| RenderOptions { cache: Some(cache.to_vec()), ..options("ears", 2) };
+    let begun = |cache: &[u8]| RenderOptions { cache: Some(cache.to_vec()), ..options("ears", 2) };
     let mut flipped = good.clone();
     flipped[1000] ^= 1;
     for (bytes, said) in [
@@ -103,23 +105,22 @@ fn wrong_statistics_are_errors() {
         (&good[..good.len() - 1], "bytes"),
         (&flipped, "hash"),
     ] {
-        let e = refused(scene(), &with(bytes));
+        let e = refused(scene(), &begun(bytes));
         assert!(matches!(e, DriveError::Cache(_)), "{e}");
         assert!(e.to_string().contains(said), "{e} does not say {said:?}");
     }
-    let e = refused(&blob(&everything([24, 16])), &with(&good));
+    let e = refused(&blob(&everything([24, 16])), &begun(&good));
     assert!(e.to_string().starts_with("statistics of another scene"), "{e}");
-    let few = Learning { cache_bytes: smallest(), ..Learning::default() };
-    let e = refused(scene(), &RenderOptions { learning: few, ..with(&good) });
+    let e = refused(scene(), &with(begun(&good), |s| s.learning.cache_bytes = smallest()));
     assert!(e.to_string().contains("there is room for"), "{e}");
     // bolin-meyer learns, but of the picture
     for strategy in ["classic", "none", "bolin-meyer"] {
-        for o in [with(&good), RenderOptions { save_cache: true, ..options(strategy, 2) }] {
-            let e = refused(scene(), &RenderOptions { strategy: strategy.into(), ..o });
+        for o in [begun(&good), RenderOptions { save_cache: true, ..options(strategy, 2) }] {
+            let e = refused(scene(), &with(o, |s| s.strategy = Strategy::parse(strategy).unwrap()));
             assert!(matches!(e, DriveError::NoCache(_)) && e.to_string().contains(strategy), "{e}");
         }
     }
-    let e = refused(scene(), &RenderOptions { control_variate: ControlVariate::Cached, ..options("classic", 2) });
+    let e = refused(scene(), &with(options("classic", 2), |s| s.control_variate = ControlVariate::Cached));
     assert!(matches!(e, DriveError::Settings(_)) && e.to_string().contains("ears"), "{e}");
 }
 
@@ -127,16 +128,16 @@ fn wrong_statistics_are_errors() {
 #[test]
 fn every_option_changes_the_picture() {
     let base = options("ears", 6);
-    let l = base.learning;
+    let changed = |change: fn(&mut Settings)| with(base.clone(), change);
     let variants = [
         base.clone(),
-        RenderOptions { adaptive: true, ..base.clone() },
-        RenderOptions { shadow_roulette: Some(false), ..base.clone() },
-        RenderOptions { control_variate: ControlVariate::Cached, ..base.clone() },
-        RenderOptions { control_variate: ControlVariate::Number(0.25), ..base.clone() },
-        RenderOptions { learning: Learning { objective: Objective::Absolute, ..l }, ..base.clone() },
-        RenderOptions { learning: Learning { norm: Norm::Max, ..l }, ..base.clone() },
-        RenderOptions { learning: Learning { cache_bytes: smallest(), ..l }, ..base },
+        changed(|s| s.adaptive = true),
+        changed(|s| s.shadow_roulette = false),
+        changed(|s| s.control_variate = ControlVariate::Cached),
+        changed(|s| s.control_variate = ControlVariate::Number(0.25)),
+        changed(|s| s.learning.objective = Objective::Absolute),
+        changed(|s| s.learning.norm = Norm::Max),
+        changed(|s| s.learning.cache_bytes = smallest()),
     ];
     let pictures = variants.each_ref().map(|o| rendered(o).picture.rgb("").unwrap());
     for i in 0..pictures.len() {
@@ -172,7 +173,7 @@ fn denoised_pictures_are_nearer_the_truth() {
 fn the_denoiser_knows_what_the_first_hits_look_like() {
     let o = RenderOptions { denoise: true, ..options("classic", 5) };
     let base = Settings::for_scene(&Scene::from_bytes(scene()).unwrap());
-    let settings = Settings { aovs: true, shards: o.shards, ..base };
+    let settings = Settings { aovs: true, shards: o.settings.shards, ..base };
     let driven = drive(scene(), &Options { threads: 1, ..Options::new(settings, o.target) }, &Unobserved).unwrap();
     let size = driven.size;
     let mut memory = vec![0.0; Planes::len(size, true)];
@@ -192,7 +193,7 @@ fn the_denoiser_knows_what_the_first_hits_look_like() {
 #[test]
 fn figures_fit_together() {
     for (strategy, factor) in [("none", Some(1.0)), ("fixed:2", Some(2.0)), ("ears", None), ("bolin-meyer", None)] {
-        let o = RenderOptions { calibrate: true, max_depth: Some(5), ..options(strategy, 10) };
+        let o = with(RenderOptions { calibrate: true, ..options(strategy, 10) }, |s| s.max_depth = 5);
         let RenderResult { picture, stats, statistics: s, .. } = rendered(&o);
         let near = |a: f64, b: f64| assert!((a - b).abs() <= 1e-5 * b.abs(), "{strategy}: {a} {b}");
         near(s.paths.spp, 10.0);
@@ -236,7 +237,7 @@ fn figures_fit_together() {
         assert_eq!(text.contains("looking up"), strategy == "ears");
     }
     // these learn of the picture, not of the scene
-    let picture_alone = [RenderOptions { adaptive: true, ..options("classic", 3) }, options("classic:2:relative", 3)];
+    let picture_alone = [with(options("classic", 3), |s| s.adaptive = true), options("classic:2:relative", 3)];
     for o in picture_alone {
         let s = rendered(&o).statistics;
         assert!(s.iterations.iter().all(|i| i.variance > Some(0.0) && i.leaves.is_none()), "{s}");

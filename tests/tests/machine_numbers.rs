@@ -1,8 +1,9 @@
 //! Numbers that must not do harm: bad ones are counted and stay out of the film, large, small and far away scenes look
 //! like others, bounds of steps and counters hold.
 
-use croupier::accel::{Hit8, Intersector, Ray8, WideBvh};
+use croupier::accel::{Intersector, WideBvh};
 use croupier::film::{PixelAov, PixelStats};
+use croupier::geometry::{Hit8, Ray8};
 use croupier::profile::Full;
 use croupier::scene::blob::NONE;
 use croupier::simd::{F32x8, Mask8, U32x8};
@@ -311,7 +312,7 @@ fn steps_keep_to_their_budget() {
                 let mut shared = AlignedBytes::zeroed(plan.session().size);
                 let mut block = AlignedBytes::zeroed(plan.shard().size);
                 let bvh = WideBvh::new(&scene);
-                let mut session = Session::<Full, _>::new(scene, bvh, &plan, shared.as_mut()).unwrap();
+                let mut session = Session::builder(scene).intersector(bvh).build(&plan, shared.as_mut()).unwrap();
                 let mut shard = Shard::new(&plan, 0, block.as_mut()).unwrap();
                 session.begin_iteration(1);
                 assert_eq!(shard.step(&session, Budget { rays: 0 }), StepResult::More);

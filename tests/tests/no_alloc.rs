@@ -82,7 +82,8 @@ fn render<P: Profile>(bytes: &[u8], strategy: Strategy) {
     let [first, second] = &mut blocks;
     without_allocating(|| {
         let intersector = WideBvh::new(&scene);
-        let mut session = Session::<P, _>::new(scene, intersector, &plan, shared.as_mut()).unwrap();
+        let mut session =
+            Session::builder(scene).profile::<P>().intersector(intersector).build(&plan, shared.as_mut()).unwrap();
         let mut shards =
             [Shard::new(&plan, 0, first.as_mut()).unwrap(), Shard::new(&plan, 1, second.as_mut()).unwrap()];
         for samples in [1, 3] {

@@ -1,6 +1,7 @@
 //! Closest and any hit against an f64 oracle, aimed rays, and every way a ray can be odd.
 
-use croupier::accel::{Hit8, Intersector, Ray8, WideBvh};
+use croupier::accel::{Intersector, WideBvh};
+use croupier::geometry::{Hit8, Ray8};
 use croupier::scene::blob::NONE;
 use croupier::simd::{F32x8, Mask8, Vec3x8};
 use croupier_host::bvh::{Effort, build};

@@ -8,7 +8,6 @@
 
 use croupier::accel::WideBvh;
 use croupier::light::LightSelector;
-use croupier::profile::Full;
 use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier::{Budget, Plan, Scene, Session, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
@@ -173,7 +172,8 @@ fn chosen_uniformly(scene: &[u8], s: &Settings, spp: u32, stated: f32) -> Image 
     let [mut shared, mut block] = [plan.session(), plan.shard()].map(|l| AlignedBytes::zeroed(l.size));
     let uniform = Uniform { lights: scene.lights.len() as u32, stated };
     let bvh = WideBvh::new(&scene);
-    let mut session = Session::<Full, _, _>::with_selector(scene, bvh, uniform, &plan, shared.as_mut()).unwrap();
+    let mut session =
+        Session::builder(scene).intersector(bvh).light_selector(uniform).build(&plan, shared.as_mut()).unwrap();
     let mut shard = Shard::new(&plan, 0, block.as_mut()).unwrap();
     session.begin_iteration(spp);
     while shard.step(&session, Budget { rays: 1 << 20 }) == StepResult::More {}

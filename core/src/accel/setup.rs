@@ -13,7 +13,7 @@
 //! than its parent, and the interval test of a packet never rejects what one of its rays accepts: which leaves a ray
 //! visits depends on that ray alone.
 
-use super::Ray8;
+use crate::geometry::Ray8;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
 /// `[f(0), f(1), f(2)]`; `array::map` would go through memory.

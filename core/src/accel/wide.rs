@@ -3,10 +3,11 @@
 //! Rays are grouped by direction octant and major axis; groups of more than [`FEW`] walk the tree as a packet, which
 //! doubles the throughput of coherent rays; the others go one by one, which is best for incoherent ones.
 
+use super::Intersector;
 use super::packet::{FEW, walk_packet};
 use super::setup::Setup;
 use super::single::{Hits, Keys, STACK, walk};
-use super::{Hit8, Intersector, Ray8};
+use crate::geometry::{Hit8, Ray8};
 use crate::scene::Scene;
 use crate::scene::blob::{Leaf, NONE, Node};
 use croupier_simd::{F32x8, Mask8, U32x8};

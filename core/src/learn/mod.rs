@@ -7,18 +7,14 @@
 //! How it works as a whole, where it departs from the papers, and what is not done: docs/LEARNING.md.
 
 mod adaptive;
-mod bins;
 pub mod cache;
 mod estimate;
 mod learned_state;
+mod needs;
 mod picture;
-mod save;
 mod settings;
-mod training;
-mod tree;
 
-pub use estimate::PixelEstimator;
-pub(crate) use learned_state::LearnedState;
+pub use learned_state::LearnedState;
+pub(crate) use needs::Needs;
 pub use picture::PictureStatistics;
-pub(crate) use settings::Needs;
-pub use settings::{ControlVariate, Learning, Objective};
+pub use settings::{ControlVariate, Learning, Objective, PixelEstimator};

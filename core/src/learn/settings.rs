@@ -1,12 +1,12 @@
-//! What the caller chooses about learning.
+//! Settings of the strategies that learn.
 
-use super::cache::CacheSize;
-use super::estimate::PixelEstimator;
-use crate::rrs::{Learned8, MAX_FACTOR, MIN_FACTOR, Norm, Space};
+use crate::names::names;
+use crate::rrs::{Learned8, MAX_FACTOR, MIN_FACTOR, Norm};
+use crate::setting::{SettingRange, SettingValue, Unreadable, Value, named_values, settings};
 use core::fmt;
 use croupier_simd::{F32x8, Vec3x8};
 
-/// Which error is to be small.
+/// Error of the picture that learning makes small.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Objective {
@@ -17,6 +17,8 @@ pub enum Objective {
     Absolute = 2,
 }
 
+names!(Objective: Relative = "relative", Absolute = "absolute");
+
 impl Objective {
     pub(super) fn from_u32(x: u32) -> Option<Self> {
         [Self::Relative, Self::Absolute].into_iter().find(|o| *o as u32 == x)
@@ -25,12 +27,24 @@ impl Objective {
 
 impl fmt::Display for Objective {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Relative => "relative",
-            Self::Absolute => "absolute",
-        })
+        f.write_str(self.name())
     }
 }
+
+/// How the estimate of the pixels is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PixelEstimator {
+    /// By the built-in denoiser, which looks at albedo and normals if [`crate::Settings::aovs`] has them gathered;
+    /// takes about 140 bytes a pixel, scratch included.
+    #[default]
+    Denoised,
+    /// Means over squares of 8x8 pixels: 12 bytes for 64 pixels.
+    Blocks,
+}
+
+names!(PixelEstimator: Denoised = "denoised", Blocks = "blocks");
+
+named_values!(Objective, PixelEstimator);
 
 /// The known value that stands in for what roulette skips (Szecsi et al. 2003).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -59,61 +73,55 @@ impl ControlVariate {
     }
 }
 
-/// Choices of the strategies that learn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Learning {
-    /// Bytes of all statistics of the scene: the session's and those of every shard.
-    pub cache_bytes: usize,
-    /// Samples in flight per shard that can be learned from.
-    pub ledger: u32,
-    /// Camera samples of a pixel that are learned from in every iteration, the first ones. More make statistics better
-    /// and iterations slower.
-    pub samples: u32,
-    /// Samples in a leaf of the octree at which it is divided (EARS: 40,000).
-    pub subdivide_count: f32,
-    /// Part of the statistics that an iteration hands on to the next, in [0, 1].
-    pub decay: f32,
-    /// How the estimate of the pixels is made.
-    pub estimate: PixelEstimator,
-    /// Which error is to be small.
-    pub objective: Objective,
-    /// How the errors of the channels become one.
-    pub norm: Norm,
-    /// Smallest and largest learned factor, within [`MIN_FACTOR`] and [`MAX_FACTOR`].
-    pub factors: [f32; 2],
-}
+impl Value for ControlVariate {
+    const PLACEHOLDER: &'static str = "off|cached|X";
+    const RANGE: SettingRange = SettingRange::WordsOrNumber(&["off", "cached"]);
 
-impl Default for Learning {
-    fn default() -> Self {
-        Self {
-            cache_bytes: 24 << 20,
-            ledger: 2048,
-            samples: 8,
-            subdivide_count: 10_000.0,
-            decay: 0.75,
-            estimate: PixelEstimator::Denoised,
-            objective: Objective::Relative,
-            norm: Norm::Mean,
-            factors: [MIN_FACTOR, MAX_FACTOR],
+    fn parse(text: &str) -> Result<Self, Unreadable> {
+        match text {
+            "off" => Ok(Self::Off),
+            "cached" => Ok(Self::Cached),
+            _ => f32::parse(text).map(Self::Number),
+        }
+    }
+
+    fn value(self) -> SettingValue {
+        match self {
+            Self::Off => SettingValue::Word("off"),
+            Self::Cached => SettingValue::Word("cached"),
+            Self::Number(x) => SettingValue::Number(x),
         }
     }
 }
 
-/// What a render learns, and how.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Needs {
-    /// Columns and rows of the picture.
-    pub size: [u32; 2],
-    /// The film holds albedos and normals, which the denoiser looks at.
-    pub features: bool,
-    /// Over what local statistics are kept, if at all.
-    pub space: Option<Space>,
-    /// Room for local statistics, if there are any.
-    pub cache: Option<CacheSize>,
-    /// How the pixels are estimated, if anything needs that.
-    pub pixels: Option<PixelEstimator>,
-    /// Pixels get samples by their error.
-    pub adaptive: bool,
-    /// The caller's choices.
-    pub learning: Learning,
+settings! {
+    /// Settings of the strategies that learn.
+    pub struct Learning {
+        cache_bytes: usize = 24 << 20 =>
+            "cache-bytes", "Memory for statistics of the scene, the session's and those of all shards together";
+        ledger: u32 = 2048 =>
+            "ledger", "Samples in flight per shard that can be learned from, of 68 bytes each",
+            SettingRange::Integers { min: 1, max: 1 << 24 };
+        /// More make statistics better and iterations slower.
+        samples: u32 = 8 =>
+            "learn-samples", "Camera samples per pixel that are learned from in each iteration, the first ones",
+            SettingRange::Integers { min: 1, max: u32::MAX as u64 };
+        /// EARS: 40,000.
+        subdivide_count: f32 = 10_000.0 =>
+            "subdivide-count", "Samples in a leaf of the octree at which it is subdivided",
+            SettingRange::Positive;
+        decay: f32 = 0.75 =>
+            "decay", "Part of the statistics that an iteration hands on to the next",
+            SettingRange::Numbers { min: 0.0, max: 1.0 };
+        estimate: PixelEstimator = PixelEstimator::Denoised =>
+            "estimate",
+            "What errors are judged by: the denoised picture (140 bytes a pixel) or means over 8x8 pixels (12 bytes for each)";
+        objective: Objective = Objective::Relative =>
+            "objective", "Error of the picture that is to be small: relative to the pixel, or absolute";
+        norm: Norm = Norm::Mean =>
+            "norm", "How the errors of the channels become one";
+        factors: [f32; 2] = [MIN_FACTOR, MAX_FACTOR] =>
+            "factors", "Smallest and largest learned factor",
+            SettingRange::Pair { first: [MIN_FACTOR, 1.0], second: [1.0, MAX_FACTOR] };
+    }
 }

@@ -2,6 +2,7 @@
 //! guiding needs because a guided throughput says nothing about how much light is left.
 
 use super::{RrsStrategy, Vertices8};
+use core::fmt;
 use croupier_simd::F32x8;
 
 /// Mean albedo of the vertex, or the product along the path.
@@ -23,6 +24,10 @@ impl Albedo {
 
 impl RrsStrategy for Albedo {
     const NEEDS_ALBEDO: bool = true;
+
+    fn write_options(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.product { "product" } else { "" })
+    }
 
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {

@@ -6,6 +6,7 @@
 //! come back as samples so rare that a picture of 512 samples a pixel looks biased (kitchen).
 
 use super::{RrsStrategy, Space, Vertices8, ears};
+use core::fmt;
 use croupier_simd::F32x8;
 
 /// The most efficient factor for the contributions of this depth; that of `classic` where little is known.
@@ -24,6 +25,10 @@ impl BolinMeyer {
 impl RrsStrategy for BolinMeyer {
     const NEEDS_ALBEDO: bool = true;
     const SPACE: Option<Space> = Some(Space::Image);
+
+    fn write_options(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.plain { "plain" } else { "" })
+    }
 
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {

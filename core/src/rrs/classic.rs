@@ -7,6 +7,7 @@
 //! | `relative` | over the estimate of the pixel | yes or no | no |
 
 use super::{RrsStrategy, Vertices8};
+use core::fmt;
 use croupier_simd::{F32x8, U32x8};
 
 /// max rgb of (prefix weight x albedo), over the pixel if `relative`, at most 1, from bounce `start`.
@@ -38,6 +39,10 @@ impl Classic {
 impl RrsStrategy for Classic {
     const NEEDS_ALBEDO: bool = true;
     const NEEDS_IMAGE: bool = true;
+
+    fn write_options(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}{}", self.start, if self.relative { ":relative" } else { "" })
+    }
 
     fn plays_relative(&self) -> bool {
         self.relative

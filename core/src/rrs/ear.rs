@@ -1,6 +1,7 @@
 //! Efficiency-aware roulette: [`super::Ears`] without splitting.
 
 use super::{RrsStrategy, Space, Vertices8, ears};
+use core::fmt;
 use croupier_simd::F32x8;
 
 /// The most efficient factor of at most 1.
@@ -20,6 +21,10 @@ impl RrsStrategy for Ear {
     const NEEDS_ALBEDO: bool = true;
     const EFFICIENCY_AWARE: bool = true;
     const SPACE: Option<Space> = Some(Space::Scene);
+
+    fn write_options(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.plain { "plain" } else { "" })
+    }
 
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {

@@ -12,6 +12,7 @@
 //! | [`MOST_THROUGHPUT`] | throughput after roulette | 10 |
 
 use super::{Classic, Learned8, MAX_FACTOR, MIN_FACTOR, RrsStrategy, Space, Vertices8, adrrs};
+use core::fmt;
 use croupier_simd::{F32x8, I32x8, Vec3x8};
 
 /// Samples at which the mean counts half.
@@ -96,6 +97,10 @@ impl RrsStrategy for Ears {
     const NEEDS_ALBEDO: bool = true;
     const EFFICIENCY_AWARE: bool = true;
     const SPACE: Option<Space> = Some(Space::Scene);
+
+    fn write_options(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.plain { "plain" } else { "" })
+    }
 
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {

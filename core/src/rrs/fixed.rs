@@ -5,6 +5,7 @@
 //! | `factor` | samples per vertex | 0.05 to 20 | none |
 
 use super::{MAX_FACTOR, MIN_FACTOR, RrsStrategy, Vertices8};
+use core::fmt;
 use croupier_simd::F32x8;
 
 /// The factor.
@@ -22,6 +23,10 @@ impl Fixed {
 }
 
 impl RrsStrategy for Fixed {
+    fn write_options(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.factor)
+    }
+
     #[inline(always)]
     fn factor(&self, _: &Vertices8) -> F32x8 {
         F32x8::splat(self.factor)

@@ -1,6 +1,6 @@
 //! Russian roulette and splitting: how many samples a vertex gets.
 //!
-//! A strategy gives a real factor `s` per lane; [`comb`] rounds the factors of a packet to sample counts with
+//! A strategy gives a real factor `s` per lane; [`comb()`] rounds the factors of a packet to sample counts with
 //! E\[n\] = s. Every estimate is divided by `s`, never by `n`, so any positive `s` that was fixed before the samples
 //! were drawn leaves the mean alone (EARS, SIGGRAPH 2022, eq. 10). How `s` is learned: docs/LEARNING.md.
 //!
@@ -89,6 +89,11 @@ pub trait RrsStrategy {
         true
     }
 
+    /// Writes the options that follow the colon in the strategy's text: its `parse` reads them back.
+    fn write_options(&self, _: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Ok(())
+    }
+
     /// The factor per lane, before clamping to [[`MIN_FACTOR`], [`MAX_FACTOR`]]. Lanes that are not finite count as 1.
     fn factor(&self, v: &Vertices8) -> F32x8;
 }
@@ -163,6 +168,20 @@ macro_rules! strategies {
                 let finite = s.is_finite();
                 let s = finite.select(s, F32x8::ONE);
                 (if self.is_biased() { s } else { s.clamp(MIN_FACTOR, MAX_FACTOR) }, finite)
+            }
+        }
+
+        /// The text that [`Strategy::parse`] reads back, without options that are the default.
+        impl fmt::Display for Strategy {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(self.name())?;
+                match self {
+                    $(Self::$name(x) if $name::parse("") != Some(*x) => {
+                        f.write_str(":")?;
+                        x.write_options(f)
+                    })*
+                    _ => Ok(()),
+                }
             }
         }
     };

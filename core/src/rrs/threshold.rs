@@ -5,6 +5,7 @@
 //! | `eps` | throughput, largest rgb | >= 0 | 0.1 |
 
 use super::{RrsStrategy, Vertices8};
+use core::fmt;
 use croupier_simd::F32x8;
 
 /// Factor 1 while the largest rgb of the throughput exceeds `eps`, else 0.
@@ -21,6 +22,10 @@ impl Threshold {
 }
 
 impl RrsStrategy for Threshold {
+    fn write_options(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.eps)
+    }
+
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
         v.beta.max_component().gt(F32x8::splat(self.eps)).zero_unless(F32x8::ONE)

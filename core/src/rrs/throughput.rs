@@ -7,6 +7,7 @@
 //! | `start` | path segments from the camera | >= 1 | 1 |
 
 use super::{MAX_FACTOR, MIN_FACTOR, Norm, RrsStrategy, Vertices8};
+use core::fmt;
 use croupier_simd::{F32x8, U32x8};
 
 /// clamp(norm(throughput), low, high) from depth `start`, 1 before.
@@ -45,6 +46,10 @@ impl Throughput {
 }
 
 impl RrsStrategy for Throughput {
+    fn write_options(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}:{}", self.norm.name(), self.low, self.high, self.start)
+    }
+
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
         let early = v.depth.lt(U32x8::splat(self.start));

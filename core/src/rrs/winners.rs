@@ -8,6 +8,7 @@
 //! | `visible` | the same, for a diffuse surface | >= 0 | 3 |
 
 use super::{RrsStrategy, Vertices8};
+use core::fmt;
 use croupier_simd::F32x8;
 
 /// max rgb of (prefix weight x albedo) x sqrt(`reflected` + `visible` / (shininess + 1)^2).
@@ -30,6 +31,10 @@ impl Winners {
 impl RrsStrategy for Winners {
     const NEEDS_ALBEDO: bool = true;
     const NEEDS_SHININESS: bool = true;
+
+    fn write_options(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", self.reflected, self.visible)
+    }
 
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {

@@ -28,6 +28,7 @@ impl<'m> FreeList<'m> {
     }
 
     /// How many are free.
+    #[cfg(test)]
     pub(crate) fn len(&self) -> usize {
         self.len
     }

@@ -1,7 +1,7 @@
 //! What each sample gave: a fixed slab with one record per unfinished sample, nested like the samples themselves.
 //!
 //! A record belongs to one sample of a vertex (one bounce and at most one light sample) or to a camera sample. It
-//! gathers the sample's own estimate of reflected radiance, without any weight of the path before it, and its cost. The
+//! accumulates the sample's own estimate of reflected radiance, without any weight of the path before it, and its cost. The
 //! bounce ends at one vertex at most; what the samples of that vertex give comes back times `inner` (bounce weight over
 //! the vertex's factor). When the last of them is closed the sample is finished: it is logged to the bin of *its*
 //! vertex, which its parent record holds, and folded into the parent (EARS, SIGGRAPH 2022, algorithm 2, without the
@@ -11,30 +11,28 @@
 //! contain it are incomplete, so they are not logged either. Nothing else changes; the image never passes through here.
 
 use super::free_list::FreeList;
+pub(crate) use crate::learn::cache::NO_BIN;
 use crate::memory::{Carver, Measure, MemoryError};
 use bytemuck::{Pod, Zeroable};
 
 /// No record.
 pub(crate) const NO_RECORD: u32 = u32::MAX;
 
-/// The bin of vertices whose samples are not learned from.
-pub(crate) const NO_BIN: u32 = u32::MAX;
-
 /// Part of a sample's estimate is missing.
 const INCOMPLETE: u32 = 1 << 31;
 /// `last` holds a finished sample of the vertex.
 const HAS_LAST: u32 = 1 << 30;
 /// The sample draws a light sample.
-const LIT: u32 = 1 << 29;
+const WITH_NEE: u32 = 1 << 29;
 /// That in `last` drew one.
-const LAST_LIT: u32 = 1 << 28;
+const LAST_WITH_NEE: u32 = 1 << 28;
 /// Bits of `open` that count.
-const OPEN: u32 = LAST_LIT - 1;
+const OPEN: u32 = LAST_WITH_NEE - 1;
 
 /// One unfinished sample, 64 bytes.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-struct Record {
+struct LedgerRecord {
     /// Estimate so far, rgb.
     radiance: [f32; 3],
     /// Counted cost so far.
@@ -71,13 +69,13 @@ pub(crate) struct Finished {
 /// A fixed slab of records; no slot at all if nothing learns.
 #[derive(Debug)]
 pub(crate) struct Ledger<'m> {
-    records: &'m mut [Record],
+    records: &'m mut [LedgerRecord],
     free: FreeList<'m>,
 }
 
 impl<'m> Ledger<'m> {
     pub(crate) fn measure(m: Measure, capacity: usize) -> Measure {
-        FreeList::measure(m.add::<Record>(capacity), capacity)
+        FreeList::measure(m.add::<LedgerRecord>(capacity), capacity)
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, capacity: usize) -> Result<Self, MemoryError> {
@@ -94,15 +92,15 @@ impl<'m> Ledger<'m> {
         !self.records.is_empty()
     }
 
-    /// A record for a sample with one open lane, `lit` if it draws a light sample; [`NO_RECORD`] if the slab is full.
-    pub(crate) fn open(&mut self, parent: u32, lit: bool) -> u32 {
+    /// A record for a sample with one open lane, `with_nee` if it draws a light sample; [`NO_RECORD`] if the slab is full.
+    pub(crate) fn open(&mut self, parent: u32, with_nee: bool) -> u32 {
         let Some(slot) = self.free.take() else { return NO_RECORD };
-        let open = if lit { 1 | LIT } else { 1 };
-        self.records[slot as usize] = Record { parent, open, ..Zeroable::zeroed() };
+        let open = if with_nee { 1 | WITH_NEE } else { 1 };
+        self.records[slot as usize] = LedgerRecord { parent, open, ..Zeroable::zeroed() };
         slot
     }
 
-    fn get(&mut self, slot: u32) -> Option<&mut Record> {
+    fn get(&mut self, slot: u32) -> Option<&mut LedgerRecord> {
         self.records.get_mut(slot as usize)
     }
 
@@ -115,7 +113,7 @@ impl<'m> Ledger<'m> {
 
     /// Adds to a sample's estimate.
     #[inline(always)]
-    pub(crate) fn gather(&mut self, slot: u32, radiance: [f32; 3]) {
+    pub(crate) fn accumulate(&mut self, slot: u32, radiance: [f32; 3]) {
         if let Some(r) = self.get(slot) {
             for (sum, x) in r.radiance.iter_mut().zip(radiance) {
                 *sum += x;
@@ -168,8 +166,8 @@ impl<'m> Ledger<'m> {
                 p.open |= INCOMPLETE;
             } else {
                 let value: [f32; 3] = core::array::from_fn(|c| done.radiance[c] * p.scale[c]);
-                let lit = done.open & LIT != 0;
-                let alike = p.open & HAS_LAST != 0 && lit == (p.open & LAST_LIT != 0);
+                let with_nee = done.open & WITH_NEE != 0;
+                let alike = p.open & HAS_LAST != 0 && with_nee == (p.open & LAST_WITH_NEE != 0);
                 let pair = alike.then(|| {
                     core::array::from_fn(|c| {
                         let d = value[c] - p.last[c];
@@ -177,7 +175,7 @@ impl<'m> Ledger<'m> {
                     })
                 });
                 p.last = value;
-                p.open = p.open & !LAST_LIT | HAS_LAST | if lit { LAST_LIT } else { 0 };
+                p.open = p.open & !LAST_WITH_NEE | HAS_LAST | if with_nee { LAST_WITH_NEE } else { 0 };
                 for c in 0..3 {
                     p.radiance[c] += p.inner[c] * done.radiance[c];
                 }
@@ -228,7 +226,7 @@ mod tests {
         /// Children that have not ended.
         left: usize,
         recorded: bool,
-        lit: bool,
+        with_nee: bool,
     }
 
     /// A logged sample of a vertex: value, rays, half squared difference.
@@ -246,8 +244,8 @@ mod tests {
             let me = self.samples.len();
             let found = [(); 2].map(|()| [(); 3].map(|()| r.below(16) as f32 / 8.0));
             let (rays, inner, scale) = (1 + r.below(2), r.power(), r.power());
-            let (children, left, recorded, lit) = (Vec::new(), 0, false, r.below(2) == 0);
-            self.samples.push(Sample { parent, children, found, rays, inner, scale, left, recorded, lit });
+            let (children, left, recorded, with_nee) = (Vec::new(), 0, false, r.below(2) == 0);
+            self.samples.push(Sample { parent, children, found, rays, inner, scale, left, recorded, with_nee });
             self.ended.push(Vec::new());
             let n = if depth < 5 { r.below(5) } else { 0 };
             let children: Vec<usize> = (0..n).map(|_| self.grow(Some(me), depth + 1, r)).collect();
@@ -291,10 +289,10 @@ mod tests {
             let log = complete.map(|child| {
                 let (x, rays) = self.worth(child);
                 let x = [0, 1, 2].map(|c| x[c] * f64::from(self.samples[s].scale[c]));
-                let lit = self.samples[child].lit;
-                let alike = last.filter(|l| l.0 == lit);
+                let with_nee = self.samples[child].with_nee;
+                let alike = last.filter(|l| l.0 == with_nee);
                 let pair = alike.map(|(_, l)| [0, 1, 2].map(|c| (0.5 * (x[c] - l[c]) * (x[c] - l[c])) as f32));
-                last = Some((lit, x));
+                last = Some((with_nee, x));
                 (x.map(|x| x as f32), rays as f32, pair)
             });
             log.collect()
@@ -324,7 +322,7 @@ mod tests {
             match work.swap_remove(at) {
                 Work::Lane(s, slot) => {
                     let sample = &forest.samples[s];
-                    sample.found.iter().for_each(|x| ledger.gather(slot, *x));
+                    sample.found.iter().for_each(|x| ledger.accumulate(slot, *x));
                     (0..sample.rays).for_each(|_| ledger.charge(slot, 1.0));
                     let dies = sample.children.is_empty();
                     if !dies || r.below(2) == 0 {
@@ -343,8 +341,8 @@ mod tests {
                     ledger.draw(slot, m as u32, first + m == all);
                     for k in first..first + m {
                         let child = forest.samples[s].children[k];
-                        let lit = forest.samples[child].lit;
-                        let record = if slot == NO_RECORD { NO_RECORD } else { ledger.open(slot, lit) };
+                        let with_nee = forest.samples[child].with_nee;
+                        let record = if slot == NO_RECORD { NO_RECORD } else { ledger.open(slot, with_nee) };
                         if slot != NO_RECORD && record == NO_RECORD {
                             refused += 1;
                             ledger.mark_incomplete(slot);

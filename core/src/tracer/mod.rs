@@ -1,46 +1,52 @@
-//! The packet machine. One turn takes eight samples from waiting vertices of one class, all with a light sample or all
-//! without (or eight camera samples), through the stages, each its own file:
+//! The path tracer: packets of eight lanes, and what waits between them. [`pipeline`] shows the whole turn of a packet.
 //!
-//! `refill` -> `scatter` -> `occlude` -> `trace` -> `surface` -> `roulette` -> `settle`
-//!
-//! What goes on becomes a waiting vertex again. Every queue is fixed; see [`vertex::Pool`] for why none can overflow.
+//! | file | holds |
+//! |---|---|
+//! | `pipeline` | all stages in order |
+//! | `refill`, `camera_rays` | what fills a packet: samples of waiting vertices, or camera samples |
+//! | `nee`, `occlude` | next event estimation: light samples, their shadow rays |
+//! | `scatter` | BSDF samples and values |
+//! | `trace` | closest hits |
+//! | `emission` | emission that rays meet, weighted against light samples |
+//! | `shading` | the vertices that hits become |
+//! | `aov` | auxiliary values of pixels |
+//! | `roulette`, `cache_key` | how many samples a vertex gets, and what is known where it lies |
+//! | `settle` | vertices go to the ring, finished paths to the books |
+//! | `vertex`, `ring`, `class` | path vertices, and the fixed ring in which they wait by class |
+//! | `book`, `root`, `ledger` | radiance and cost of camera samples and of learned samples in flight |
+//! | `shard`, `job` | one unit of parallel work, and what all of them share |
 
-mod flight;
+mod aov;
+mod book;
+mod cache_key;
+mod camera_rays;
+mod class;
+mod emission;
 mod free_list;
 mod job;
 mod ledger;
+mod nee;
 mod occlude;
-mod place;
+mod path;
+mod pipeline;
+mod ray_state;
 mod refill;
+mod ring;
 mod root;
 mod roulette;
 mod scatter;
 mod settle;
+mod shading;
 mod shard;
-mod surface;
+#[cfg(test)]
+mod stage_tests;
 mod trace;
 mod vertex;
 
 pub(crate) use job::Job;
 pub use shard::{Budget, Shard, ShardError, StepResult};
 
-use crate::settings::Settings;
-use crate::tiles::{TILE_PIXELS, Tiles};
+/// Bytes of the state of a path in flight: a waiting vertex with its link in the ring, and a camera sample.
+pub const BYTES_PER_PATH: usize = ring::BYTES_PER_VERTEX + root::BYTES_PER_ROOT;
 
-/// Bytes of a waiting vertex, its slots in the rings and its root: the state per path.
-pub const BYTES_PER_PATH: usize = size_of::<vertex::Vertex>() + 4 * (vertex::RINGS + 1) + size_of::<root::Root>() + 4;
-
-/// Camera samples in flight: every waiting vertex may have its own, and so may the lanes of a packet.
-fn roots_capacity(settings: &Settings) -> usize {
-    settings.ring as usize + 16
-}
-
-/// Records of samples in flight, if anything is learned from them.
-fn ledger_capacity(settings: &Settings) -> usize {
-    if settings.strategy.space().is_some() { settings.learning.ledger as usize } else { 0 }
-}
-
-/// Pixel slots of one shard.
-fn pixel_slots(tiles: &Tiles) -> usize {
-    tiles.most_tiles().saturating_mul(TILE_PIXELS as usize)
-}
+const _: () = assert!(BYTES_PER_PATH <= 208);

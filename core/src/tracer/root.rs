@@ -1,4 +1,4 @@
-//! One record per camera sample in flight: what its whole tree of paths has gathered.
+//! One record per camera sample in flight: what its whole tree of paths has found.
 
 use super::free_list::FreeList;
 use crate::memory::{Carver, Measure, MemoryError};
@@ -8,15 +8,15 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 /// A camera sample whose paths are not all finished.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct Root {
-    /// Radiance gathered so far; f64 because a split sample sums thousands of terms.
+pub(crate) struct CameraSample {
+    /// Radiance found so far; f64 because a split sample sums thousands of terms.
     pub radiance: [f64; 3],
     /// Waiting vertices and lanes in flight that belong to it.
     pub open: u32,
     /// Rays traced for it.
     pub rays: u32,
-    /// Its pixel.
-    pub target: Target,
+    /// Pixel that it belongs to.
+    pub target: PixelTarget,
     /// Samples that its splits have added.
     pub splits: u32,
     /// Makes eight words of what [`Roots::targets`] reads.
@@ -26,7 +26,7 @@ pub(crate) struct Root {
 /// The pixel of a camera sample.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct Target {
+pub(crate) struct PixelTarget {
     /// What a squared error of a sample's rgb counts in the error of the picture.
     pub error_weight: [f32; 3],
     /// Samples of the pixel over those of the mean pixel; `error_weight` times its square is that of the pixel.
@@ -39,29 +39,32 @@ pub(crate) struct Target {
 
 /// The pixels of eight camera samples.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Target8 {
-    /// See [`Target::error_weight`].
+pub(crate) struct PixelTarget8 {
+    /// See [`PixelTarget::error_weight`].
     pub error_weight: Vec3x8,
-    /// See [`Target::share`].
+    /// See [`PixelTarget::share`].
     pub share: F32x8,
     /// Film indices.
     pub film: U32x8,
 }
 
+/// Bytes of a camera sample in flight, with its place in the list of free slots.
+pub(crate) const BYTES_PER_ROOT: usize = size_of::<CameraSample>() + size_of::<u32>();
+
 /// One record per lane read as a row: `target` and the words behind it.
-const ROW: usize = core::mem::offset_of!(Root, target) / 4;
-const _: () = assert!(ROW + 8 <= size_of::<Root>() / 4);
+const ROW: usize = core::mem::offset_of!(CameraSample, target) / 4;
+const _: () = assert!(ROW + 8 <= size_of::<CameraSample>() / 4);
 
 /// A fixed slab of roots.
 #[derive(Debug)]
 pub(crate) struct Roots<'m> {
-    slots: &'m mut [Root],
+    slots: &'m mut [CameraSample],
     free: FreeList<'m>,
 }
 
 impl<'m> Roots<'m> {
     pub(crate) fn measure(m: Measure, capacity: usize) -> Measure {
-        FreeList::measure(m.add::<Root>(capacity), capacity)
+        FreeList::measure(m.add::<CameraSample>(capacity), capacity)
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, capacity: usize) -> Result<Self, MemoryError> {
@@ -75,18 +78,18 @@ impl<'m> Roots<'m> {
     }
 
     /// A new root with one open lane. `None` cannot happen while roots outnumber vertices by two packets.
-    pub(crate) fn open(&mut self, target: Target) -> Option<u32> {
+    pub(crate) fn open(&mut self, target: PixelTarget) -> Option<u32> {
         let slot = self.free.take()?;
-        self.slots[slot as usize] = Root { target, open: 1, ..Zeroable::zeroed() };
+        self.slots[slot as usize] = CameraSample { target, open: 1, ..Zeroable::zeroed() };
         Some(slot)
     }
 
     /// The pixels of the roots in `mask`; 0 in other lanes.
     #[inline(always)]
-    pub(crate) fn targets(&self, slots: U32x8, mask: Mask8) -> Target8 {
+    pub(crate) fn targets(&self, slots: U32x8, mask: Mask8) -> PixelTarget8 {
         let row = |slot: u32| match self.slots.get(slot as usize) {
             Some(root) => {
-                let words: &[f32; size_of::<Root>() / 4] = bytemuck::cast_ref(root);
+                let words: &[f32; size_of::<CameraSample>() / 4] = bytemuck::cast_ref(root);
                 F32x8::new(core::array::from_fn(|k| words[ROW + k]))
             }
             None => F32x8::ZERO,
@@ -94,15 +97,15 @@ impl<'m> Roots<'m> {
         let [a, b, c, d, e, f, g, h] = U32x8::select(mask, slots, U32x8::splat(u32::MAX)).to_array();
         let rows = [row(a), row(b), row(c), row(d), row(e), row(f), row(g), row(h)];
         let [x, y, z, share, film, ..] = F32x8::transpose(rows);
-        Target8 { error_weight: Vec3x8::new(x, y, z), share, film: film.to_bits() }
+        PixelTarget8 { error_weight: Vec3x8::new(x, y, z), share, film: film.to_bits() }
     }
 
-    pub(crate) fn get(&mut self, slot: u32) -> &mut Root {
+    pub(crate) fn get(&mut self, slot: u32) -> &mut CameraSample {
         &mut self.slots[slot as usize]
     }
 
     /// Closes one vertex or lane; the finished root if it was the last.
-    pub(crate) fn close(&mut self, slot: u32) -> Option<Root> {
+    pub(crate) fn close(&mut self, slot: u32) -> Option<CameraSample> {
         let root = &mut self.slots[slot as usize];
         root.open -= 1;
         if root.open > 0 {

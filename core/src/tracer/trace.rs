@@ -1,46 +1,24 @@
-//! Stage `trace`: closest hits, and what each ray finds.
+//! Stage `trace`: closest hits.
 
-use super::flight::RayState8;
-use super::shard::Shard;
-use crate::accel::{Hit8, Intersector};
+use super::book::Bookkeeping;
+use super::ray_state::RayState8;
+use crate::accel::Intersector;
 use crate::cost::COST_BOUNCE;
-use crate::light::LightSelector;
-use crate::profile::Profile;
-use crate::session::Session;
+use crate::geometry::Hit8;
+use crate::world::World;
 
-impl Shard<'_> {
-    /// Traces a flight and hands it on: escaped lanes meet the environment, the others a surface and roulette.
-    pub(super) fn advance<P: Profile, I: Intersector, L: LightSelector>(
-        &mut self,
-        session: &Session<'_, '_, P, I, L>,
-        f: &RayState8,
-    ) {
-        if f.active.none() {
-            return;
-        }
-        let hit = self.trace(session, f);
-        let escaped = f.active.and_not(hit.hit);
-        if escaped.any() {
-            self.escape(session, f, escaped);
-        }
-        if hit.hit.any() {
-            self.arrive(session, f, &hit);
-        }
+/// What the rays of a packet hit.
+#[inline(always)]
+pub(crate) fn trace<W: World>(world: &W, book: &mut Bookkeeping<'_>, rays: &RayState8) -> Hit8 {
+    let n = rays.active.count();
+    book.counters.trace.count(n);
+    // camera rays are counted where they begin; a packet holds rays of one kind
+    if rays.path.depth.lane(rays.active.lanes().next().unwrap_or(0)) > 1 {
+        book.counters.scatter_rays += u64::from(n);
     }
-
-    fn trace<P: Profile, I: Intersector, L: LightSelector>(
-        &mut self,
-        session: &Session<'_, '_, P, I, L>,
-        f: &RayState8,
-    ) -> Hit8 {
-        let n = f.active.count();
-        self.counters.trace.count(n);
-        if f.depth.lane(f.active.lanes().next().unwrap_or(0)) > 1 {
-            self.counters.scatter_rays += u64::from(n);
-        }
-        self.charge(f.active, f.root, f.ledger, COST_BOUNCE);
-        let mut hit = session.intersector().closest(&f.ray, f.active);
-        hit.hit &= f.active;
-        hit
-    }
+    book.charge(rays.active, &rays.path, COST_BOUNCE);
+    let mut hit = world.intersector().closest(&rays.ray, rays.active);
+    // a host's intersector may answer for lanes that it was not asked about
+    hit.hit &= rays.active;
+    hit
 }

@@ -8,7 +8,7 @@ pub use calibrate::Calibration;
 
 use crate::blob::AlignedBytes;
 use crate::render::{Observer, Progress, Target};
-use croupier::accel::{Intersector, WideBvh};
+use croupier::accel::Intersector;
 use croupier::film::{PixelAov, PixelStats};
 use croupier::learn::PictureStatistics;
 use croupier::learn::cache::{Cache, CacheError};
@@ -167,8 +167,6 @@ pub enum DriveError {
     Session(SessionError),
     /// A shard cannot be made.
     Shard(ShardError),
-    /// There is no such roulette strategy.
-    Strategy(croupier::rrs::ParseError),
     /// The saved cache cannot be loaded, or the cache not be saved.
     Cache(CacheError),
     /// A cache is to be loaded or saved with this strategy, which learns nothing of the scene.
@@ -186,7 +184,6 @@ impl fmt::Display for DriveError {
             Self::Settings(e) => e.fmt(f),
             Self::Session(e) => e.fmt(f),
             Self::Shard(e) => e.fmt(f),
-            Self::Strategy(e) => e.fmt(f),
             Self::Cache(e @ CacheError::Bounds { .. }) => write!(f, "statistics of another scene: {e}"),
             Self::Cache(e) => e.fmt(f),
             Self::NoCache(strategy) => {
@@ -243,7 +240,7 @@ pub fn drive_with<P: Profile + Send + Sync>(
     let block = |size: usize| AlignedBytes::try_zeroed(size).ok_or(DriveError::Memory(size));
     let mut shared = block(plan.session().size)?;
     let mut blocks = (0..settings.shards).map(|_| block(plan.shard().size)).collect::<Result<Vec<_>, _>>()?;
-    let mut session = Session::<P, _>::new(scene, WideBvh::new(&scene), &plan, shared.as_mut())?;
+    let mut session = Session::builder(scene).profile::<P>().build(&plan, shared.as_mut())?;
     let mut shards = Vec::with_capacity(blocks.len());
     for (i, b) in blocks.iter_mut().enumerate() {
         shards.push(Shard::new(&plan, i as u32, b.as_mut())?);

@@ -5,9 +5,10 @@ use crate::image::Picture;
 use crate::statistics::Statistics;
 use croupier::denoise::{Planes, scratch_len};
 use croupier::film::{PixelAov, PixelStats};
-use croupier::learn::{ControlVariate, Learning};
+use croupier::learn::ControlVariate;
 use croupier::profile::AnyProfile;
-use croupier::{Film, MIN_RING, Plan, Scene, Settings, SettingsError, Strategy, rrs};
+use croupier::rrs::Ears;
+use croupier::{Film, Plan, Scene, Settings, SettingsError, Strategy, rrs};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -42,35 +43,15 @@ impl Target {
     }
 }
 
-/// What to render, besides the scene.
+/// Options of a render, besides the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
-    /// A roulette strategy as [`Strategy::parse`] reads it.
-    pub strategy: String,
+    /// Settings of the core. What they leave open is the scene's own ([`Settings::with_scene`]).
+    pub settings: Settings,
     /// When to stop.
     pub target: Target,
-    /// Path segments from the camera; the scene's own if absent.
-    pub max_depth: Option<u32>,
-    /// Columns and rows; the camera's own if absent.
-    pub size: Option<[u32; 2]>,
-    /// Seed: another number gives another, independent image.
-    pub seed: u64,
     /// Threads; 0 is one per processor. Does not change the image.
     pub threads: usize,
-    /// Units of parallel work, >= 1. Part of what determines the image.
-    pub shards: u32,
-    /// See [`Settings::ring`]; the core's own number if absent.
-    pub ring: Option<u32>,
-    /// See [`Settings::split_budget`]; the core's own number if absent.
-    pub split_budget: Option<u32>,
-    /// See [`Settings::adaptive`].
-    pub adaptive: bool,
-    /// See [`Settings::shadow_roulette`]. Absent: with [`Strategy::is_efficiency_aware`] ones, whose rule it is.
-    pub shadow_roulette: Option<bool>,
-    /// See [`Settings::control_variate`].
-    pub control_variate: ControlVariate,
-    /// Choices of the strategies that learn.
-    pub learning: Learning,
     /// A saved cache to begin with. Needs a strategy that learns from the scene.
     pub cache: Option<Vec<u8>>,
     /// Return the cache in the end. Needs such a strategy too.
@@ -81,27 +62,33 @@ pub struct RenderOptions {
     pub calibrate: bool,
 }
 
-impl Default for RenderOptions {
-    fn default() -> Self {
-        Self {
-            strategy: "ears".into(),
-            target: Target::Spp(64),
-            max_depth: None,
-            size: None,
-            seed: 0,
-            threads: 0,
+impl RenderOptions {
+    /// Defaults with this strategy: roulette of light samples with those whose rule it is
+    /// ([`Strategy::is_efficiency_aware`]), 16 shards, all layers, 64 samples per pixel.
+    pub fn new(strategy: Strategy) -> Self {
+        let settings = Settings {
+            strategy,
             shards: 16,
-            ring: None,
-            split_budget: None,
-            adaptive: false,
-            shadow_roulette: None,
-            control_variate: ControlVariate::default(),
-            learning: Learning::default(),
+            aovs: true,
+            shadow_roulette: strategy.is_efficiency_aware(),
+            ..Settings::default()
+        };
+        Self {
+            settings,
+            target: Target::Spp(64),
+            threads: 0,
             cache: None,
             save_cache: false,
             denoise: false,
             calibrate: false,
         }
+    }
+}
+
+/// With efficiency-aware roulette and splitting.
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self::new(Strategy::Ears(Ears::default()))
     }
 }
 
@@ -232,48 +219,17 @@ impl fmt::Display for PlanSummary {
 
 pub use crate::drive::DriveError as RenderError;
 
-/// Settings of the core for a scene.
-fn settings(scene: &Scene<'_>, options: &RenderOptions) -> Result<Settings, RenderError> {
-    choose(Settings::for_scene(scene), options)
-}
-
-/// `base` with the options that are given.
-fn choose(base: Settings, options: &RenderOptions) -> Result<Settings, RenderError> {
-    let strategy = Strategy::parse(&options.strategy).map_err(RenderError::Strategy)?;
-    Ok(Settings {
-        size: options.size.unwrap_or(base.size),
-        seed: options.seed,
-        shards: options.shards,
-        max_depth: options.max_depth.unwrap_or(base.max_depth),
-        strategy,
-        ring: options.ring.unwrap_or(base.ring),
-        split_budget: options.split_budget.unwrap_or(base.split_budget),
-        aovs: true,
-        adaptive: options.adaptive,
-        shadow_roulette: options.shadow_roulette.unwrap_or(strategy.is_efficiency_aware()),
-        control_variate: options.control_variate,
-        learning: options.learning,
-    })
-}
-
 /// Fails if the options make no sense whatever the scene: known before one is loaded.
 pub fn check(options: &RenderOptions) -> Result<(), RenderError> {
-    // the least of everything that a scene or the core would choose
-    let least = Settings {
-        size: [1, 1],
-        seed: 0,
-        shards: 1,
-        max_depth: 1,
-        strategy: Strategy::default(),
-        ring: MIN_RING,
-        split_budget: 0,
-        aovs: true,
-        adaptive: false,
-        shadow_roulette: false,
-        control_variate: ControlVariate::Off,
-        learning: Learning::default(),
-    };
-    Plan::new(&choose(least, options)?)?;
+    let mut settings = options.settings;
+    // the least that a scene could choose
+    if settings.size == [0, 0] {
+        settings.size = [1, 1];
+    }
+    if settings.max_depth == 0 {
+        settings.max_depth = 1;
+    }
+    Plan::new(&settings)?;
     Ok(())
 }
 
@@ -288,7 +244,7 @@ pub fn render_scene(
     options: &RenderOptions,
     observer: &dyn Observer,
 ) -> Result<RenderResult, RenderError> {
-    let settings = settings(&scene, options)?;
+    let settings = options.settings.with_scene(&scene);
     let plan = PlanSummary::new(&scene, &settings)?;
     let o = Options {
         threads: options.threads,
@@ -314,7 +270,7 @@ pub fn render_scene(
 
 /// What [`render_scene`] would take, without rendering.
 pub fn plan(scene: &Scene<'_>, options: &RenderOptions) -> Result<PlanSummary, RenderError> {
-    Ok(PlanSummary::new(scene, &settings(scene, options)?)?)
+    Ok(PlanSummary::new(scene, &options.settings.with_scene(scene))?)
 }
 
 const RGB: [&str; 3] = ["R", "G", "B"];
@@ -417,9 +373,9 @@ mod tests {
     #[test]
     fn the_first_pixel_that_is_not_finite_is_told() {
         let scene = crate::bake::bake(&crate::builtin::cornell_box(), &Default::default(), |_, _| ()).unwrap();
-        let options = RenderOptions { size: Some([5, 3]), target: Target::Spp(1), ..RenderOptions::default() };
         let scene = Scene::from_bytes(&scene.bytes).unwrap();
-        let o = Options::new(settings(&scene, &options).unwrap(), options.target);
+        let settings = Settings { size: [5, 3], ..Settings::for_scene(&scene) };
+        let o = Options::new(settings, Target::Spp(1));
         let mut r = drive_scene(scene, &o, &crate::drive::Unobserved).unwrap();
         assert_eq!(stats(&r).first_non_finite, None);
         r.counters.first_non_finite = 8;

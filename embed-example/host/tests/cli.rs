@@ -78,7 +78,7 @@ fn usage_errors_are_status_2() {
         (vec!["render", "--rrs", "magic"], "known are none, threshold"),
         (vec!["render", "--rrs", "fixed:0.01"], "0.05 to 20"),
         (vec!["render", "--max-depth", "0"], "--max-depth"),
-        (vec!["render", "--max-depth", "201"], "--max-depth"),
+        (vec!["render", "--max-depth", "201"], "from 1 to 200"),
         (vec!["render", "--shards", "0"], "--shards"),
         (vec!["render", "-o", "picture.jpg"], "must end in .exr"),
         (vec!["render", "--exposure", "inf"], "-100 and 100"),

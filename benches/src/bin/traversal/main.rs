@@ -14,7 +14,8 @@
 mod rays;
 
 use clap::Parser;
-use croupier::accel::{Hit8, Intersector, Ray8, WideBvh};
+use croupier::accel::{Intersector, WideBvh};
+use croupier::geometry::{Hit8, Ray8};
 use croupier::simd::Mask8;
 use croupier_benches::clock::Clock;
 use croupier_benches::results::{Results, Table};

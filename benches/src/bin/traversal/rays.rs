@@ -1,6 +1,7 @@
 //! The scene of the benchmark, and its sets of rays in the layouts of the kernels.
 
-use croupier::accel::{Intersector, Ray8, WideBvh};
+use croupier::accel::{Intersector, WideBvh};
+use croupier::geometry::Ray8;
 use croupier::simd::{F32x8, Mask8, Vec3x8};
 use glam::Vec3;
 use obvhs::ray::Ray;

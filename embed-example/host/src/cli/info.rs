@@ -1,6 +1,5 @@
 //! `croupier info`
 
-use super::learning::LearningFlags;
 use super::notes::Notes;
 use super::settings::SettingsFlags;
 use super::{Outcome, say, say_json, scene};
@@ -17,11 +16,9 @@ pub struct Args {
     /// Print the facts as one line of JSON
     #[arg(long)]
     json: bool,
-    // What the memory of a render depends on. The heading of the last flags would hold for any after them.
+    // What the memory of a render depends on.
     #[command(flatten)]
     settings: SettingsFlags,
-    #[command(flatten)]
-    learning: LearningFlags,
 }
 
 #[derive(Serialize)]
@@ -79,9 +76,7 @@ impl Facts {
 /// Runs the command.
 pub fn run(args: &Args) -> Outcome {
     let path = args.scene.as_deref();
-    let mut options = RenderOptions::default();
-    args.learning.apply(&mut options);
-    args.settings.apply(&mut options);
+    let options = args.settings.options()?;
     // Said before the scene is loaded.
     check(&options)?;
     let (bytes, notes) = scene::open(path)?;

@@ -4,9 +4,9 @@
 //! what went wrong; 2: the arguments make no sense. Results go to stdout, progress, notes and errors to stderr.
 
 mod bake;
+mod cache;
 mod compare;
 mod info;
-mod learning;
 mod notes;
 mod output;
 mod progress;

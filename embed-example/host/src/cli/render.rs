@@ -1,6 +1,6 @@
 //! `croupier render`
 
-use super::learning::{CacheFlags, LearningFlags};
+use super::cache::CacheFlags;
 use super::notes::Notes;
 use super::output::Outputs;
 use super::progress::Rendering;
@@ -31,9 +31,6 @@ pub struct Flags {
     settings: SettingsFlags,
     #[command(flatten)]
     until: Until,
-    /// Another number gives another, independent image
-    #[arg(long, value_name = "N", default_value_t = RenderOptions::default().seed)]
-    seed: u64,
     /// Threads, 0 for one per processor; the image does not depend on them
     #[arg(long, value_name = "N", default_value_t = RenderOptions::default().threads)]
     threads: usize,
@@ -54,8 +51,6 @@ pub struct Flags {
     #[arg(long)]
     json: bool,
     // The heading of the last flags would hold for any after them.
-    #[command(flatten)]
-    learning: LearningFlags,
     #[command(flatten)]
     cache: CacheFlags,
 }
@@ -92,14 +87,11 @@ impl Flags {
     fn options(&self) -> Result<RenderOptions, Box<dyn Error>> {
         let mut options = RenderOptions {
             target: self.until.target(),
-            seed: self.seed,
             threads: self.threads,
             denoise: self.denoise,
             calibrate: self.stats,
-            ..RenderOptions::default()
+            ..self.settings.options()?
         };
-        self.learning.apply(&mut options);
-        self.settings.apply(&mut options);
         // Said before the scene is loaded.
         check(&options)?;
         self.cache.apply(&mut options)?;
@@ -139,7 +131,7 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     let options = flags.options()?;
     let (bytes, mut notes) = scene::open(path)?;
     let validated = Scene::from_bytes(&bytes).map_err(|e| scene::about(path)(&e))?;
-    if let Some(text) = shortened(&validated, options.max_depth) {
+    if let Some(text) = shortened(&validated, options.settings.max_depth) {
         notes.add(path, text);
     }
     let watch = Rendering::start(options.target);
@@ -162,8 +154,8 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
         width: picture.width,
         height: picture.height,
         plan,
-        strategy: &options.strategy,
-        seed: options.seed,
+        strategy: &options.settings.strategy.to_string(),
+        seed: options.settings.seed,
         stopped_early: *stopped_early,
         output: outputs.exr,
         png: &outputs.png,
@@ -181,10 +173,10 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
 }
 
 /// What to say if paths end before the scene wants them to, and nobody asked for it.
-fn shortened(scene: &Scene<'_>, given: Option<u32>) -> Option<String> {
+fn shortened(scene: &Scene<'_>, given: u32) -> Option<String> {
     let wanted = scene.info.max_depth;
     let text = || format!("paths end after {MAX_PATH_LENGTH} segments, the scene asks for {wanted}");
-    (given.is_none() && wanted > MAX_PATH_LENGTH).then(text)
+    (given == 0 && wanted > MAX_PATH_LENGTH).then(text)
 }
 
 fn print(r: &Report<'_>) -> Outcome {

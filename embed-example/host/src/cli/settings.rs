@@ -1,72 +1,125 @@
-//! What every strategy is told, and what a render's memory depends on.
+//! Flags of the core's settings: one for each row of their table.
 
+use clap::{Arg, ArgMatches, Command, FromArgMatches, error::ErrorKind};
+use croupier::learn::Learning;
 use croupier::learn::cache::CacheSize;
-use croupier::rrs::ParseError;
-use croupier::{MAX_PATH_LENGTH, MIN_RING, Strategy};
+use croupier::{MAX_PATH_LENGTH, SettingError, SettingInfo, SettingRange, Settings, Strategy};
 use croupier_host::render::RenderOptions;
+use std::fmt::Write;
 
-/// Flags of the core's settings.
-#[derive(clap::Args)]
+/// Most pixels of a picture that the program renders and writes.
+const MAX_PIXELS: u64 = 1 << 30;
+
+/// The settings that are given, with their texts.
+#[derive(Debug)]
 pub struct SettingsFlags {
-    /// Roulette strategy; --help lists them
-    #[arg(long, value_name = "NAME", long_help = strategies(), default_value_t = RenderOptions::default().strategy, value_parser = strategy)]
-    rrs: String,
-    /// Path segments from the camera: 1 shows emitters only; the scene's own number if absent
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_PATH_LENGTH)))]
-    max_depth: Option<u32>,
-    /// Size in pixels; the scene's own if absent
-    #[arg(long, value_name = "WxH", value_parser = size)]
-    size: Option<[u32; 2]>,
-    /// Units of parallel work; the image depends on their number. 16 if absent, as many as --cache-bytes has room for
-    /// if that is fewer
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
-    shards: Option<u32>,
-    /// Path vertices that may wait in a shard, 16 to 2^24; 512 if absent. With fewer, factors above 1 become 1 more
-    /// often
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(i64::from(MIN_RING)..=1 << 24))]
-    ring: Option<u32>,
-    /// Samples that splitting may add to one camera sample; 4096 if absent
-    #[arg(long, value_name = "N")]
-    split_budget: Option<u32>,
+    given: Vec<(&'static SettingInfo, String)>,
 }
 
 impl SettingsFlags {
-    /// Puts them into `options`, which say already how much memory learning has.
-    pub fn apply(&self, options: &mut RenderOptions) {
-        options.strategy = self.rrs.clone();
-        options.max_depth = self.max_depth;
-        options.size = self.size;
-        options.shards = self.shards.unwrap_or_else(|| shards(options));
-        options.ring = self.ring;
-        options.split_budget = self.split_budget;
+    /// Options of the library: what is given, defaults for the rest.
+    pub fn options(&self) -> Result<RenderOptions, SettingError> {
+        let given = |name: &str| self.given.iter().find(|(row, _)| row.name == name).map(|(_, text)| text);
+        let mut options = match given("rrs") {
+            Some(text) => RenderOptions::new(Strategy::parse(text).map_err(SettingError::Strategy)?),
+            None => RenderOptions::default(),
+        };
+        for (row, text) in &self.given {
+            options.settings.set(row.name, text)?;
+        }
+        if given("shards").is_none() {
+            options.settings.shards = shards(&options.settings);
+        }
+        Ok(options)
     }
 }
 
 /// The usual number of shards, less where their statistics do not fit. If not even those of one do, the core says what
 /// one needs.
-fn shards(options: &RenderOptions) -> u32 {
-    let learns = Strategy::parse(&options.strategy).is_ok_and(|s| s.space().is_some());
-    let fits = |shards: &u32| !learns || CacheSize::within(options.learning.cache_bytes, *shards).is_some();
-    let usual = RenderOptions::default().shards;
-    (1..=usual).rev().find(fits).unwrap_or(1)
+fn shards(settings: &Settings) -> u32 {
+    let learns = settings.strategy.space().is_some();
+    let fits = |shards: &u32| !learns || CacheSize::within(settings.learning.cache_bytes, *shards).is_some();
+    (1..=settings.shards).rev().find(fits).unwrap_or(1)
 }
 
-/// Help of `--rrs`.
-fn strategies() -> String {
-    let lines = Strategy::TABLE.iter().map(|(name, help)| format!("\n  {name}: {help}"));
-    format!("Roulette strategy:{}", lines.collect::<String>())
+/// Values that the program accepts: those of the core, but for what would be cut or could not be written.
+fn range(row: &SettingInfo) -> SettingRange {
+    match row.name {
+        "max-depth" => SettingRange::Integers { min: 1, max: MAX_PATH_LENGTH.into() },
+        "size" => SettingRange::Size { max_pixels: MAX_PIXELS },
+        _ => row.range,
+    }
 }
 
-fn strategy(name: &str) -> Result<String, ParseError> {
-    Strategy::parse(name).map(|_| name.into())
+/// Checks the text of a setting.
+fn check(row: &'static SettingInfo, text: &str) -> Result<String, String> {
+    let mut settings = Settings::default();
+    let narrowed = |s: &Settings| s.get(row.name).is_some_and(|value| range(row).contains(value));
+    match settings.set(row.name, text) {
+        Err(SettingError::Strategy(e)) => Err(e.to_string()),
+        Ok(()) if row.from_scene && settings == Settings::default() || narrowed(&settings) => Ok(text.into()),
+        _ => Err(format!("need {}", range(row))),
+    }
 }
 
-fn size(text: &str) -> Result<[u32; 2], String> {
-    let parts = text.split_once(['x', 'X']).ok_or("write it as 640x480")?;
-    let side = |s: &str| s.parse::<u32>().map_err(|e| format!("{s:?}: {e}"));
-    match [side(parts.0)?, side(parts.1)?] {
-        [0, _] | [_, 0] => Err("a picture needs at least 1x1 pixels".into()),
-        [w, h] if u64::from(w) * u64::from(h) > 1 << 30 => Err("more than 2^30 pixels".into()),
-        size => Ok(size),
+/// The default in words.
+fn default(row: &SettingInfo) -> String {
+    let usual = RenderOptions::default().settings;
+    match row.name {
+        "shards" => format!("{}, as many as --cache-bytes has room for if that is fewer", usual.shards),
+        "shadow-roulette" => {
+            let strategies = Strategy::TABLE.iter().filter_map(|(name, _)| Strategy::parse(name).ok());
+            let aware: Vec<_> = strategies.filter(Strategy::is_efficiency_aware).map(|s| s.name()).collect();
+            format!("true with {}", aware.join(" and "))
+        }
+        name => usual.get(name).map_or_else(String::new, |value| value.to_string()),
+    }
+}
+
+fn arg(row: &'static SettingInfo) -> Arg {
+    let is_flag = row.range == SettingRange::Flag;
+    let mut help = row.help.to_string();
+    // their names say it already
+    if !is_flag && !matches!(row.range, SettingRange::Words(_) | SettingRange::Strategy) {
+        let _ = write!(help, " ({})", range(row));
+    }
+    let _ = write!(help, " [default: {}]", default(row));
+    let arg = Arg::new(row.name).long(row.name).value_name(row.value_name).allow_negative_numbers(true);
+    let arg = arg.value_parser(move |text: &str| check(row, text)).help(help.clone());
+    let arg = if is_flag { arg.num_args(0..=1).require_equals(true).default_missing_value("true") } else { arg };
+    let arg = if Learning::TABLE.contains(row) { arg.help_heading("Learning") } else { arg };
+    match row.range {
+        SettingRange::Strategy => arg.long_help(Strategy::TABLE.iter().fold(help, |mut help, (name, about)| {
+            let _ = write!(help, "\n  {name}: {about}");
+            help
+        })),
+        _ => arg,
+    }
+}
+
+impl FromArgMatches for SettingsFlags {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let mut given = Vec::new();
+        for row in Settings::TABLE {
+            let text = matches.try_get_one::<String>(row.name);
+            let text = text.map_err(|e| clap::Error::raw(ErrorKind::ValueValidation, e))?;
+            given.extend(text.map(|text| (row, text.clone())));
+        }
+        Ok(Self { given })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl clap::Args for SettingsFlags {
+    fn augment_args(command: Command) -> Command {
+        command.args(Settings::TABLE.iter().map(arg))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
     }
 }

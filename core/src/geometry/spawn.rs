@@ -1,8 +1,7 @@
 //! Points on surfaces with error bounds, and the rays that leave them.
 
 use super::Ray8;
-use crate::scene::Scene;
-use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier_simd::{F32x8, Vec3x8};
 
 /// Points on triangles, world space.
 #[derive(Clone, Copy, Debug)]
@@ -15,26 +14,19 @@ pub struct SurfacePoint8 {
     pub error: F32x8,
 }
 
-/// The points with weights `1 - u - v`, `u`, `v` on the triangles; lanes outside `mask` may hold anything and give the
-/// point 0 with the normal +z. A triangle without area has the normal +z.
+/// Bound of the rounding of a point on a triangle, relative to the absolute terms of its sum: 32 u, u = 2^-24 (NUMERICS
+/// OFF-1). Vertices are exact, so weights, products and sums leave a few roundings of each term; 32 leaves room for the
+/// rounding of the offset and of the triangle test.
+pub const OFFSET_BOUND: f32 = 32.0 / 16_777_216.0;
+
+/// The points with weights `1 - u - v`, `u`, `v` on triangles `[a, b, c]`. A triangle without area has the normal +z.
 ///
-/// `error` is `32 2^-24 sum |b_i p_i| . |ng|` (NUMERICS OFF-1): vertices are exact, so weights, products and sums leave
-/// a few roundings of each term; 32 leaves room for the rounding of the offset and of the triangle test.
-pub fn surface_point(scene: &Scene<'_>, triangle: U32x8, u: F32x8, v: F32x8, mask: Mask8) -> SurfacePoint8 {
-    let triangle = U32x8::select(mask, triangle, U32x8::splat(0)).to_array();
-    let (u, v) = (mask.zero_unless(u), mask.zero_unless(v));
-    let at = |corner: usize| {
-        Vec3x8::from_fn(|i| {
-            let t = scene.triangles.get(triangle[i] as usize);
-            let vertex = t.and_then(|t| scene.vertices.get(t.vertex[corner] as usize));
-            vertex.map_or([0.0; 3], |vertex| vertex.p)
-        })
-        .zero_unless(mask)
-    };
-    let (a, b, c) = (at(0), at(1), at(2));
+/// `error` is [`OFFSET_BOUND`]` sum |b_i p_i| . |ng|`.
+#[inline]
+pub fn surface_point([a, b, c]: [Vec3x8; 3], u: F32x8, v: F32x8) -> SurfacePoint8 {
     let w = F32x8::ONE - u - v;
     let (pa, pb, pc) = (a * w, b * u, c * v);
-    let n = normal(a, b, c);
+    let n = triangle_normal(a, b, c);
     let size = n.abs().max_component();
     // scaled before the length: edges of 1e-12 square to nothing; `max` also turns a NaN into the tiny value
     let tiny = F32x8::splat(1e-37);
@@ -42,13 +34,13 @@ pub fn surface_point(scene: &Scene<'_>, triangle: U32x8, u: F32x8, v: F32x8, mas
     let up = Vec3x8::splat(0.0, 0.0, 1.0);
     let ng = Vec3x8::select(size.gt(tiny) & size.is_finite(), n / n.length(), up);
     let sum = pa.abs() + pb.abs() + pc.abs();
-    SurfacePoint8 { p: pa + pb + pc, ng, error: sum.dot(ng.abs()) * (32.0 / 16_777_216.0) }
+    SurfacePoint8 { p: pa + pb + pc, ng, error: sum.dot(ng.abs()) * OFFSET_BOUND }
 }
 
-/// Normal of twice the area's length from the two shorter edges: of a needle the two long ones are nearly parallel, and
+/// Geometric normal of `[a, b, c]`, as long as twice the area, from the two shorter edges: of a needle the two long ones are nearly parallel, and
 /// the roundings of their cross product would tilt it. If all three are nearly parallel (an obtuse needle) it may be
 /// tilted by some 2^-24 of length over width.
-pub(crate) fn normal(a: Vec3x8, b: Vec3x8, c: Vec3x8) -> Vec3x8 {
+pub fn triangle_normal(a: Vec3x8, b: Vec3x8, c: Vec3x8) -> Vec3x8 {
     let (ab, bc, ca) = (b - a, c - b, a - c);
     let (x, y, z) = (ab.length_sqr(), bc.length_sqr(), ca.length_sqr());
     let skip_ab = x.ge(y) & x.ge(z);
@@ -64,13 +56,13 @@ pub fn offset(p: Vec3x8, ng: Vec3x8, error: F32x8, d: Vec3x8) -> Vec3x8 {
 
 /// The segments from `p` to `q`, both moved off their surfaces, as rays with `d = q' - p'` and `0 < t < 1`.
 ///
-/// `q` moves by `32 2^-24 |d| . |q_ng|` more than its own error: `d` and the t of the triangle test are rounded
-/// relative to the distance, whatever the coordinates of `q`. A lamp in a plane through the origin has an error of 0
-/// and would stand in its own light.
+/// `q` moves by [`OFFSET_BOUND`]` |d| . |q_ng|` more than its own error: `d` and the t of the triangle test are rounded
+/// relative to the distance, whatever the coordinates of `q`. An emitter in a plane through the origin has an error
+/// of 0 and would occlude itself.
 pub fn shadow_ray(p: Vec3x8, ng: Vec3x8, error: F32x8, q: Vec3x8, q_ng: Vec3x8, q_error: F32x8) -> Ray8 {
     let d = q - p;
     let o = offset(p, ng, error, d);
-    let reach = d.abs().dot(q_ng.abs()) * (32.0 / 16_777_216.0);
+    let reach = d.abs().dot(q_ng.abs()) * OFFSET_BOUND;
     let d = offset(q, q_ng, q_error + reach, -d) - o;
     Ray8 { o, d, tmin: F32x8::ZERO, tmax: F32x8::ONE }
 }

@@ -1,0 +1,39 @@
+//! Eight rays and what they hit.
+
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+
+/// Eight rays: points `o + t d`, `tmin < t < tmax`. Directions need not be unit.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray8 {
+    /// Origins, world space.
+    pub o: Vec3x8,
+    /// Directions.
+    pub d: Vec3x8,
+    /// Smallest parameter, exclusive.
+    pub tmin: F32x8,
+    /// Largest parameter, exclusive; infinity is allowed.
+    pub tmax: F32x8,
+}
+
+impl Ray8 {
+    /// Rays without an end.
+    #[inline(always)]
+    pub fn unbounded(o: Vec3x8, d: Vec3x8) -> Self {
+        Self { o, d, tmin: F32x8::ZERO, tmax: F32x8::INFINITY }
+    }
+}
+
+/// Eight closest hits; lanes outside `hit` hold `tmax`, [`crate::scene::blob::NONE`] and zeros.
+#[derive(Clone, Copy, Debug)]
+pub struct Hit8 {
+    /// Lanes that hit.
+    pub hit: Mask8,
+    /// Ray parameter.
+    pub t: F32x8,
+    /// Triangle index.
+    pub triangle: U32x8,
+    /// Barycentric weight of the triangle's vertex b.
+    pub u: F32x8,
+    /// Barycentric weight of the triangle's vertex c; vertex a has `1 - u - v`.
+    pub v: F32x8,
+}

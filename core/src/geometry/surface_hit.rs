@@ -1,0 +1,116 @@
+//! The triangles of eight hits. Whatever wants to know something of a hit surface asks here: each triangle record is
+//! read once per hit.
+
+use super::{Hit8, SurfacePoint8, surface_point};
+use crate::scene::Scene;
+use crate::scene::blob::{NONE, TRIANGLE_SMOOTH, Triangle, Vertex};
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+
+/// Eight hit triangles. Lanes outside `mask`, and those whose triangle does not exist, hold the zero triangle of
+/// material 0, flat and without a light.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceHit8 {
+    /// Lanes that hit.
+    pub mask: Mask8,
+    /// Ray parameter.
+    pub t: F32x8,
+    /// Barycentric weight of vertex b.
+    pub u: F32x8,
+    /// Barycentric weight of vertex c; vertex a has `1 - u - v`.
+    pub v: F32x8,
+    /// Positions of vertices a, b and c, world space.
+    pub corners: [Vec3x8; 3],
+    /// Vertex indices.
+    pub vertices: [[u32; 3]; 8],
+    /// Material indices.
+    pub material: [u32; 8],
+    /// Light indices, [`NONE`] where the triangle does not emit.
+    pub light: [u32; 8],
+    /// Lanes that interpolate vertex normals.
+    pub smooth: Mask8,
+}
+
+/// What lanes without a triangle read.
+const NO_TRIANGLE: Triangle = Triangle { vertex: [NONE; 3], material: 0, light: NONE, flags: 0 };
+
+impl SurfaceHit8 {
+    /// Reads the triangles of the hit lanes.
+    #[inline(always)]
+    pub fn gather(scene: &Scene<'_>, hit: &Hit8) -> Self {
+        let mask = hit.hit;
+        let index = U32x8::select(mask, hit.triangle, U32x8::splat(NONE)).to_array();
+        let triangle = index.map(|i| scene.triangles.get(i as usize).unwrap_or(&NO_TRIANGLE));
+        let vertices = triangle.map(|t| t.vertex);
+        let corner = |k: usize| {
+            Vec3x8::from_fn(|i| scene.vertices.get(vertices[i][k] as usize).map_or([0.0; 3], |vertex| vertex.p))
+        };
+        let smooth = (0..8).fold(0, |bits, i| bits | u32::from(triangle[i].flags & TRIANGLE_SMOOTH != 0) << i);
+        Self {
+            mask,
+            t: hit.t,
+            u: mask.zero_unless(hit.u),
+            v: mask.zero_unless(hit.v),
+            corners: [corner(0), corner(1), corner(2)],
+            vertices,
+            material: triangle.map(|t| t.material),
+            light: triangle.map(|t| t.light),
+            smooth: Mask8::from_bits(smooth),
+        }
+    }
+
+    /// Lanes whose triangle emits.
+    #[inline(always)]
+    pub fn emitters(&self) -> Mask8 {
+        self.mask.and_not(U32x8::new(self.light).eq(U32x8::splat(NONE)))
+    }
+
+    /// The hit points.
+    #[inline(always)]
+    pub fn point(&self) -> SurfacePoint8 {
+        surface_point(self.corners, self.u, self.v)
+    }
+
+    /// Barycentric weights of vertices a, b and c.
+    #[inline(always)]
+    pub fn weights(&self) -> [F32x8; 3] {
+        [F32x8::ONE - self.u - self.v, self.u, self.v]
+    }
+
+    /// What `of` says of vertex `k` (0 to 2) of each lane; 0 where there is no such vertex.
+    #[inline(always)]
+    pub fn of_vertex(&self, scene: &Scene<'_>, k: usize, of: impl Fn(&Vertex) -> [f32; 3]) -> Vec3x8 {
+        Vec3x8::from_fn(|i| scene.vertices.get(self.vertices[i][k] as usize).map_or([0.0; 3], &of))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{TRIANGLES, scene};
+
+    /// Killed by: a corner or a lane swapped, a triangle that is read outside the mask, an index that is trusted.
+    #[test]
+    fn each_lane_has_its_own_triangle() {
+        scene(|scene| {
+            let triangle = U32x8::new([0, 1, 2, 3, NONE, 1000, 0, 1]);
+            let (u, v) = (F32x8::splat(0.25), F32x8::splat(0.5));
+            let hit = Hit8 { hit: Mask8::from_bits(0b0111_1111), t: F32x8::ONE, triangle, u, v };
+            let s = SurfaceHit8::gather(scene, &hit);
+            for i in 0..8 {
+                let t = if i < 7 { scene.triangles.get(triangle.lane(i) as usize) } else { None };
+                let Some(t) = t else {
+                    assert_eq!((s.material[i], s.light[i], s.corners.map(|c| c.lane(i))), (0, NONE, [[0.0; 3]; 3]));
+                    continue;
+                };
+                assert_eq!((s.vertices[i], s.material[i], s.light[i]), (t.vertex, t.material, t.light));
+                let p = t.vertex.map(|v| scene.vertices[v as usize].p);
+                assert_eq!(s.corners.map(|c| c.lane(i)), p);
+                let at = [0, 1, 2].map(|c| 0.25 * p[0][c] + 0.25 * p[1][c] + 0.5 * p[2][c]);
+                assert_eq!(s.point().p.lane(i), at);
+                assert_eq!(s.emitters().lane(i), t.light != NONE);
+            }
+            assert!(TRIANGLES >= 4 && s.emitters().any() && s.smooth.any() && !s.smooth.all());
+            assert_eq!(s.point().p.lane(7), [0.0; 3]);
+        });
+    }
+}

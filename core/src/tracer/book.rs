@@ -1,0 +1,289 @@
+//! The books of a shard: what every camera sample and every learned sample has gathered and cost so far, and where it
+//! goes when it is finished. Stages compute packets; whatever outlives a packet is entered here.
+//!
+//! | book | holds | closes into |
+//! |---|---|---|
+//! | roots | camera samples in flight: radiance, rays | sums of pixels |
+//! | ledger | learned samples in flight: estimate, cost | training, and the sample they are part of |
+//! | training | statistics of this iteration | the session's cache |
+//! | pixels, AOVs | sums per pixel | the session's film |
+//! | counters | what happened | the session's counters |
+
+use super::job::Job;
+use super::ledger::{Ledger, NO_BIN, NO_RECORD};
+use super::nee::ShadowRays8;
+use super::path::Path8;
+use super::refill::Samples8;
+use super::root::{PixelTarget, Roots};
+use super::vertex::PathVertex;
+use crate::counters::Counters;
+use crate::film::{PixelAov, PixelSums, REL_MSE_EPSILON};
+use crate::learn::LearnedState;
+use crate::learn::cache::Training;
+use crate::memory::{Carver, Measure, MemoryError};
+use crate::rrs::Norm;
+use crate::settings::Settings;
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+
+/// Radiance found by eight lanes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Contribution8 {
+    /// What it counts in the pixel: prefix weight included.
+    pub pixel: Vec3x8,
+    /// What it counts in the sample's own estimate: no prefix weight.
+    pub local: Vec3x8,
+}
+
+/// All that a shard keeps beyond a packet, but for the vertices that wait.
+#[derive(Debug)]
+pub(crate) struct Bookkeeping<'m> {
+    pub(super) roots: Roots<'m>,
+    pub(super) ledger: Ledger<'m>,
+    pub(crate) training: Option<Training<'m>>,
+    pub(super) pixels: &'m mut [PixelSums],
+    pub(super) aovs: &'m mut [PixelAov],
+    pub(crate) counters: Counters,
+    /// Error of a sample beyond which it is an outlier to the statistics.
+    outlier: f32,
+    /// How the errors of the channels become one.
+    norm: Norm,
+}
+
+/// Camera samples in flight: every waiting vertex may have its own, and so may the lanes of a packet.
+fn roots_capacity(settings: &Settings) -> usize {
+    settings.ring as usize + 16
+}
+
+/// Records of samples in flight, if anything is learned from them.
+fn ledger_capacity(settings: &Settings) -> usize {
+    if settings.strategy.space().is_some() { settings.learning.ledger as usize } else { 0 }
+}
+
+impl<'m> Bookkeeping<'m> {
+    /// Bytes; [`Self::carve`] carves in the same order.
+    pub(crate) fn measure(m: Measure, job: &Job) -> Measure {
+        let (s, pixels) = (&job.settings, job.pixel_slots());
+        let m = Ledger::measure(Roots::measure(m, roots_capacity(s)), ledger_capacity(s));
+        let m = job.cache.map_or(m, |size| Training::measure(m, size));
+        m.add::<PixelSums>(pixels).add::<PixelAov>(if s.aovs { pixels } else { 0 })
+    }
+
+    pub(crate) fn carve(c: &mut Carver<'m>, job: &Job) -> Result<Self, MemoryError> {
+        let (s, pixels) = (&job.settings, job.pixel_slots());
+        Ok(Self {
+            roots: Roots::carve(c, roots_capacity(s))?,
+            ledger: Ledger::carve(c, ledger_capacity(s))?,
+            training: job.cache.map(|size| Training::carve(c, size)).transpose()?,
+            pixels: c.take(pixels)?,
+            aovs: c.take(if s.aovs { pixels } else { 0 })?,
+            counters: Counters::default(),
+            outlier: f32::INFINITY,
+            norm: s.learning.norm,
+        })
+    }
+
+    /// Begins an iteration with empty books.
+    pub(crate) fn begin(&mut self, learned: &LearnedState<'_>) {
+        self.roots.reset();
+        self.ledger.reset();
+        self.counters = Counters::default();
+        self.pixels.fill(PixelSums::default());
+        self.aovs.fill(PixelAov::default());
+        self.outlier = learned.outlier();
+        if let Some(t) = &mut self.training {
+            t.clear(learned.used_bins());
+        }
+    }
+
+    /// Opens a camera sample: its root and, if it is `learned` from, its ledger record. `None` cannot happen while
+    /// roots outnumber vertices by two packets.
+    pub(super) fn open_camera_sample(&mut self, target: PixelTarget, learned: bool) -> Option<(u32, u32)> {
+        let root = self.roots.open(target)?;
+        if !learned || !self.ledger.is_on() {
+            return Some((root, NO_RECORD));
+        }
+        let record = self.ledger.open(NO_RECORD, false);
+        self.counters.ledger_full += u64::from(record == NO_RECORD);
+        Some((root, record))
+    }
+
+    /// `lanes` samples of a waiting vertex are drawn; `drained` if they are its last.
+    #[inline(always)]
+    pub(super) fn draw(&mut self, v: &PathVertex, lanes: u32, drained: bool) {
+        self.roots.get(v.root()).open += lanes - u32::from(drained);
+        self.ledger.draw(v.record(), lanes, drained);
+    }
+
+    /// A ledger record for each of the first `lanes` samples of vertices with the records `parents`, as long as there
+    /// are any.
+    pub(super) fn open_samples(&mut self, parents: U32x8, lanes: usize, with_nee: bool) -> U32x8 {
+        let mut out = [NO_RECORD; 8];
+        if self.ledger.is_on() {
+            let parents = parents.to_array();
+            for (record, &parent) in out.iter_mut().zip(&parents).take(lanes) {
+                if parent == NO_RECORD {
+                    continue;
+                }
+                *record = self.ledger.open(parent, with_nee);
+                if *record == NO_RECORD {
+                    self.counters.ledger_full += 1;
+                    self.ledger.mark_incomplete(parent);
+                    self.close_record(parent);
+                }
+            }
+        }
+        U32x8::new(out)
+    }
+
+    /// Adds radiance to the roots and ledger records of the lanes in `mask`. What is not finite is counted, not added.
+    #[inline]
+    pub(super) fn accumulate(&mut self, mask: Mask8, path: &Path8, found: &Contribution8) {
+        let radiance = found.pixel;
+        let mask = mask & radiance.abs().max_component().gt(F32x8::ZERO) | mask.and_not(radiance.is_finite());
+        if mask.none() {
+            return;
+        }
+        let good = mask & radiance.is_finite();
+        let root = path.root.to_array();
+        let (r, g, b) = (radiance.x.to_array(), radiance.y.to_array(), radiance.z.to_array());
+        for i in good.lanes() {
+            let sum = &mut self.roots.get(root[i]).radiance;
+            sum[0] += f64::from(r[i]);
+            sum[1] += f64::from(g[i]);
+            sum[2] += f64::from(b[i]);
+        }
+        for i in mask.and_not(good).lanes() {
+            self.count_non_finite(root[i]);
+        }
+        let logged = mask.and_not(path.record.eq(U32x8::splat(NO_RECORD)));
+        if logged.any() {
+            let x = found.local * self.firefly_scale(good, radiance, path.root);
+            let (r, g, b) = (x.x.to_array(), x.y.to_array(), x.z.to_array());
+            let record = path.record.to_array();
+            for i in (good & logged).lanes() {
+                self.ledger.accumulate(record[i], [r[i], g[i], b[i]]);
+            }
+            for i in mask.and_not(good).lanes() {
+                self.ledger.mark_incomplete(record[i]);
+            }
+        }
+    }
+
+    /// What part of eight contributions the statistics take. The variance of the picture leaves outliers out; so must
+    /// the moments that are weighed against it, or cells that met one sample of them would always split.
+    fn firefly_scale(&self, mask: Mask8, radiance: Vec3x8, root: U32x8) -> F32x8 {
+        let limit = F32x8::splat(self.outlier);
+        let square = radiance * radiance;
+        // the error weight of a channel is at most that of a black pixel
+        let most = square.max_component() * F32x8::splat(1.0 / REL_MSE_EPSILON as f32);
+        if (mask & most.gt(limit)).none() {
+            return F32x8::ONE;
+        }
+        let error = self.norm.of(square * self.roots.targets(root, mask).error_weight);
+        error.gt(limit).select((limit / error).sqrt(), F32x8::ONE)
+    }
+
+    /// Counts a value that was not finite and remembers the first pixel.
+    pub(super) fn count_non_finite(&mut self, root: u32) {
+        self.counters.non_finite += 1;
+        if self.counters.first_non_finite == 0 {
+            self.counters.first_non_finite = u64::from(self.roots.get(root).target.film) + 1;
+        }
+    }
+
+    /// Counts the lanes of `broken`, whose weight is not finite; what they are part of is not learned from.
+    pub(super) fn break_lanes(&mut self, broken: Mask8, path: &Path8) {
+        for i in broken.lanes() {
+            self.count_non_finite(path.root.lane(i));
+            self.ledger.mark_incomplete(path.record.lane(i));
+        }
+    }
+
+    /// Charges one ray of relative `cost` to the root and the ledger record of each lane in `mask`.
+    #[inline]
+    pub(super) fn charge(&mut self, mask: Mask8, path: &Path8, cost: f32) {
+        let root = path.root.to_array();
+        for i in mask.lanes() {
+            self.roots.get(root[i]).rays += 1;
+        }
+        let logged = mask.and_not(path.record.eq(U32x8::splat(NO_RECORD)));
+        if logged.any() {
+            let record = path.record.to_array();
+            for i in logged.lanes() {
+                self.ledger.charge(record[i], cost);
+            }
+        }
+    }
+
+    /// Tells the records of the lanes in `active` at which bin the samples of the vertex that they led to are logged,
+    /// times which scale, and what they count (`inner`, the bounce's weight over the vertex's factor).
+    pub(super) fn arrive(&mut self, active: Mask8, path: &Path8, bin: U32x8, scale: Vec3x8, inner: Vec3x8) {
+        let active = active.and_not(path.record.eq(U32x8::splat(NO_RECORD)));
+        let (record, bin) = (path.record.to_array(), bin.to_array());
+        for i in active.lanes() {
+            self.ledger.arrive(record[i], bin[i], scale.lane(i), inner.lane(i));
+        }
+    }
+
+    /// Tells the statistics what came of the shadow rays of `samples`: those of `visible` met nothing.
+    pub(super) fn learn_shadow_rays(&mut self, samples: &Samples8, s: &ShadowRays8, visible: Mask8) {
+        if self.training.is_none() {
+            return;
+        }
+        let v = &samples.vertex;
+        let logged = s.active.and_not(s.path.record.eq(U32x8::splat(NO_RECORD)));
+        if logged.none() {
+            return;
+        }
+        let local = s.found.local * self.firefly_scale(visible & logged, s.found.pixel, s.path.root);
+        let Some(training) = &mut self.training else { return };
+        for i in (logged & s.towards.lt(U32x8::splat(NO_BIN))).lanes() {
+            let taken = training.log_shadow(s.towards.lane(i), visible.lane(i));
+            self.counters.shadows_refused += u64::from(!taken);
+        }
+        for i in (visible & logged).lanes() {
+            let (x, scale) = (local.lane(i), self.ledger.scale(v.path.record.lane(i)));
+            training.log_light(v.bin.lane(i), [0, 1, 2].map(|c| x[c] * scale[c]), v.nee_probability.lane(i));
+        }
+    }
+
+    /// Ends the paths of the lanes in `mask`.
+    pub(super) fn close_lanes(&mut self, mask: Mask8, path: &Path8) {
+        let (root, record, depth) = (path.root.to_array(), path.record.to_array(), path.depth.to_array());
+        for i in mask.lanes() {
+            self.close(root[i], record[i], depth[i]);
+        }
+    }
+
+    /// Ends a path of `depth` segments: closes a lane or a drained vertex of `root` and `record`. A finished camera
+    /// sample goes to its pixel.
+    #[inline]
+    pub(super) fn close(&mut self, root: u32, record: u32, depth: u32) {
+        self.counters.path_segments += u64::from(depth);
+        self.close_record(record);
+        if let Some(done) = self.roots.close(root) {
+            self.counters.camera_samples += 1;
+            if let Some(p) = self.pixels.get_mut(done.target.pixel as usize) {
+                p.add(done.radiance, done.rays);
+            }
+            if let Some(a) = self.aovs.get_mut(done.target.pixel as usize) {
+                a.paths += 1.0 + f64::from(done.splits);
+            }
+        }
+    }
+
+    /// Closes a lane or a drained vertex of a ledger record and logs what that finishes.
+    #[inline]
+    fn close_record(&mut self, record: u32) {
+        let (training, counters) = (&mut self.training, &mut self.counters);
+        self.ledger.close(record, |f| {
+            let Some(t) = training.as_mut().filter(|_| f.bin != NO_BIN) else { return };
+            counters.samples_logged += 1;
+            if !t.log(f.bin, f.value, f.cost) {
+                counters.samples_refused += 1;
+            } else if let Some(d) = f.pair {
+                t.log_pair(f.bin, d);
+            }
+        });
+    }
+}

@@ -1,0 +1,120 @@
+//! Camera samples in the order of tiles, pixels (Morton) and samples, eight at a time. Neighbouring lanes are samples of
+//! one pixel or of neighbouring pixels, so primary packets are coherent.
+
+use super::book::Bookkeeping;
+use super::job::Job;
+use super::ledger::NO_RECORD;
+use super::path::Path8;
+use super::ray_state::RayState8;
+use super::root::PixelTarget;
+use crate::camera;
+use crate::geometry::Ray8;
+use crate::rng::Key8;
+use crate::scene::Effects;
+use crate::tiles::{TILE_PIXELS, Tiles};
+use crate::world::World;
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+
+/// Where a shard is in its camera samples.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CameraCursor {
+    /// Current tile, if any is left.
+    tile: Option<u32>,
+    /// Pixel slots of the tiles before it.
+    base: u32,
+    /// Slot within the tile.
+    slot: u32,
+    /// Sample within the pixel.
+    sample: u32,
+}
+
+impl CameraCursor {
+    pub(super) fn new(tiles: &Tiles, shard: u32, samples: u32) -> Self {
+        let tile = if samples == 0 { None } else { tiles.next_of(shard, 0) };
+        Self { tile, base: 0, slot: 0, sample: 0 }
+    }
+
+    pub(super) const fn finished() -> Self {
+        Self { tile: None, base: 0, slot: 0, sample: 0 }
+    }
+
+    pub(super) fn is_finished(&self) -> bool {
+        self.tile.is_none()
+    }
+
+    /// The next (pixel, pixel slot, sample); a finished cursor gives `None`. `samples` is the number per pixel of a
+    /// tile.
+    fn next(&mut self, tiles: &Tiles, shard: u32, samples: impl Fn(u32) -> u32) -> Option<([u32; 2], u32, u32)> {
+        while let Some(tile) = self.tile {
+            let found = tiles.pixel(tile, self.slot).map(|p| (p, self.base + self.slot, self.sample));
+            self.sample += 1;
+            if found.is_none() || self.sample >= samples(tile) {
+                self.sample = 0;
+                self.slot += 1;
+                if self.slot == TILE_PIXELS {
+                    self.slot = 0;
+                    self.base += TILE_PIXELS;
+                    self.tile = tiles.next_of(shard, tile + 1);
+                }
+            }
+            if found.is_some() {
+                return found;
+            }
+        }
+        None
+    }
+}
+
+/// Up to eight camera rays of shard `index`; none when the cursor ran out within empty slots.
+#[inline(always)]
+pub(crate) fn camera_rays<W: World>(
+    world: &W,
+    job: &Job,
+    index: u32,
+    cursor: &mut CameraCursor,
+    book: &mut Bookkeeping<'_>,
+) -> RayState8 {
+    let (settings, tiles, learned, iteration) = (&job.settings, &job.tiles, world.learned(), world.iteration());
+    // numbers of one pixel must not come back in another iteration, however many samples it had
+    let (seed, first_sample) = match settings.adaptive {
+        true => (settings.seed ^ iteration.number.wrapping_mul(0x9e37_79b9_7f4a_7c15), 0),
+        false => (settings.seed, iteration.first_sample),
+    };
+    let (mut x, mut y, mut pixel, mut sample) = ([0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8]);
+    let (mut root, mut record, mut weight) = ([0u32; 8], [NO_RECORD; 8], [[1.0; 3]; 8]);
+    let mut lanes = 0;
+    while lanes < 8 {
+        let Some((p, slot, s)) = cursor.next(tiles, index, |t| learned.samples_of_tile(t)) else { break };
+        let film = tiles.film_index(p) as u32;
+        let (error_weight, share) = learned.error_weight(film);
+        let target = PixelTarget { error_weight, share, film, pixel: slot };
+        let Some(opened) = book.open_camera_sample(target, s < settings.learning.samples) else { break };
+        [x[lanes], y[lanes]] = p;
+        pixel[lanes] = film;
+        sample[lanes] = first_sample.wrapping_add(s);
+        weight[lanes] = error_weight;
+        (root[lanes], record[lanes]) = opened;
+        lanes += 1;
+    }
+    let key = Key8::camera(seed, U32x8::new(pixel), U32x8::new(sample));
+    let [u0, u1, u2, u3] = key.pixel_and_lens();
+    let px = F32x8::from_fn(|i| x[i] as f32) + u0;
+    let py = F32x8::from_fn(|i| y[i] as f32) + u1;
+    let lens = if W::EFFECTS.contains(Effects::LENS) { [u2, u3] } else { [F32x8::ZERO; 2] };
+    let (o, d) = camera::generate(world.scene().camera, settings.size, px, py, lens);
+    book.counters.camera_rays += lanes as u64;
+    RayState8 {
+        active: Mask8::first(lanes),
+        ray: Ray8::unbounded(o, d),
+        from: o,
+        normal: Vec3x8::ZERO,
+        beta: Vec3x8::ONE,
+        weight: Vec3x8::ONE,
+        pdf: F32x8::ONE,
+        skip_mis: Mask8::all_lanes(),
+        path: Path8 { root: U32x8::new(root), record: U32x8::new(record), depth: U32x8::splat(1) },
+        key: key.next_vertex(),
+        albedo_product: F32x8::ONE,
+        error_weight: Vec3x8::from_fn(|i| weight[i]),
+    }
+}

@@ -1,0 +1,47 @@
+//! Emission that rays meet, weighted against the light sample that could have found it.
+
+use super::book::Contribution8;
+use super::ray_state::RayState8;
+use crate::geometry::SurfaceHit8;
+use crate::light::{self, power_heuristic};
+use crate::scene::Effects;
+use crate::world::World;
+use croupier_simd::{F32x8, Mask8, Vec3x8};
+
+/// Radiance of the environment along the rays that `escaped`; `None` without one.
+#[inline(always)]
+pub(crate) fn environment<W: World>(world: &W, rays: &RayState8, escaped: Mask8) -> Option<Contribution8> {
+    let scene = world.scene();
+    let any = Effects::ENVIRONMENT.with(Effects::CONSTANT);
+    if !W::EFFECTS.intersects(any) || scene.environment.is_none() {
+        return None;
+    }
+    let radiance = light::environment_radiance(scene, rays.ray.d, escaped);
+    let pdf = light::environment_pdf(scene, world.lights(), rays.from, rays.normal, rays.ray.d, escaped);
+    Some(weighted(rays, radiance, pdf))
+}
+
+/// Radiance of the hit emitters, in the lanes of [`SurfaceHit8::emitters`]; `ng` are the normals by winding. `None` if
+/// there is no emitter.
+#[inline(always)]
+pub(crate) fn area<W: World>(world: &W, rays: &RayState8, hit: &SurfaceHit8, ng: Vec3x8) -> Option<Contribution8> {
+    let emitters = hit.emitters();
+    if !W::EFFECTS.contains(Effects::AREA_LIGHTS) || emitters.none() {
+        return None;
+    }
+    let scene = world.scene();
+    let radiance = light::area_radiance(scene, hit, rays.ray.d, ng, emitters);
+    let sampled = emitters.and_not(rays.skip_mis);
+    if sampled.none() {
+        return Some(Contribution8 { pixel: rays.beta * radiance, local: rays.weight * radiance });
+    }
+    let pdf = light::area_pdf(scene, world.lights(), rays.from, rays.normal, hit, rays.ray.d, sampled);
+    Some(weighted(rays, radiance, pdf))
+}
+
+/// `radiance` times the MIS weight of rays whose directions light sampling has with density `pdf`.
+#[inline(always)]
+fn weighted(rays: &RayState8, radiance: Vec3x8, pdf: F32x8) -> Contribution8 {
+    let weight = rays.skip_mis.select(F32x8::ONE, power_heuristic(rays.pdf, pdf));
+    Contribution8 { pixel: rays.beta * radiance * weight, local: rays.weight * radiance * weight }
+}

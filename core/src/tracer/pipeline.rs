@@ -1,0 +1,109 @@
+//! The whole turn of a packet, stage by stage.
+//!
+//! ```text
+//!            +--> samples of waiting vertices --> nee, scatter --> occlude --+
+//!  refill ---+                                                               +--> trace --> emission --+
+//!            +--> camera rays -----------------------------------------------+                         |
+//!    ^                                                                                                 v
+//!    +------------------------------------ settle <-- roulette <-- aov <-- surface --------------------+
+//! ```
+//!
+//! Stages compute packets from packets and read nothing but the [`World`]; what outlives the packet goes to the books
+//! ([`Bookkeeping`](super::book::Bookkeeping)) or, as waiting vertices, to the [`Ring`](super::ring::Ring).
+
+use super::camera_rays::camera_rays;
+use super::emission;
+use super::nee::{sample_lights, shadow_rays};
+use super::occlude::occlude;
+use super::refill::{Refill, refill, samples};
+use super::roulette::roulette;
+use super::scatter::scatter;
+use super::settle::settle;
+use super::shading::{albedo, shade};
+use super::shard::Shard;
+use super::trace::trace;
+use crate::geometry::SurfaceHit8;
+use crate::settings::MAX_PATH_LENGTH;
+use crate::world::World;
+use croupier_simd::{Mask8, U32x8, Vec3x8};
+
+/// One packet through all stages; `false` when nothing is left.
+pub(super) fn turn<W: World>(shard: &mut Shard<'_>, world: &W) -> bool {
+    let index = shard.index();
+    let Shard { job, cursor, ring, book, comb, .. } = shard;
+    let settings = &job.settings;
+
+    let rays = match refill(cursor, ring, book) {
+        Refill::Done => return false,
+        Refill::Camera => camera_rays(world, job, index, cursor, book),
+        Refill::Samples(taken) => {
+            let samples = samples(world, ring, book, &taken);
+            let light = sample_lights(world, &samples);
+            let scattered = scatter(world, &samples, light.as_ref().map(|l| l.wi));
+            if let Some(light) = light {
+                let roulette = settings.shadow_roulette;
+                if let Some(shadow) = shadow_rays(world, book, &samples, &light, &scattered.nee, roulette) {
+                    let visible = occlude(world, book, &shadow);
+                    book.learn_shadow_rays(&samples, &shadow, visible);
+                    book.accumulate(visible, &shadow.path, &shadow.found);
+                }
+            }
+            book.break_lanes(scattered.broken, &samples.path);
+            book.close_lanes(samples.active.and_not(scattered.rays.active), &samples.path);
+            scattered.rays
+        }
+    };
+    if rays.active.none() {
+        return true;
+    }
+
+    let hit = trace(world, book, &rays);
+    let escaped = rays.active.and_not(hit.hit);
+    if escaped.any() {
+        if let Some(found) = emission::environment(world, &rays, escaped) {
+            book.accumulate(escaped, &rays.path, &found);
+        }
+        book.close_lanes(escaped, &rays.path);
+    }
+    if hit.hit.none() {
+        return true;
+    }
+
+    let hit = SurfaceHit8::gather(world.scene(), &hit);
+    let point = hit.point();
+    book.counters.surface.count(hit.mask.count());
+    if let Some(found) = emission::area(world, &rays, &hit, point.ng) {
+        book.accumulate(hit.emitters(), &rays.path, &found);
+    }
+
+    // segments may end here, and camera samples are looked at all the same
+    let alive = hit.mask & rays.path.depth.lt(U32x8::splat(world.max_depth()));
+    if settings.max_depth > MAX_PATH_LENGTH {
+        book.counters.max_length_reached += u64::from(hit.mask.and_not(alive).count());
+    }
+    let first = hit.mask & rays.path.depth.eq(U32x8::splat(1));
+    let wants_aovs = book.wants_aovs() && first.any();
+    if alive.none() && !wants_aovs {
+        book.close_lanes(hit.mask, &rays.path);
+        return true;
+    }
+
+    let mut arrival = shade(world, &rays, &hit, &point);
+    let needs_albedo = settings.strategy.needs_albedo();
+    let seen = if wants_aovs { first & arrival.active } else { Mask8::NONE };
+    arrival.active &= alive;
+    let albedo = albedo(world, &arrival, seen | if needs_albedo { arrival.active } else { Mask8::NONE });
+    if wants_aovs {
+        book.record_first_hit(first, &rays.path, hit.t, arrival.vertex.ns, albedo);
+    }
+    arrival.albedo = if needs_albedo { albedo } else { Vec3x8::ZERO };
+    book.close_lanes(hit.mask.and_not(arrival.active), &rays.path);
+    if arrival.active.none() {
+        return true;
+    }
+
+    let decision = roulette(world, settings, book, comb, ring.free(), &mut arrival);
+    settle(book, ring, &arrival, &decision);
+    book.counters.ring_peak = book.counters.ring_peak.max(ring.waiting() as u64);
+    true
+}

@@ -1,0 +1,51 @@
+//! What paths read while they are traced: one name for scene, kernels, learned state and iteration. All of it is frozen
+//! while an iteration runs.
+
+use crate::accel::Intersector;
+use crate::learn::LearnedState;
+use crate::light::LightSelector;
+use crate::scene::{Effects, Scene};
+
+/// One round of camera samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Iteration {
+    /// 1 for the first; 0 before it.
+    pub number: u64,
+    /// Camera samples per pixel before it.
+    pub first_sample: u32,
+    /// Camera samples per pixel in it.
+    pub samples: u32,
+}
+
+/// The read-only side of a render, as shards see it. Sealed: [`crate::Session`] is the one that hosts use.
+pub trait World: sealed::Sealed {
+    /// Effects that the kernels are compiled with.
+    const EFFECTS: Effects;
+    /// What finds hits.
+    type Intersector: Intersector;
+    /// What chooses lights.
+    type Lights: LightSelector;
+
+    /// The scene.
+    fn scene(&self) -> &Scene<'_>;
+    /// What finds hits.
+    fn intersector(&self) -> &Self::Intersector;
+    /// What chooses lights.
+    fn lights(&self) -> &Self::Lights;
+    /// Statistics of earlier iterations.
+    fn learned(&self) -> &LearnedState<'_>;
+    /// The iteration that runs.
+    fn iteration(&self) -> Iteration;
+    /// Path segments at which every path ends.
+    fn max_depth(&self) -> u32;
+
+    /// What tells a shard that its sums belong here: content hash of the scene, and iteration.
+    fn identity(&self) -> (u64, Iteration) {
+        (self.scene().hash, self.iteration())
+    }
+}
+
+pub(crate) mod sealed {
+    /// Keeps [`super::World`] to this crate.
+    pub trait Sealed {}
+}
