@@ -314,6 +314,101 @@ fn every_fault_of_the_records_has_its_error() {
     expect("environment of a point light", &parts.blob(), reference(S::Lights, 2, S::Environment, 0, 1));
 }
 
+/// Every parameter of every kind just outside its range. Killed by: a parameter that its row lacks or the validator
+/// does not check; by the second half, one that is checked where it is not used.
+#[test]
+fn every_parameter_of_every_kind_is_checked() {
+    for (index, kind) in (0u32..).zip(MaterialKind::ALL) {
+        let used = kind.facts().parameters;
+        for parameter in used {
+            let [lo, hi] = parameter.range();
+            for bad in [lo.next_down(), hi.next_up(), NAN, INF] {
+                let mut parts = Parts::tiny();
+                let m = &mut parts.materials[index as usize];
+                let field = match parameter {
+                    Parameter::Reflectance => (m.reflectance[2] = bad, Field::Reflectance).1,
+                    Parameter::Alpha => (m.alpha = bad, Field::Alpha).1,
+                    Parameter::RelativeEta => (m.eta[0] = bad, Field::Eta).1,
+                    Parameter::ComplexEta => (m.eta[1] = bad, Field::Eta).1,
+                    Parameter::InternalReflectance => (m.fdr = bad, Field::InternalReflectance).1,
+                    Parameter::TransmittanceTable => (parts.tables[40] = bad, Field::Reflectance).1,
+                };
+                let what = format!("{} with {parameter:?} {bad}", kind.name());
+                // all share one table: the first that refers to it is told
+                let shares = |k: &MaterialKind| k.facts().parameters.contains(&Parameter::TransmittanceTable);
+                let first = MaterialKind::ALL.iter().position(shares).map_or(index, |i| i as u32);
+                let index = if *parameter == Parameter::TransmittanceTable { first } else { index };
+                expect(&what, &parts.blob(), number(SectionKind::Materials, index, field, bad));
+            }
+        }
+        let unused = |p| !used.contains(&p);
+        let mut parts = Parts::tiny();
+        let m = &mut parts.materials[index as usize];
+        if unused(Parameter::Alpha) {
+            m.alpha = -7.0;
+        }
+        if unused(Parameter::RelativeEta) && unused(Parameter::ComplexEta) {
+            m.eta = [-7.0; 3];
+        }
+        if unused(Parameter::ComplexEta) {
+            (m.k, m.eta[1]) = ([-7.0; 3], -7.0);
+        }
+        if unused(Parameter::InternalReflectance) {
+            m.fdr = 7.0;
+        }
+        assert_eq!(error(&parts.blob()), None, "{}", kind.name());
+        if unused(Parameter::TransmittanceTable) {
+            parts.materials[index as usize].table = 0;
+            expect(kind.name(), &parts.blob(), reference(SectionKind::Materials, index, SectionKind::Tables, 0, 64));
+        }
+    }
+}
+
+/// Every field of every light kind just outside what it may hold. Killed by: a field that its row lacks or the
+/// validator does not check.
+#[test]
+fn every_field_of_every_light_is_checked() {
+    use SectionKind as S;
+    let tiny = Parts::tiny();
+    for kind in LightKind::ALL {
+        let i = tiny.lights.iter().position(|l| l.kind == *kind as u32).unwrap_or_else(|| panic!("no {kind:?}"));
+        let index = i as u32;
+        for field in kind.fields() {
+            let mut parts = tiny.clone();
+            let l = &mut parts.lights[i];
+            let expected = match field {
+                LightField::Triangle => {
+                    l.area *= 1.01;
+                    number(S::Lights, index, Field::Area, 0.505)
+                }
+                LightField::Environment => {
+                    parts.environment[0].light = 9;
+                    reference(S::Lights, index, S::Environment, 0, 1)
+                }
+                LightField::Position => {
+                    l.vector[1] = MAX_COORDINATE.next_up();
+                    number(S::Lights, index, Field::Position, MAX_COORDINATE.next_up())
+                }
+                LightField::Direction => {
+                    l.vector = [0.0, 0.0, 0.9];
+                    number(S::Lights, index, Field::Direction, 0.9 * 0.9)
+                }
+                LightField::Emission => {
+                    l.emission[2] = MAX_EMISSION.next_up();
+                    number(S::Lights, index, Field::Emission, MAX_EMISSION.next_up())
+                }
+            };
+            expect(&format!("{} with {field:?}", kind.name()), &parts.blob(), expected);
+        }
+        let mut parts = tiny.clone();
+        parts.lights[i].params[0] = 1.0;
+        expect(kind.name(), &parts.blob(), SceneError::Reserved { of: S::Lights, index });
+        // each kind calls for one of its effects
+        let effects = Scene::from_bytes(tiny.blob().bytes()).unwrap().effects;
+        assert!(effects.intersects(Effects::of_light(*kind)), "{}", kind.name());
+    }
+}
+
 /// Killed by: dropping a check of `Sections`, in its order.
 #[test]
 fn every_fault_of_the_frame_has_its_error() {
