@@ -1,4 +1,4 @@
-//! The statistics cache as bytes: round trips, merging, and what happens to bytes that are wrong.
+//! The statistics cache as bytes: round trips, merging, damaged bytes.
 
 use croupier::learn::Objective;
 use croupier::learn::cache::CacheError;
@@ -195,7 +195,7 @@ fn random_damage_never_panics() {
 }
 
 /// A cache full of random numbers from 0 to 1e100, which no samples explain, still gives finite look-ups, also after
-/// splitting and logging. Killed by: no saturation, a division by a count of 0, a variance below 0.
+/// subdividing and logging. Killed by: no saturation, a division by a count of 0, a variance below 0.
 #[test]
 fn a_poisoned_cache_gives_finite_numbers() {
     let (bytes, mut rng) = (learned(60, 4, 2000.0), SplitMix(11));

@@ -1,4 +1,4 @@
-//! What renders that learn take and give: saved statistics, denoised pictures, figures.
+//! Input and output of renders that learn: saved statistics, denoised pictures, figures.
 
 use croupier::cost::COST_SHADOW;
 use croupier::denoise::{Planes, scratch_len};
@@ -37,7 +37,7 @@ fn with(mut options: RenderOptions, change: impl Fn(&mut Settings)) -> RenderOpt
     options
 }
 
-/// Bytes of a cache that cannot split.
+/// Size of a cache that cannot subdivide, bytes.
 fn smallest() -> usize {
     CacheSize::SMALLEST.bytes(2).unwrap()
 }

@@ -1,4 +1,4 @@
-//! Rays that leave surfaces: never onto the surface they left, never past a close neighbour.
+//! Secondary rays: they neither hit the surface they left nor miss a close neighbour.
 
 use croupier::accel::{Intersector, WideBvh};
 use croupier::geometry::{Ray8, offset, shadow_ray};
