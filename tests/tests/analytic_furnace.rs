@@ -1,7 +1,7 @@
 //! Everything under light from everywhere: radiance is the albedo, and 1 where nothing is lost.
 
 use croupier::Settings;
-use croupier::scene::blob::MaterialKind;
+use croupier::unstable::scene::blob::MaterialKind;
 use croupier_host::description::{Model, Reflectance};
 use croupier_tests::bsdf::{Case, assert_every_kind, at_angle};
 use croupier_tests::runner::{Image, render, settings};

@@ -1,9 +1,9 @@
 //! Every scattering model against its f64 oracle, one direction pair at a time.
 
-use croupier::bsdf::fresnel::{self, Index8};
-use croupier::bsdf::{self, CacheDirection, Lobes, facts};
-use croupier::scene::blob::MaterialKind;
-use croupier::simd::{F32x8, Mask8, Vec3x8};
+use croupier::unstable::bsdf::fresnel::{self, Index8};
+use croupier::unstable::bsdf::{self, CacheDirection, Lobes, facts};
+use croupier::unstable::scene::blob::MaterialKind;
+use croupier::unstable::simd::{F32x8, Mask8, Vec3x8};
 use croupier_tests::bsdf::*;
 use croupier_tests::stats::SplitMix;
 

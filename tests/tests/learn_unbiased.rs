@@ -6,9 +6,9 @@
 //! than 1e-4. Here the iterations of a render are not independent; where that may matter the error comes from renders
 //! with different seeds.
 
-use croupier::film::{PixelAov, PixelStats};
-use croupier::learn::{ControlVariate, Learning, Objective, PixelEstimator};
-use croupier::rrs::Norm;
+use croupier::unstable::film::{PixelAov, PixelStats};
+use croupier::unstable::learn::{ControlVariate, Learning, Objective, PixelEstimator};
+use croupier::unstable::rrs::Norm;
 use croupier::{Settings, Strategy};
 use croupier_host::builtin;
 use croupier_host::description::*;

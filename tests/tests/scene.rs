@@ -1,8 +1,8 @@
 //! The one door from bytes to a scene: what is valid passes, each fault has its error, no bytes do harm.
 
 use croupier::Scene;
-use croupier::scene::blob::*;
-use croupier::scene::{ChildFault, Effects, Field, SceneError, SectionFault, SlotFault};
+use croupier::unstable::scene::blob::*;
+use croupier::unstable::scene::{ChildFault, Effects, Field, SceneError, SectionFault, SlotFault};
 use croupier_tests::blob::{Blob, Parts, alias, widths};
 use croupier_tests::walk;
 use proptest::prelude::*;

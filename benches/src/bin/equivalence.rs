@@ -22,8 +22,9 @@
 //! should be, or the scenes are not there; 1 otherwise.
 
 use clap::Parser;
-use croupier::learn::{ControlVariate, Learning, PixelEstimator};
-use croupier::{Counters, MIN_RING, Settings, Strategy};
+use croupier::unstable::MIN_RING;
+use croupier::unstable::learn::{ControlVariate, Learning, PixelEstimator};
+use croupier::{Counters, Settings, Strategy};
 use croupier_benches::results::{Results, Table};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;

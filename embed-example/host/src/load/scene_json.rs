@@ -5,7 +5,7 @@ use super::{LoadError, Loader, obj};
 use crate::description::{
     Camera, Emitter, Environment, Material, Model, ParameterSource, Reflectance, SceneDescription, ThinLens,
 };
-use croupier::scene::blob::MaterialKind;
+use croupier::unstable::scene::blob::MaterialKind;
 use std::path::Path;
 
 pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription, LoadError> {
