@@ -4,8 +4,8 @@
 use super::book::Bookkeeping;
 use super::job::Job;
 use super::ledger::NO_RECORD;
+use super::packets::RayState8;
 use super::path::Path8;
-use super::ray_state::RayState8;
 use super::root::PixelTarget;
 use crate::camera;
 use crate::geometry::Ray8;
