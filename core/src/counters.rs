@@ -62,7 +62,8 @@ pub struct Counters {
     /// ([`crate::learn::cache::BIN_LIMIT`]), or because a number overflowed. Many of them: the statistics lean to the
     /// first tiles of each shard.
     pub samples_refused: u64,
-    /// Shadow rays whose visibility was not learned from because their bin had 65,535 of this iteration.
+    /// Shadow rays whose visibility was not learned from because their bin had enough of this
+    /// iteration ([`crate::learn::cache::BIN_LIMIT`]).
     pub shadows_refused: u64,
     /// Samples without a ledger record because the slab was full: they, and those they are part of, were not learned
     /// from.

@@ -24,82 +24,25 @@
 
 mod filter;
 mod finish;
+mod grid;
+mod noisy;
+mod pixels;
 mod planes;
 mod prepare;
 
-use core::fmt;
-use croupier_simd::F32x8;
+pub use noisy::{COLOR_LIMIT, DenoiseError, Noisy, Part};
 pub use planes::Planes;
 
-/// The noisy picture: planes of `columns * rows` values, row by row; longer ones are cut. Pixels whose color or
-/// variance is not finite (or beyond [`COLOR_LIMIT`] or its square) count as absent.
-#[derive(Clone, Copy, Debug)]
-pub struct Noisy<'a> {
-    /// Columns and rows.
-    pub size: [u32; 2],
-    /// Mean radiance, rgb.
-    pub color: [&'a [f32]; 3],
-    /// Squared standard error of the mean. Where it is 0 all around, pixels keep their values; among noisy neighbours 0
-    /// rather means that all samples of a pixel missed the light.
-    pub variance: [&'a [f32]; 3],
-    /// Mean albedo of the first hits, 0 to 1, 0 where nothing is hit. Three empty slices: unknown.
-    pub albedo: [&'a [f32]; 3],
-    /// Mean shading normal of the first hits, world space, 0 where nothing is hit. Three empty slices: unknown.
-    pub normal: [&'a [f32]; 3],
-}
+use grid::{FEATURES, Grid, SIGNAL};
 
-/// Radiance above which a pixel counts as absent: squares of sums of it stay finite.
-pub const COLOR_LIMIT: f32 = 1e15;
-
-/// What has too few values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// A plane of [`Noisy::color`].
-    Color,
-    /// A plane of [`Noisy::variance`].
-    Variance,
-    /// A plane of [`Noisy::albedo`].
-    Albedo,
-    /// A plane of [`Noisy::normal`].
-    Normal,
-    /// The scratch memory; see [`scratch_len`].
-    Scratch,
-    /// A plane of the result.
-    Out,
-    /// The memory of [`Planes`]; see [`Planes::len`].
-    Planes,
-}
-
-/// A slice is too short.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct DenoiseError {
-    /// Which one.
-    pub part: Part,
-    /// Columns and rows of the picture.
-    pub size: [u32; 2],
-    /// Values needed.
-    pub needed: usize,
-    /// Values given.
-    pub given: usize,
-}
-
-impl fmt::Display for DenoiseError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let part = match self.part {
-            Part::Color => "a color plane",
-            Part::Variance => "a variance plane",
-            Part::Albedo => "an albedo plane",
-            Part::Normal => "a normal plane",
-            Part::Scratch => "scratch memory",
-            Part::Out => "a result plane",
-            Part::Planes => "plane memory",
-        };
-        let [columns, rows] = self.size;
-        write!(f, "{part} for {columns}x{rows} pixels needs {} values, {} given", self.needed, self.given)
-    }
-}
-
-impl core::error::Error for DenoiseError {}
+/// Distances of the taps, level by level.
+const STEPS: [usize; 5] = [1, 2, 4, 8, 16];
+/// Standard errors of a difference at which two pixels stop belonging together at the first level. Chosen by hand
+/// after varying one number at a time, by the relMSE of seven scenes with 4 and 16 samples per pixel: no joint optimum,
+/// and not checked on other scenes.
+const MEMBERSHIP: f32 = 2.75;
+/// Its factor from level to level: neighbours have come to share samples, and variances count them as independent.
+const MEMBERSHIP_DECAY: f32 = 0.95;
 
 /// Values of scratch memory that [`denoise`] needs for a picture of `size`; `usize::MAX` if that is not addressable.
 pub fn scratch_len(size: [u32; 2]) -> usize {
@@ -143,85 +86,4 @@ pub fn denoise(noisy: &Noisy<'_>, scratch: &mut [f32], out: [&mut [f32]; 3]) -> 
     filter::despeckle(grid, from, features, to);
     finish::finish(noisy, grid, to, features, out);
     Ok(())
-}
-
-/// Distances of the taps, level by level.
-const STEPS: [usize; 5] = [1, 2, 4, 8, 16];
-/// Columns of margin on either side of a scratch row: no tap leaves the row. A multiple of 8.
-const MARGIN: usize = 16;
-/// Values of a pixel that the levels change: e (rgb) and the variance of e, summed over rgb.
-const SIGNAL: usize = 4;
-/// Values of a pixel that stay: normal, albedo, each scaled so that a distance of 1 separates, and [`REACH`].
-const FEATURES: usize = 7;
-/// Plane of the features: how far [`filter::despeckle`] may move the pixel.
-const REACH: usize = 6;
-/// Normal, x, of what is not in the picture: far from all that is.
-const NOWHERE: f32 = 1e9;
-
-/// Standard errors of a difference at which two pixels stop belonging together at the first level. Chosen by hand
-/// after varying one number at a time, by the relMSE of seven scenes with 4 and 16 samples per pixel: no joint optimum,
-/// and not checked on other scenes.
-const MEMBERSHIP: f32 = 2.75;
-/// Its factor from level to level: neighbours have come to share samples, and variances count them as independent.
-const MEMBERSHIP_DECAY: f32 = 0.95;
-/// Per squared distance of two normals, 1 separates. See [`MEMBERSHIP`].
-const NORMAL_WEIGHT: f32 = 3.5;
-/// Per squared distance of two albedos. See [`MEMBERSHIP`].
-const ALBEDO_WEIGHT: f32 = 3.0;
-/// Smallest divisor: below it radiance is hardly the surface's own color.
-const ALBEDO_FLOOR: f32 = 0.1;
-/// Standard errors by which a pixel may be moved towards its neighbours.
-const DESPECKLE: f32 = 3.0;
-/// Squared radiance that never matters: keeps 0 / 0 away.
-const TINY: f32 = 1e-20;
-
-/// Where a pixel is in scratch memory: rows of planes, each plane with a margin on both sides.
-#[derive(Clone, Copy)]
-struct Grid {
-    columns: usize,
-    rows: usize,
-    /// `columns`, up to a multiple of 8.
-    padded: usize,
-    /// Values from one plane of a row to the next.
-    stride: usize,
-}
-
-impl Grid {
-    fn new(size: [u32; 2]) -> Self {
-        let [columns, rows] = size.map(|n| n as usize);
-        let padded = columns.saturating_add(7) & !7;
-        Self { columns, rows, padded, stride: padded.saturating_add(2 * MARGIN) }
-    }
-
-    /// First lanes of the packets of a row, from the beginning of a plane.
-    fn packets(self) -> impl Iterator<Item = usize> {
-        (MARGIN..MARGIN + self.padded).step_by(8)
-    }
-
-    /// Row `y` of a block with `planes` planes; empty if there is no such row.
-    fn row(self, block: &[f32], planes: usize, y: usize) -> &[f32] {
-        let len = planes * self.stride;
-        if y < self.rows { block.get(y * len..).and_then(|r| r.get(..len)).unwrap_or(&[]) } else { &[] }
-    }
-
-    fn row_mut(self, block: &mut [f32], planes: usize, y: usize) -> &mut [f32] {
-        let len = planes * self.stride;
-        if y < self.rows { block.get_mut(y * len..).and_then(|r| r.get_mut(..len)).unwrap_or(&mut []) } else { &mut [] }
-    }
-}
-
-/// Eight values from `at`; 0 if they are not all there.
-#[inline(always)]
-fn load(row: &[f32], at: usize) -> F32x8 {
-    match row.get(at..).and_then(|r| r.first_chunk()) {
-        Some(a) => F32x8::new(*a),
-        None => F32x8::ZERO,
-    }
-}
-
-#[inline(always)]
-fn store(row: &mut [f32], at: usize, x: F32x8) {
-    if let Some(a) = row.get_mut(at..).and_then(|r| r.first_chunk_mut()) {
-        *a = x.to_array();
-    }
 }

@@ -3,6 +3,7 @@
 extern crate std;
 
 use crate::accel::Intersector;
+use crate::film::Film;
 use crate::geometry::{Hit8, Ray8};
 use crate::learn::LearnedState;
 use crate::light::PowerSelector;
@@ -210,11 +211,13 @@ pub(crate) fn world<R>(change: impl FnOnce(&mut Settings), f: impl FnOnce(&TestW
         let layout = LearnedState::measure(Measure::new(), &needs).layout().expect("a layout");
         let (mut shared, at) = block(layout.size);
         let mut carver = Carver::new(&mut shared[at..], layout).expect("memory");
+        let mut learned = LearnedState::carve(&mut carver, &needs, scene).expect("memory");
+        learned.begin(4, &Film::new(settings.size, &mut [], &mut []));
         let world = TestWorld {
             scene,
             intersector: BruteForce(scene),
             lights: PowerSelector(*scene),
-            learned: LearnedState::carve(&mut carver, &needs, scene).expect("memory"),
+            learned,
             iteration: Iteration { number: 1, first_sample: 0, samples: 4 },
             max_depth: settings.max_depth,
         };

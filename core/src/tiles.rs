@@ -1,16 +1,89 @@
-//! Which pixels belong to which shard: square tiles, dealt out so that neighbours in both directions differ.
+//! Numbering of pixels, of the square blocks that they lie in, and of the tiles that shards own.
+//!
+//! Pixels count row by row from the top left: the *film index*. Blocks count row by row as well; those at the right and
+//! lower border are cut off. Tiles are blocks of [`TILE`] pixels a side, and their slots count in Morton order.
 
-/// Pixels along a tile's side.
+/// Side of a tile, pixels.
 pub(crate) const TILE: u32 = 8;
 /// Pixel slots of a tile; slots outside the picture stay empty.
 pub(crate) const TILE_PIXELS: u32 = TILE * TILE;
 
-/// The tiles of a picture.
+/// Film index of a pixel of a picture with `size` columns and rows.
+#[inline]
+pub(crate) fn film_index(size: [u32; 2], [x, y]: [u32; 2]) -> usize {
+    y as usize * size[0] as usize + x as usize
+}
+
+/// Column and row of the pixel with a film index.
+#[inline]
+pub(crate) fn pixel_at(size: [u32; 2], film: u32) -> [u32; 2] {
+    [film % size[0], film / size[0]]
+}
+
+/// Division of a picture into square blocks.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BlockGrid {
+    size: [u32; 2],
+    side: u32,
+}
+
+impl BlockGrid {
+    /// Blocks of `side` pixels, at least 1, of a picture with `size` columns and rows.
+    #[inline]
+    pub(crate) fn new(size: [u32; 2], side: u32) -> Self {
+        Self { size, side }
+    }
+
+    /// Tiles of a picture with `size` columns and rows.
+    #[inline]
+    pub(crate) fn tiles(size: [u32; 2]) -> Self {
+        Self::new(size, TILE)
+    }
+
+    /// Columns and rows of blocks.
+    #[inline]
+    fn shape(self) -> [u32; 2] {
+        self.size.map(|n| n.div_ceil(self.side))
+    }
+
+    /// Number of blocks.
+    #[inline]
+    pub(crate) fn count(self) -> usize {
+        let [columns, rows] = self.shape();
+        columns as usize * rows as usize
+    }
+
+    /// Number of the block around the pixel with a film index.
+    #[inline]
+    pub(crate) fn of_pixel(self, film: u32) -> u32 {
+        let [x, y] = pixel_at(self.size, film);
+        y / self.side * self.shape()[0] + x / self.side
+    }
+
+    /// First column and row of a block.
+    #[inline]
+    fn start(self, block: u32) -> [u32; 2] {
+        let [columns, _] = self.shape();
+        [block % columns * self.side, block / columns * self.side]
+    }
+
+    /// First column and row of a block, and those behind its last.
+    pub(crate) fn corners(self, block: u32) -> [[u32; 2]; 2] {
+        let from = self.start(block);
+        [from, [0, 1].map(|a| (from[a] + self.side).min(self.size[a]))]
+    }
+
+    /// Number of pixels in a block.
+    pub(crate) fn area(self, block: u32) -> u32 {
+        let [from, to] = self.corners(block);
+        (to[0] - from[0]) * (to[1] - from[1])
+    }
+}
+
+/// Assignment of a picture's tiles to shards, interleaved so that neighbours in both directions differ.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tiles {
     size: [u32; 2],
-    columns: u32,
-    rows: u32,
     shards: u32,
     /// Tiles to skip per row, so that a column does not belong to one shard.
     skew: u32,
@@ -25,34 +98,93 @@ impl Tiles {
     pub(crate) fn new(size: [u32; 2], shards: u32) -> Self {
         // near the golden section of the shard count: rows start far apart
         let skew = (f64::from(shards) * 0.618_034) as u32;
-        Self { size, columns: size[0].div_ceil(TILE), rows: size[1].div_ceil(TILE), shards, skew }
+        Self { size, shards, skew }
     }
 
     fn owner(&self, tile: u32) -> u32 {
-        let (x, y) = (tile % self.columns, tile / self.columns);
+        let [columns, _] = BlockGrid::tiles(self.size).shape();
+        let (x, y) = (tile % columns, tile / columns);
         ((u64::from(x) + u64::from(y) * u64::from(self.skew.max(1))) % u64::from(self.shards)) as u32
     }
 
     /// The first tile of `shard` at or after `tile`.
     pub(crate) fn next_of(&self, shard: u32, tile: u32) -> Option<u32> {
-        (tile..self.columns * self.rows).find(|&t| self.owner(t) == shard)
+        (tile..BlockGrid::tiles(self.size).count() as u32).find(|&t| self.owner(t) == shard)
     }
 
-    /// How many tiles a shard owns at the most.
+    /// Upper bound of the tiles that a shard owns.
     pub(crate) fn most_tiles(&self) -> usize {
         // per row of tiles the owners run through all shards in turn
-        (self.rows as usize).saturating_mul(self.columns.div_ceil(self.shards) as usize)
+        let [columns, rows] = BlockGrid::tiles(self.size).shape();
+        (rows as usize).saturating_mul(columns.div_ceil(self.shards) as usize)
     }
 
-    /// Picture coordinates of slot `slot` of `tile` (Morton order), if inside the picture.
+    /// Column and row of slot `slot` of `tile` (Morton order), if inside the picture.
     pub(crate) fn pixel(&self, tile: u32, slot: u32) -> Option<[u32; 2]> {
-        let x = tile % self.columns * TILE + even_bits(slot);
-        let y = tile / self.columns * TILE + even_bits(slot >> 1);
+        let [x, y] = BlockGrid::tiles(self.size).start(tile);
+        let (x, y) = (x + even_bits(slot), y + even_bits(slot >> 1));
         (x < self.size[0] && y < self.size[1]).then_some([x, y])
     }
 
-    /// Index of a pixel in the film.
-    pub(crate) fn film_index(&self, [x, y]: [u32; 2]) -> usize {
-        y as usize * self.size[0] as usize + x as usize
+    /// Film index of a pixel.
+    pub(crate) fn film_index(&self, pixel: [u32; 2]) -> usize {
+        film_index(self.size, pixel)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::vec;
+
+    /// Shards, slots, corners and the block around a pixel number tiles alike; every pixel is one shard's, once. Killed
+    /// by: columns and rows exchanged, a border that is not cut off, a slot of another order, a tile of two shards.
+    #[test]
+    fn all_numberings_agree() {
+        for size in [[1, 1], [8, 8], [17, 9], [3, 40], [64, 33]] {
+            for shards in [1, 2, 3, 7] {
+                let (tiles, grid) = (Tiles::new(size, shards), BlockGrid::tiles(size));
+                let mut seen = vec![0; (size[0] * size[1]) as usize];
+                let mut owned = 0;
+                for shard in 0..shards {
+                    let mut of_shard = 0;
+                    let mut next = tiles.next_of(shard, 0);
+                    while let Some(tile) = next {
+                        let [from, to] = grid.corners(tile);
+                        let mut inside = 0;
+                        for [x, y] in (0..TILE_PIXELS).filter_map(|slot| tiles.pixel(tile, slot)) {
+                            let film = tiles.film_index([x, y]);
+                            assert_eq!(pixel_at(size, film as u32), [x, y]);
+                            assert_eq!(grid.of_pixel(film as u32), tile, "{size:?}");
+                            assert!((from[0]..to[0]).contains(&x) && (from[1]..to[1]).contains(&y));
+                            seen[film] += 1;
+                            inside += 1;
+                        }
+                        assert_eq!(grid.area(tile), inside);
+                        of_shard += 1;
+                        next = tiles.next_of(shard, tile + 1);
+                    }
+                    assert!(of_shard <= tiles.most_tiles());
+                    owned += of_shard;
+                }
+                assert!(seen.iter().all(|n| *n == 1));
+                assert_eq!(owned, grid.count());
+            }
+        }
+    }
+
+    /// Blocks of any side cover the picture once. Killed by: a side that is taken for that of tiles.
+    #[test]
+    fn blocks_of_any_side_cover_the_picture() {
+        for side in [1, 3, 8, 50] {
+            let grid = BlockGrid::new([20, 7], side);
+            let areas: u32 = (0..grid.count() as u32).map(|b| grid.area(b)).sum();
+            assert_eq!(areas, 140);
+            for film in 0..140 {
+                let ([x, y], [from, to]) = (pixel_at([20, 7], film), grid.corners(grid.of_pixel(film)));
+                assert!((from[0]..to[0]).contains(&x) && (from[1]..to[1]).contains(&y), "side {side}");
+            }
+        }
     }
 }

@@ -18,7 +18,7 @@ mod vec3;
 pub use f32x8::F32x8;
 pub use int::{I32x8, U32x8};
 pub use mask::Mask8;
-pub use vec3::{Frame8, Vec3x8};
+pub use vec3::{Frame8, LUMINANCE, Vec3x8};
 
 /// Lanes of every vector type here.
 pub const LANES: usize = 8;

@@ -14,6 +14,9 @@ pub struct Vec3x8 {
     pub z: F32x8,
 }
 
+/// Weights of red, green and blue in luminance: the Y row of the matrix from linear Rec. 709 (D65) to CIE XYZ.
+pub const LUMINANCE: [f64; 3] = [0.212_671, 0.715_16, 0.072_169];
+
 impl Vec3x8 {
     /// All components 0.
     pub const ZERO: Self = Self::splat(0.0, 0.0, 0.0);
@@ -113,10 +116,11 @@ impl Vec3x8 {
         (self.x + self.y + self.z) * (1.0 / 3.0)
     }
 
-    /// Rec. 709 luminance of linear RGB.
+    /// Luminance of linear Rec. 709 colours, by [`LUMINANCE`].
     #[inline(always)]
     pub fn luminance(self) -> F32x8 {
-        self.x * 0.212_671 + self.y * 0.715_16 + self.z * 0.072_169
+        const WEIGHTS: [f32; 3] = [LUMINANCE[0] as f32, LUMINANCE[1] as f32, LUMINANCE[2] as f32];
+        self.x * WEIGHTS[0] + self.y * WEIGHTS[1] + self.z * WEIGHTS[2]
     }
 
     /// Are all components finite?

@@ -3,7 +3,7 @@
 use crate::stats::SplitMix;
 use bytemuck::{Pod, Zeroable};
 use croupier::learn::Objective;
-use croupier::learn::cache::{Cache, CacheSize, Local8, Training};
+use croupier::learn::cache::{Cache, CacheSize, Local8, Training, VertexKind, VertexKind8};
 use croupier::scene::blob::content_hash;
 use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
 
@@ -56,10 +56,20 @@ pub fn vertex(rng: &mut SplitMix) -> ([f32; 3], [f32; 3]) {
     (core::array::from_fn(|a| (c[a] + 1.1 * n[a] + rng.range(-0.01, 0.01)) as f32), n.map(|x| x as f32))
 }
 
-/// The bin of one vertex.
-pub fn find(cache: &Cache<'_>, kind: u32, p: [f32; 3], d: [f32; 3]) -> u32 {
+/// Kind of this number.
+pub fn kind(number: u32) -> VertexKind8 {
+    VertexKind8::splat(VertexKind::ALL[number as usize])
+}
+
+/// Number of any kind.
+pub fn any_kind(rng: &mut SplitMix) -> u32 {
+    (rng.bits() % VertexKind::ALL.len() as u64) as u32
+}
+
+/// Bin of a vertex of the kind with number `number`.
+pub fn find(cache: &Cache<'_>, number: u32, p: [f32; 3], d: [f32; 3]) -> u32 {
     let [p, d] = [p, d].map(|v| Vec3x8::splat(v[0], v[1], v[2]));
-    cache.find(U32x8::splat(kind), p, d, Mask8::all_lanes()).lane(5)
+    cache.find(kind(number), p, d, Mask8::all_lanes()).lane(5)
 }
 
 /// What is known of the bins `8 k` to `8 k + 7`.
@@ -88,7 +98,7 @@ pub fn iterate(cache: &mut Cache<'_>, shards: &mut [Training<'_>], n: usize, spl
         t.clear(cache.bins());
         for _ in 0..n {
             let (p, d) = vertex(rng);
-            let bin = find(cache, rng.bits() as u32 & 3, p, d);
+            let bin = find(cache, any_kind(rng), p, d);
             let x = [(); 3].map(|()| (rng.bits() >> 58) as f32 / 1024.0);
             assert!(t.log(bin, x, (rng.bits() >> 61) as f32));
             assert!(t.log_pair(bin, x));

@@ -17,7 +17,7 @@ pub struct LightScene {
     pub textures: Vec<Texture>,
     /// Texels.
     pub texels: Vec<u32>,
-    /// Lights; probabilities are set by [`Self::finish`].
+    /// Lights.
     pub lights: Vec<Light>,
     /// Selection table, set by [`Self::finish`].
     pub light_alias: Vec<Alias>,
@@ -111,9 +111,6 @@ impl LightScene {
     /// Selects with the given weights.
     pub fn select_by(mut self, weights: &[f64]) -> Self {
         self.light_alias = alias::build(weights);
-        for (light, entry) in self.lights.iter_mut().zip(&self.light_alias) {
-            light.probability = entry.probability;
-        }
         self
     }
 

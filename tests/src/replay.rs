@@ -11,7 +11,7 @@ use croupier::accel::{Intersector, WideBvh};
 use croupier::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
 use croupier::cost::COST_SHADOW;
 use croupier::geometry::{Ray8, offset, shadow_ray};
-use croupier::learn::cache::{Cache, Kind};
+use croupier::learn::cache::{Cache, VertexKind, VertexKind8};
 use croupier::light::{LightSample8, PowerSelector, power_heuristic, sample};
 use croupier::rng::Key8;
 use croupier::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind};
@@ -167,12 +167,12 @@ impl Replay<'_, '_> {
             _ => v.ns * (v.ns.dot(v.wo) * F32x8::splat(2.0)) - v.wo,
         };
         let kind = match (depth, v.kind) {
-            (1, MaterialKind::Diffuse) => Kind::FirstDiffuse,
-            (1, _) => Kind::FirstGlossy,
-            (_, MaterialKind::Diffuse) => Kind::Diffuse,
-            _ => Kind::Glossy,
+            (1, MaterialKind::Diffuse) => VertexKind::FirstDiffuse,
+            (1, _) => VertexKind::FirstGlossy,
+            (_, MaterialKind::Diffuse) => VertexKind::Diffuse,
+            _ => VertexKind::Glossy,
         };
-        let kind = U32x8::splat(kind as u32);
+        let kind = VertexKind8::splat(kind);
         let bin = self.cache.find(kind, v.p, dir, one()).lane(0) as usize;
         let scale = rgb(albedo).map(|a| match a {
             _ if depth == 1 => 1.0,

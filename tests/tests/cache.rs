@@ -1,6 +1,6 @@
 //! The statistics cache: where a vertex belongs, what is summed, how the tree grows, what is looked up.
 
-use croupier::learn::cache::{BIN_LIMIT, Cache, CacheSize, MAX_VALUE};
+use croupier::learn::cache::{BIN_LIMIT, Cache, CacheSize, MAX_VALUE, NO_BIN, VertexKind, VertexKind8};
 use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_tests::cache::*;
 use croupier_tests::stats::{FAMILY_ALPHA, SplitMix, chi_square, sidak};
@@ -12,7 +12,7 @@ const ALL: fn() -> Mask8 = Mask8::all_lanes;
 
 /// Every bin stands for one leaf of the oracle and one direction bin, and the other way round; places inside, outside
 /// and with numbers that are not finite; inactive lanes. Killed by: axes swapped in the octant, the wrong root, a level
-/// left out, no clamping, `u32::MAX` missing.
+/// left out, no clamping, `NO_BIN` missing.
 #[test]
 fn find_agrees_with_an_oracle() {
     // too small for a grid, a coarse one, a finer one
@@ -31,15 +31,15 @@ fn agrees_with_an_oracle(room: usize, least: u32) {
         let vertices: [_; 8] = std::array::from_fn(|_| {
             let (p, d) = vertex(&mut rng);
             let anywhere = std::array::from_fn(|a| rng.range(LO[a] as f64 - 1.0, HI[a] as f64 + 1.0) as f32);
-            (rng.bits() as u32 & 3, if turn % 2 == 0 { p } else { anywhere }, d)
+            (any_kind(&mut rng), if turn % 2 == 0 { p } else { anywhere }, d)
         });
         let active = Mask8::from_bits(rng.bits() as u32);
-        let kind = U32x8::from_fn(|i| vertices[i].0);
+        let kind = VertexKind8::from_fn(|i| VertexKind::ALL[vertices[i].0 as usize]);
         let bins = cache.find(kind, Vec3x8::from_fn(|i| vertices[i].1), Vec3x8::from_fn(|i| vertices[i].2), active);
         for (i, (kind, p, d)) in vertices.into_iter().enumerate() {
             let (bin, p) = (bins.lane(i), oracle.clamp(p.map(f64::from)));
             if !active.lane(i) {
-                assert_eq!(bin, u32::MAX);
+                assert_eq!(bin, NO_BIN);
                 continue;
             }
             let [height, azimuth] = height_and_azimuth(d.map(f64::from));
@@ -63,6 +63,27 @@ fn agrees_with_an_oracle(room: usize, least: u32) {
     assert!(find(&cache, 1, [0.0; 3], [nan; 3]) < cache.bins());
 }
 
+/// Vertices alike in all but their kind share no bin, each kind has a tree that grows alone. Killed by: kinds that are
+/// masked, two kinds with one octree, roots that are not the first nodes.
+#[test]
+fn every_kind_has_an_octree_of_its_own() {
+    let (mut blocks, mut rng) = (Blocks::leaves(60, 1), SplitMix(14));
+    let (mut cache, mut shards) = blocks.carve(LO, HI);
+    let kinds = VertexKind::ALL.len();
+    assert_eq!(cache.leaves() as usize, kinds);
+    for (grown, p) in (0..kinds).map(|k| (k, vertex(&mut rng).0)) {
+        let bins: Vec<u32> = (0..kinds as u32).map(|k| find(&cache, k, p, [0.0, 0.0, 1.0])).collect();
+        assert_eq!(bins.iter().collect::<HashSet<_>>().len(), kinds);
+        let t = &mut shards[0];
+        t.clear(cache.bins());
+        (0..100).for_each(|_| assert!(t.log(bins[grown], [1.0; 3], 1.0)));
+        cache.begin_merge(0.0);
+        cache.absorb(t);
+        cache.freeze(50.0);
+        assert_eq!(cache.leaves() as usize, kinds + 7 * (grown + 1), "one leaf of one tree");
+    }
+}
+
 /// 4e6 uniform directions. Moving a border of a slab by 0.005 of the height (1 % of a bin's area) gives a non-central
 /// chi-square of 200, missed with a probability below 1e-7. Killed by: uneven slabs, quadrants about another axis.
 #[test]
@@ -72,7 +93,7 @@ fn direction_bins_have_equal_area() {
     let mut observed = [0u64; 16];
     for _ in 0..500_000 {
         let d = Vec3x8::from_fn(|_| rng.direction().map(|x| x as f32));
-        cache.find(U32x8::splat(0), Vec3x8::ZERO, d, ALL()).to_array().iter().for_each(|b| observed[*b as usize] += 1);
+        cache.find(kind(0), Vec3x8::ZERO, d, ALL()).to_array().iter().for_each(|b| observed[*b as usize] += 1);
     }
     let p = chi_square(&observed, &[250_000.0; 16], 5.0).p;
     assert!(p > sidak(FAMILY_ALPHA, 1), "p = {p}: {observed:?}");
@@ -109,13 +130,13 @@ fn jitter_stays_within_half_a_leaf() {
             continue;
         }
         let [p8, d8] = [p, d].map(|v| Vec3x8::splat(v[0], v[1], v[2]));
-        let bin = cache.find_jittered(U32x8::splat(1), p8, d8, u.map(F32x8::splat), ALL()).lane(2);
+        let bin = cache.find_jittered(kind(1), p8, d8, u.map(F32x8::splat), ALL()).lane(2);
         let leaf = oracle.cell(1, moved).leaf;
         assert_eq!(*leaf_of.entry(bin / 16).or_insert(leaf), leaf);
         seen += 1;
         moved_away += u32::from(leaf != own.leaf);
         // half is no movement
-        let still = cache.find_jittered(U32x8::splat(1), p8, d8, [F32x8::splat(0.5); 3], ALL()).lane(2);
+        let still = cache.find_jittered(kind(1), p8, d8, [F32x8::splat(0.5); 3], ALL()).lane(2);
         assert_eq!(still, find(&cache, 1, p, d));
     }
     // each axis leaves the cell with probability 1/4
@@ -147,7 +168,7 @@ fn borders_of_cells_do_not_show() {
         cache.freeze(3000.0);
         let mean = |bins: U32x8| cache.local(bins, ALL()).mean.x.to_array().iter().sum::<f32>() / 8.0;
         let at = |x: f32| Vec3x8::splat(x, LO[1] + 0.7, LO[2] + 1.1);
-        let (kind, dir) = (U32x8::splat(0), Vec3x8::splat(0.0, 0.0, 1.0));
+        let (kind, dir) = (kind(0), Vec3x8::splat(0.0, 0.0, 1.0));
         let mut smooth = |x: f32| {
             let draw = |k: u32| {
                 let mut any = || F32x8::from_fn(|_| rng.f32());
@@ -234,7 +255,7 @@ fn a_billion_samples_keep_their_mean() {
     assert!(!t.log(7, [1.0; 3], 1.0) && !t.log_pair(7, [1.0; 3]));
     assert!(t.log(8, [1.0; 3], 1.0) && t.log_pair(8, [1.0; 3]));
     t.log_light(7, [1.0; 3], 1.0);
-    assert!((0..65_535).all(|k| t.log_shadow(7, k % 2 == 0)) && !t.log_shadow(7, true) && t.log_shadow(8, true));
+    assert!((0..BIN_LIMIT).all(|k| t.log_shadow(7, k % 2 == 0)) && !t.log_shadow(7, true) && t.log_shadow(8, true));
     cache.absorb(t);
     let once = Oracle::new(&saved(&cache)).leaves[0][7];
     assert_eq!(once[12..], [65_535.0, 32_768.0, 0.0], "no light sample of a full bin");
@@ -252,7 +273,7 @@ fn a_billion_samples_keep_their_mean() {
     for x in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         assert!(!t.log(3, [0.0, x, 0.0], 1.0) && !t.log(3, [0.0; 3], x) && !t.log_pair(3, [x, 0.0, 0.0]));
     }
-    assert!(!t.log(cache.bins(), [1.0; 3], 1.0) && !t.log(u32::MAX, [1.0; 3], 1.0) && !t.log_pair(u32::MAX, [1.0; 3]));
+    assert!(!t.log(cache.bins(), [1.0; 3], 1.0) && !t.log(NO_BIN, [1.0; 3], 1.0) && !t.log_pair(NO_BIN, [1.0; 3]));
     for _ in 0..BIN_LIMIT {
         (0..9).for_each(|_| t.log_light(3, [f32::MAX; 3], f32::MAX));
         assert!(t.log(3, [f32::MAX, -5.0, 2.0], f32::MAX) && t.log_pair(3, [f32::MAX; 3]));
@@ -362,7 +383,7 @@ fn visibilities_are_what_shadow_rays_met() {
         // whatever the vertex's own direction
         let bins = [up, down, [1.0, 0.0, 0.0]].map(|own| {
             let bin = U32x8::splat(find(cache, 0, p, own));
-            assert_eq!(cache.bins_towards(bin, towards, Mask8::first(3)).to_array()[3..], [u32::MAX; 5]);
+            assert_eq!(cache.bins_towards(bin, towards, Mask8::first(3)).to_array()[3..], [NO_BIN; 5]);
             cache.bins_towards(bin, towards, ALL())
         });
         assert!(bins.iter().all(|b| b.to_array() == bins[0].to_array()));
@@ -375,7 +396,7 @@ fn visibilities_are_what_shadow_rays_met() {
         let t = &mut shards[0];
         t.clear(cache.bins());
         assert!((0..rays).all(|k| t.log_shadow(bin, k < visible)));
-        assert!([cache.bins(), u32::MAX].into_iter().all(|none| !t.log_shadow(none, true)));
+        assert!([cache.bins(), NO_BIN].into_iter().all(|none| !t.log_shadow(none, true)));
         cache.begin_merge(0.5);
         cache.absorb(t);
         cache.freeze(f64::INFINITY);
@@ -393,7 +414,7 @@ fn visibilities_are_what_shadow_rays_met() {
     // none is known of other kinds
     let other = U32x8::splat(find(&cache, 1, LO, up));
     assert_eq!(cache.visibility_root(cache.bins_towards(other, Vec3x8::splat(0.0, 0.0, 1.0), ALL())).lane(0), 1.0);
-    for none in [cache.bins(), u32::MAX] {
+    for none in [cache.bins(), NO_BIN] {
         assert_eq!(cache.visibility_root(U32x8::splat(none)).lane(0), 1.0);
     }
     // a second place: its share and that of the surroundings differ
@@ -432,7 +453,7 @@ fn light_shares_are_of_all_squares() {
         t.log_light(1, [0.0, 1.0, 2.0], 1.0);
     }
     [f32::NAN, f32::INFINITY].iter().for_each(|x| t.log_light(0, [1.0, *x, 1.0], 1.0));
-    [cache.bins(), u32::MAX].iter().for_each(|none| t.log_light(*none, [1.0; 3], 1.0));
+    [cache.bins(), NO_BIN].iter().for_each(|none| t.log_light(*none, [1.0; 3], 1.0));
     cache.begin_merge(1.0);
     cache.absorb(t);
     cache.freeze(f64::INFINITY);
@@ -460,7 +481,7 @@ fn what_is_looked_up() {
     }
     cache.absorb(t);
     cache.freeze(f64::INFINITY);
-    let l = cache.local(U32x8::new([0, 1, 2, 15, 16, 31, u32::MAX, 1]), Mask8::from_bits(0x7f));
+    let l = cache.local(U32x8::new([0, 1, 2, 15, 16, 31, NO_BIN, 1]), Mask8::from_bits(0x7f));
     let near = |found: [f32; 3], expected: f32| found.iter().all(|x| (x - expected).abs() <= 0.02 * expected);
     for (lane, mean, moment, cost, count) in
         [(0, 1.0, 2.0, 5.0, 4000.0), (1, 3.0, 9.0, 7.0, 4000.0), (2, 2.0, 5.5, 6.0, 0.0), (3, 2.0, 5.5, 6.0, 0.0)]

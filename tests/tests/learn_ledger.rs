@@ -2,7 +2,7 @@
 //! spoils nothing.
 
 use croupier::accel::WideBvh;
-use croupier::learn::cache::{Cache, CacheSize, Kind};
+use croupier::learn::cache::{Cache, CacheSize, VertexKind};
 use croupier::learn::{Learning, Objective, PixelEstimator};
 use croupier::{Counters, Scene, Settings};
 use croupier_host::blob::AlignedBytes;
@@ -196,7 +196,7 @@ fn faces_and_materials_in_one_cell_stay_apart() {
         let mut found = Vec::new();
         learning(&scene, &s, &[16, 16, 0], IN_ORDER, &mut |_, l: &mut dyn Learned| found = bins(l));
         assert_eq!(found.len(), 64, "one leaf for each kind");
-        let of = |kind: Kind| {
+        let of = |kind: VertexKind| {
             let leaf = found[16 * kind as usize..][..16].iter().filter(|b| b[0] > 0.0);
             let mut means: Vec<f64> = leaf.map(|b| b[3] / b[0]).collect();
             means.sort_by(f64::total_cmp);
@@ -205,9 +205,9 @@ fn faces_and_materials_in_one_cell_stay_apart() {
         let close = |found: &[f64], expected: &[f64]| {
             found.len() == expected.len() && found.iter().zip(expected).all(|(f, e)| (f / e - 1.0).abs() < 0.05)
         };
-        let (matte, shiny) = (of(Kind::FirstDiffuse), of(Kind::FirstGlossy));
+        let (matte, shiny) = (of(VertexKind::FirstDiffuse), of(VertexKind::FirstGlossy));
         assert!(close(&matte, &faces) && close(&shiny, &shown), "{objective}: {matte:?} and {shiny:?}");
-        assert!(of(Kind::Diffuse).is_empty() && of(Kind::Glossy).is_empty(), "paths have one vertex");
+        assert!(of(VertexKind::Diffuse).is_empty() && of(VertexKind::Glossy).is_empty(), "paths have one vertex");
     }
 }
 

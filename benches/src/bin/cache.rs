@@ -4,7 +4,7 @@
 //! siblings of one vertex are, *scattered* ones any eight. Fastest of many rounds:
 //! other programs only add to it.
 
-use croupier::learn::cache::{Cache, Training};
+use croupier::learn::cache::{Cache, Training, VertexKind, VertexKind8};
 use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_tests::cache::{BOUNDS, Blocks, iterate, vertex};
 use croupier_tests::stats::SplitMix;
@@ -18,7 +18,7 @@ struct Packet {
     p: Vec3x8,
     d: Vec3x8,
     jitter: [F32x8; 3],
-    kind: U32x8,
+    kind: VertexKind8,
 }
 
 fn packets(coherent: bool, rng: &mut SplitMix) -> Vec<Packet> {
@@ -30,7 +30,7 @@ fn packets(coherent: bool, rng: &mut SplitMix) -> Vec<Packet> {
                 p: Vec3x8::from_fn(|i| v[i].0.map(|x| x + 0.002 * rng.f32())),
                 d: Vec3x8::from_fn(|i| v[i].1),
                 jitter: [(); 3].map(|()| F32x8::from_fn(|_| rng.f32())),
-                kind: U32x8::splat(rng.bits() as u32 & 3),
+                kind: VertexKind8::splat(VertexKind::ALL[rng.bits() as usize % VertexKind::ALL.len()]),
             }
         })
         .collect()

@@ -1,6 +1,6 @@
 //! The passes over the neighbours.
 
-use super::{FEATURES, Grid, NOWHERE, REACH, SIGNAL, TINY, load, store};
+use super::grid::{FEATURES, Grid, NOWHERE, REACH, SIGNAL, TINY, feature_distance, load, store};
 use croupier_simd::F32x8;
 
 /// Weights of the taps: the product of (1 2 1)/4 in both directions.
@@ -38,8 +38,7 @@ pub(super) fn smooth(grid: Grid, step: usize, factor2: f32, from: &[f32], featur
                     }
                     let d: [F32x8; 3] = core::array::from_fn(|c| load(e_row, c * s + q) - e[c]);
                     let variance_q = load(e_row, 3 * s + q);
-                    let g: [F32x8; 6] = core::array::from_fn(|c| (load(f_row, c * s + q) - f[c]).sqr());
-                    let unlike = ((g[0] + g[1]) + (g[2] + g[3])) + (g[4] + g[5]);
+                    let unlike = feature_distance(f_row, s, q, &f);
                     let apart = (d[0].sqr() + d[1].sqr() + d[2].sqr()) * inverse / (variance + variance_q + TINY);
                     let w = F32x8::ZERO.max(1.0 - apart - unlike).sqr() * kernel;
                     for c in 0..3 {

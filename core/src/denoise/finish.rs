@@ -1,7 +1,8 @@
 //! From scratch memory to the result: the level put right, color multiplied by albedo.
 
-use super::prepare::Pixels;
-use super::{FEATURES, Grid, MARGIN, Noisy, REACH, SIGNAL, TINY, load};
+use super::grid::{FEATURES, Grid, MARGIN, REACH, SIGNAL, TINY, load};
+use super::noisy::Noisy;
+use super::pixels::Pixels;
 use croupier_simd::F32x8;
 
 /// Squared relative reach (`REACH`) above which a pixel takes part in the correction of the level.

@@ -1,6 +1,7 @@
 //! The denoiser's planes in one piece of memory, filled from a film.
 
-use super::{DenoiseError, Noisy, Part, denoise};
+use super::denoise;
+use super::noisy::{DenoiseError, Noisy, Part};
 use crate::film::{PixelAov, PixelStats};
 
 /// Input and result of [`denoise`], carved out of one slice: fill every pixel with [`Planes::set`], call

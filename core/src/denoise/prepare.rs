@@ -1,60 +1,19 @@
 //! From the caller's planes to scratch memory: absent pixels filled, color divided by albedo, variance made robust.
 
-use super::{
-    ALBEDO_FLOOR, ALBEDO_WEIGHT, COLOR_LIMIT, DESPECKLE, FEATURES, Grid, MARGIN, NORMAL_WEIGHT, NOWHERE, Noisy, REACH,
-    SIGNAL, load, store,
-};
+use super::grid::{FEATURES, Grid, MARGIN, NOWHERE, REACH, SIGNAL, feature_distance, load, store};
+use super::noisy::Noisy;
+use super::pixels::{Pixels, load_or};
 use croupier_simd::{F32x8, Mask8};
 
 /// Variance of a pixel that is still to be filled.
 const ABSENT: f32 = -1.0;
 
-/// Eight neighbouring pixels of a row as the filter sees them.
-pub(super) struct Pixels {
-    /// Which are in the picture and finite.
-    pub present: Mask8,
-    /// Color divided by albedo; 0 unless present.
-    pub e: [F32x8; 3],
-    /// Variance of `e`, summed over rgb; 0 unless present.
-    pub variance: F32x8,
-    /// The albedo that it is divided by.
-    pub divisor: [F32x8; 3],
-    albedo: [F32x8; 3],
-}
-
-impl Pixels {
-    /// Pixels `x`, `x + 1`, ... of row `y`. The same bits whenever it is called.
-    #[inline(always)]
-    pub(super) fn read(noisy: &Noisy<'_>, grid: Grid, x: usize, y: usize) -> Self {
-        let at = y * grid.columns + x;
-        let mut present = Mask8::first(grid.columns.saturating_sub(x));
-        let albedo: [F32x8; 3] = core::array::from_fn(|c| gather(noisy.albedo[c], at, 1.0).clamp(0.0, 1.0));
-        let divisor = albedo.map(|a| a.max(F32x8::splat(ALBEDO_FLOOR)));
-        let color: [F32x8; 3] = core::array::from_fn(|c| gather(noisy.color[c], at, 0.0));
-        let square: [F32x8; 3] = core::array::from_fn(|c| gather(noisy.variance[c], at, 0.0));
-        for c in 0..3 {
-            // Comparisons with NaN are false.
-            present &= color[c].abs().le(F32x8::splat(COLOR_LIMIT));
-            present &= square[c].le(F32x8::splat(COLOR_LIMIT * COLOR_LIMIT));
-        }
-        let mut variance = F32x8::ZERO;
-        let e = core::array::from_fn(|c| {
-            let inverse = 1.0 / divisor[c];
-            variance += F32x8::ZERO.max(square[c]) * inverse.sqr();
-            present.zero_unless(color[c] * inverse)
-        });
-        Self { present, e, variance: present.zero_unless(variance), divisor, albedo }
-    }
-}
-
-/// Eight values from `at`, `default` where there are none.
-#[inline(always)]
-fn gather(plane: &[f32], at: usize, default: f32) -> F32x8 {
-    match plane.get(at..).and_then(|p| p.first_chunk()) {
-        Some(a) => F32x8::new(*a),
-        None => F32x8::from_fn(|i| plane.get(at + i).copied().unwrap_or(default)),
-    }
-}
+/// Per squared distance of two normals, 1 separates. See `MEMBERSHIP`.
+const NORMAL_WEIGHT: f32 = 3.5;
+/// Per squared distance of two albedos. See `MEMBERSHIP`.
+const ALBEDO_WEIGHT: f32 = 3.0;
+/// Standard errors by which a pixel may be moved towards its neighbours.
+const DESPECKLE: f32 = 3.0;
 
 /// Fills `signal` and `features`; `other` is the block that the first level will write.
 pub(super) fn prepare(noisy: &Noisy<'_>, grid: Grid, signal: &mut [f32], other: &mut [f32], features: &mut [f32]) {
@@ -83,7 +42,7 @@ pub(super) fn prepare(noisy: &Noisy<'_>, grid: Grid, signal: &mut [f32], other: 
             store(v_row, 3 * s + x, missing.select(F32x8::splat(ABSENT), p.variance));
             for c in 0..3 {
                 store(e_row, c * s + x, p.e[c]);
-                let n = gather(noisy.normal[c], y * grid.columns + column, 0.0);
+                let n = load_or(noisy.normal[c], y * grid.columns + column, 0.0);
                 // A NaN becomes -1: some normal, which only its own pixel is judged by.
                 let n = n.clamp(-1.0, 1.0) * normal_scale;
                 let outside = if c == 0 { NOWHERE } else { 0.0 };
@@ -150,8 +109,7 @@ fn smooth_variance(grid: Grid, from: &[f32], to: &mut [f32], features: &mut [f32
                     continue;
                 }
                 for q in (x - 1..x + 2).filter(|&q| d != 1 || q != x) {
-                    let g: [F32x8; 6] = core::array::from_fn(|c| (load(f_row, c * s + q) - f[c]).sqr());
-                    let unlike = ((g[0] + g[1]) + (g[2] + g[3])) + (g[4] + g[5]);
+                    let unlike = feature_distance(f_row, s, q, &f);
                     let w = F32x8::ZERO.max(1.0 - unlike) * if d == 1 || q == x { 2.0 } else { 1.0 };
                     sum += w * F32x8::ZERO.max(load(v_row, 3 * s + q));
                     total += w;

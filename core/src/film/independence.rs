@@ -2,7 +2,9 @@
 //! squared difference of the picture before and an iteration is the sum of their true variances, whatever happens
 //! within.
 
-use super::{PixelStats, PixelSums, SqrtNewton, relative_denominator};
+use super::error::relative_denominator;
+use super::pixel::{PixelStats, PixelSums};
+use super::sqrt::SqrtNewton;
 
 /// Sums over the pixels of an iteration that is being merged: by how much it differs from the picture before, and by
 /// how much it should if the samples of each were independent. Relative, as relMSE is.

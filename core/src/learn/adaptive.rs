@@ -5,10 +5,10 @@
 //! variance is mostly noise. Every pixel has one sample at least, and an iteration counts as much in all of them: were
 //! samples pooled, a pixel that happened to look dark and smooth would keep its error for ever.
 
-use super::estimate::{Pixels, tile_of, tiles};
+use super::estimate::Pixels;
 use crate::film::{Film, SqrtNewton};
 use crate::memory::{Carver, Measure, MemoryError};
-use crate::tiles::TILE;
+use crate::tiles::{BlockGrid, film_index};
 
 /// Least and greatest share of a pixel in the samples beyond its first, relative to what the mean pixel wishes.
 const SHARES: [f64; 2] = [0.25, 8.0];
@@ -25,11 +25,11 @@ pub(super) struct SampleAllocation<'m> {
 
 impl<'m> SampleAllocation<'m> {
     pub(super) fn measure(m: Measure, size: [u32; 2], adaptive: bool) -> Measure {
-        m.add::<u32>(if adaptive { tiles(size) } else { 0 })
+        m.add::<u32>(if adaptive { BlockGrid::tiles(size).count() } else { 0 })
     }
 
     pub(super) fn carve(c: &mut Carver<'m>, size: [u32; 2], adaptive: bool) -> Result<Self, MemoryError> {
-        Ok(Self { size, counts: c.take(if adaptive { tiles(size) } else { 0 })?, samples: 1 })
+        Ok(Self { size, counts: c.take(if adaptive { BlockGrid::tiles(size).count() } else { 0 })?, samples: 1 })
     }
 
     /// Samples of each pixel of a tile.
@@ -43,7 +43,7 @@ impl<'m> SampleAllocation<'m> {
         if self.counts.is_empty() {
             return 1.0;
         }
-        let n = self.of_tile(tile_of(self.size, film) as u32);
+        let n = self.of_tile(BlockGrid::tiles(self.size).of_pixel(film));
         if n > 0 { f64::from(n) / f64::from(self.samples.max(1)) } else { 1.0 }
     }
 
@@ -85,29 +85,22 @@ impl<'m> SampleAllocation<'m> {
         }
     }
 
-    /// First pixel of a tile, and the one behind its last.
-    fn corners(&self, tile: u32) -> [[u32; 2]; 2] {
-        let columns = self.size[0].div_ceil(TILE);
-        let first = [tile % columns * TILE, tile / columns * TILE];
-        [first, [0, 1].map(|a| (first[a] + TILE).min(self.size[a]))]
-    }
-
     /// Pixels of a tile.
     fn area(&self, tile: u32) -> f64 {
-        let [from, to] = self.corners(tile);
-        f64::from((to[0] - from[0]) * (to[1] - from[1]))
+        f64::from(BlockGrid::tiles(self.size).area(tile))
     }
 
     /// sqrt(variance / cost) of a tile's samples. Pixels count their rays, of whatever kind, so the cost is their
     /// number.
     fn desired_density(&self, tile: u32, film: &Film<'_>, pixels: &Pixels<'_>) -> f64 {
-        let [from, to] = self.corners(tile);
+        let [from, to] = BlockGrid::tiles(self.size).corners(tile);
         let (mut error, mut rays) = (0.0, 0.0);
         for y in from[1]..to[1] {
             for x in from[0]..to[0] {
-                let i = y * self.size[0] + x;
-                let Some(p) = film.pixels().get(i as usize) else { continue };
-                let e = p.variance_of_mean().into_iter().zip(pixels.error_weight(i)).map(|(v, w)| v * f64::from(w));
+                let i = film_index(self.size, [x, y]);
+                let Some(p) = film.pixels().get(i) else { continue };
+                let e =
+                    p.variance_of_mean().into_iter().zip(pixels.error_weight(i as u32)).map(|(v, w)| v * f64::from(w));
                 error += e.sum::<f64>() * p.samples as f64;
                 rays += p.rays as f64 / p.samples.max(1) as f64;
             }

@@ -5,7 +5,7 @@ use super::settings::{Learning, Objective, PixelEstimator};
 use crate::denoise::{self, Planes};
 use crate::film::{Film, REL_MSE_EPSILON};
 use crate::memory::{Carver, Measure, MemoryError};
-use crate::tiles::TILE;
+use crate::tiles::BlockGrid;
 
 /// Where the values are.
 #[derive(Debug)]
@@ -28,18 +28,6 @@ pub(super) struct Pixels<'m> {
     given: bool,
 }
 
-/// Tiles of a picture.
-pub(super) fn tiles(size: [u32; 2]) -> usize {
-    let [w, h] = size.map(|n| n.div_ceil(TILE) as usize);
-    w * h
-}
-
-/// The tile around a pixel.
-pub(super) fn tile_of(size: [u32; 2], film: u32) -> usize {
-    let (x, y) = (film % size[0] / TILE, film / size[0] / TILE);
-    (y * size[0].div_ceil(TILE) + x) as usize
-}
-
 impl<'m> Pixels<'m> {
     pub(super) fn measure(m: Measure, size: [u32; 2], features: bool, how: Option<PixelEstimator>) -> Measure {
         match how {
@@ -47,7 +35,7 @@ impl<'m> Pixels<'m> {
             Some(PixelEstimator::Denoised) => {
                 m.add::<f32>(Planes::len(size, features)).add::<f32>(denoise::scratch_len(size))
             }
-            Some(PixelEstimator::Blocks) => (0..3).fold(m, |m, _| m.add::<f32>(tiles(size))),
+            Some(PixelEstimator::Blocks) => (0..3).fold(m, |m, _| m.add::<f32>(BlockGrid::tiles(size).count())),
         }
     }
 
@@ -68,7 +56,8 @@ impl<'m> Pixels<'m> {
                 Values::Denoised { planes, scratch: c.take(denoise::scratch_len(size))? }
             }
             Some(PixelEstimator::Blocks) => {
-                Values::Blocks([c.take(tiles(size))?, c.take(tiles(size))?, c.take(tiles(size))?])
+                let tiles = BlockGrid::tiles(size).count();
+                Values::Blocks([c.take(tiles)?, c.take(tiles)?, c.take(tiles)?])
             }
         };
         Ok(Self { size, relative: learning.objective == Objective::Relative, values, known: false, given: false })
@@ -85,7 +74,7 @@ impl<'m> Pixels<'m> {
         let (planes, i) = match &self.values {
             Values::None => return [0.0; 3],
             Values::Denoised { planes, .. } => (planes.out.each_ref(), film as usize),
-            Values::Blocks(planes) => (planes.each_ref(), tile_of(self.size, film)),
+            Values::Blocks(planes) => (planes.each_ref(), BlockGrid::tiles(self.size).of_pixel(film) as usize),
         };
         planes.map(|p| p.get(i).copied().unwrap_or(0.0))
     }
@@ -152,15 +141,13 @@ impl<'m> Pixels<'m> {
                 let _ = planes.denoise(scratch);
             }
             Values::Blocks(planes) => {
-                let [w, h] = self.size;
+                let tiles = BlockGrid::tiles(self.size);
                 planes.iter_mut().for_each(|p| p.fill(0.0));
                 for (i, p) in film.pixels().iter().enumerate() {
-                    let (x, y) = (i as u32 % w, i as u32 / w);
-                    let sides = [w - x / TILE * TILE, h - y / TILE * TILE];
-                    let area = f64::from(sides.map(|n| n.min(TILE)).iter().product::<u32>());
-                    let at = tile_of(self.size, i as u32);
+                    let tile = tiles.of_pixel(i as u32);
+                    let area = f64::from(tiles.area(tile));
                     for (plane, mean) in planes.iter_mut().zip(p.mean()) {
-                        if let Some(sum) = plane.get_mut(at) {
+                        if let Some(sum) = plane.get_mut(tile as usize) {
                             *sum += (mean / area) as f32;
                         }
                     }

@@ -1,7 +1,7 @@
 //! The session's side of learning: everything learned, frozen while an iteration runs.
 
 use super::adaptive::SampleAllocation;
-use super::cache::{Cache, Training};
+use super::cache::{BINS, Cache, NO_BIN, Training, VertexKind8};
 use super::estimate::Pixels;
 use super::needs::Needs;
 use super::picture::{Picture, PictureStatistics, Visit};
@@ -12,11 +12,11 @@ use crate::film::Film;
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::rrs::{Learned8, Space};
 use crate::scene::Scene;
-
+use crate::tiles::BlockGrid;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
-/// Bins of path lengths per block of pixels, for statistics over the picture.
-const DEPTHS: u32 = 16;
+/// Bins of path lengths per block of pixels, for statistics over the picture: those of a leaf, whose place it takes.
+const DEPTHS: u32 = BINS as u32;
 
 /// Everything learned.
 #[derive(Debug)]
@@ -47,8 +47,8 @@ impl<'m> LearnedState<'m> {
         let mut cache = n.cache.map(|size| Cache::carve(c, size, bounds, n.learning.objective)).transpose()?;
         let mut block = 1;
         if let Some(cache) = cache.as_mut().filter(|_| n.space == Some(Space::Image)) {
-            let blocks = |side: u32| n.size.map(|n| u64::from(n.div_ceil(side))).iter().product::<u64>();
-            while blocks(block) > u64::from(cache.size().leaves()) {
+            let blocks = |side: u32| BlockGrid::new(n.size, side).count();
+            while blocks(block) > cache.size().leaves() as usize {
                 block += 1;
             }
             cache.flatten(blocks(block) as u32);
@@ -81,17 +81,23 @@ impl<'m> LearnedState<'m> {
 
     /// See [`Cache::find_jittered`].
     #[inline]
-    pub(crate) fn scene_bins(&self, kind: U32x8, p: Vec3x8, dir: Vec3x8, jitter: [F32x8; 3], active: Mask8) -> U32x8 {
+    pub(crate) fn scene_bins(
+        &self,
+        kind: VertexKind8,
+        p: Vec3x8,
+        dir: Vec3x8,
+        jitter: [F32x8; 3],
+        active: Mask8,
+    ) -> U32x8 {
         match &self.cache {
             Some(c) => c.find_jittered(kind, p, dir, jitter, active),
-            None => U32x8::splat(u32::MAX),
+            None => U32x8::splat(NO_BIN),
         }
     }
 
     /// The bin of path length `depth` under a pixel.
     pub(crate) fn image_bin(&self, film: u32, depth: u32) -> u32 {
-        let (x, y) = (film % self.size[0] / self.block, film / self.size[0] / self.block);
-        (y * self.size[0].div_ceil(self.block) + x) * DEPTHS + depth.clamp(1, DEPTHS) - 1
+        BlockGrid::new(self.size, self.block).of_pixel(film) * DEPTHS + depth.clamp(1, DEPTHS) - 1
     }
 
     /// Begins an iteration of `samples` camera samples per pixel in the mean.
@@ -117,7 +123,7 @@ impl<'m> LearnedState<'m> {
     pub(crate) fn bins_towards(&self, bin: U32x8, dir: Vec3x8, active: Mask8) -> U32x8 {
         match &self.cache {
             Some(c) => c.bins_towards(bin, dir, active),
-            None => U32x8::splat(u32::MAX),
+            None => U32x8::splat(NO_BIN),
         }
     }
 

@@ -7,16 +7,12 @@
 //! How it works as a whole, where it departs from the papers, and what is not done: docs/LEARNING.md.
 
 mod adaptive;
-mod bins;
 pub mod cache;
 mod estimate;
 mod learned_state;
 mod needs;
 mod picture;
-mod save;
 mod settings;
-mod training;
-mod tree;
 
 pub use learned_state::LearnedState;
 pub(crate) use needs::Needs;

@@ -122,10 +122,5 @@ fn error_of(film: u32, p: &PixelSums, norm: Norm, pixels: &Pixels<'_>, allocatio
         let square = (p.sum_sqr[c] - 2.0 * x * p.sum[c]) / n + x * x;
         square.max(0.0) * f64::from(error_weight[c]) / share
     };
-    let [r, g, b] = [error(0), error(1), error(2)];
-    match norm {
-        Norm::Max => r.max(g).max(b),
-        Norm::Mean => (r + g + b) / 3.0,
-        Norm::Luminance => 0.2126 * r + 0.7152 * g + 0.0722 * b,
-    }
+    norm.of_color([error(0), error(1), error(2)])
 }

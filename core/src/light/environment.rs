@@ -18,10 +18,11 @@
 //! nearer pole, and cos a - cos b is taken as 2 sin((a + b) / 2) sin((b - a) / 2) (compare NUMERICS SMP-8).
 
 use super::power::{pick, probability};
-use super::{LightSample8, LightSelector, usable};
+use super::{Chosen, LightModel, LightSample8, LightSelector, SceneExtent, usable};
 use crate::scene::Scene;
-use crate::scene::blob::{Alias, Environment, EnvironmentKind, NONE};
+use crate::scene::blob::{Alias, Environment, EnvironmentKind, Light, NONE};
 use core::f32::consts::{FRAC_1_PI, TAU};
+use core::f64::consts::PI;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// 1 / (4 pi).
@@ -197,29 +198,40 @@ fn map_density(scene: &Scene<'_>, e: &Environment, at: &Place, c: [Vec3x8; 4], m
     (mask & usable(pdf)).zero_unless(pdf)
 }
 
-/// The environment's light sample in the lanes of `mask`; `pdf` without the selection probability.
-#[inline(always)]
-pub(super) fn sample(scene: &Scene<'_>, words: [U32x8; 3], mask: Mask8) -> LightSample8 {
-    let Some(e) = scene.environment else { return LightSample8::NONE };
-    let (wi, radiance, pdf) = if e.kind == EnvironmentKind::Map as u32 {
-        let wi = sample_map(scene, e, words, mask);
-        let at = place(e, to_local(e, wi));
-        let c = corners(scene, e, &at, mask);
-        (wi, bilinear(c, at.x, at.y) * splat(e.radiance), map_density(scene, e, &at, c, mask))
-    } else {
-        let [u0, u1] = [words[0], words[1]].map(U32x8::to_unit);
-        let (sin, cos) = u1.sin_cos_2pi();
-        let sin_theta = (u0 * (1.0 - u0)).safe_sqrt() * 2.0;
-        let wi = Vec3x8::new(sin_theta * cos, 1.0 - u0 * 2.0, sin_theta * sin);
-        (wi, splat(e.radiance), F32x8::splat(UNIFORM_SPHERE))
-    };
-    LightSample8 {
-        wi,
-        radiance,
-        pdf,
-        infinite: Mask8::all_lanes(),
-        valid: mask & pdf.gt(F32x8::ZERO),
-        ..LightSample8::NONE
+/// Light from infinity.
+pub(super) struct Surroundings;
+
+impl LightModel for Surroundings {
+    const DELTA: bool = false;
+
+    #[inline(always)]
+    fn sample(scene: &Scene<'_>, _: &Chosen<'_>, _: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8 {
+        let Some(e) = scene.environment else { return LightSample8::NONE };
+        let (wi, radiance, pdf) = if e.kind == EnvironmentKind::Map as u32 {
+            let wi = sample_map(scene, e, words, mask);
+            let at = place(e, to_local(e, wi));
+            let c = corners(scene, e, &at, mask);
+            (wi, bilinear(c, at.x, at.y) * splat(e.radiance), map_density(scene, e, &at, c, mask))
+        } else {
+            let [u0, u1] = [words[0], words[1]].map(U32x8::to_unit);
+            let (sin, cos) = u1.sin_cos_2pi();
+            let sin_theta = (u0 * (1.0 - u0)).safe_sqrt() * 2.0;
+            let wi = Vec3x8::new(sin_theta * cos, 1.0 - u0 * 2.0, sin_theta * sin);
+            (wi, splat(e.radiance), F32x8::splat(UNIFORM_SPHERE))
+        };
+        LightSample8 {
+            wi,
+            radiance,
+            pdf,
+            infinite: Mask8::all_lanes(),
+            valid: mask & pdf.gt(F32x8::ZERO),
+            ..LightSample8::NONE
+        }
+    }
+
+    /// Through a disk of the scene's radius.
+    fn power(_: &Light, scene: &SceneExtent) -> f64 {
+        PI * scene.radius * scene.radius * scene.environment
     }
 }
 

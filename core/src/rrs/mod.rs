@@ -1,6 +1,6 @@
 //! Russian roulette and splitting: how many samples a vertex gets.
 //!
-//! A strategy gives a real factor `s` per lane; [`comb`] rounds the factors of a packet to sample counts with
+//! A strategy gives a real factor `s` per lane; [`comb()`] rounds the factors of a packet to sample counts with
 //! E\[n\] = s. Every estimate is divided by `s`, never by `n`, so any positive `s` that was fixed before the samples
 //! were drawn leaves the mean alone (EARS, SIGGRAPH 2022, eq. 10). How `s` is learned: docs/LEARNING.md.
 //!

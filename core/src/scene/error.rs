@@ -15,17 +15,18 @@ pub enum Field {
     TextureCoordinate,
     /// Bounds: smallest not above largest, and around every triangle.
     Bounds,
-    /// Reflectance or tabulated transmittance, 0 to 1.
+    /// Reflectance or tabulated transmittance, [`super::blob::REFLECTANCE_RANGE`].
     Reflectance,
     /// GGX width, [`super::blob::ALPHA_RANGE`].
     Alpha,
-    /// Refractive index: relative, [`super::blob::ETA_RANGE`]; of a conductor, 0 to [`super::blob::MAX_CONDUCTOR`].
+    /// Refractive index: relative, [`super::blob::ETA_RANGE`]; of a conductor, [`super::blob::CONDUCTOR_RANGE`].
     Eta,
-    /// Extinction of a conductor, 0 to [`super::blob::MAX_CONDUCTOR`], not 0 together with eta.
+    /// Extinction of a conductor, [`super::blob::CONDUCTOR_RANGE`]; the larger of it and eta from
+    /// [`super::blob::MIN_CONDUCTOR`].
     Extinction,
-    /// Internal diffuse reflectance, 0 up to but without 1.
+    /// Internal diffuse reflectance, [`super::blob::FDR_RANGE`].
     InternalReflectance,
-    /// Emission, 0 to [`super::blob::MAX_EMISSION`]; of an area light, that of its triangle's material.
+    /// Emission, 0 to [`super::blob::MAX_EMISSION`].
     Emission,
     /// Area, above 0 and that of the light's triangle within 1e-3.
     Area,

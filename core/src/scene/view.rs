@@ -39,7 +39,7 @@ pub struct Records<'s> {
     pub tables: &'s [f32],
     /// Lights.
     pub lights: &'s [Light],
-    /// Alias table over the lights; empty if no light has a probability above 0.
+    /// Alias table over the lights; may be empty if no light emits.
     pub light_alias: &'s [Alias],
     /// The environment, if any.
     pub environment: Option<&'s Environment>,

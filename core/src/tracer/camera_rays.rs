@@ -65,14 +65,15 @@ impl CameraCursor {
     }
 }
 
-/// Up to eight camera rays of shard `index`. `None` when the cursor ran out within empty slots.
+/// Up to eight camera rays of shard `index`; none when the cursor ran out within empty slots.
+#[inline(always)]
 pub(crate) fn camera_rays<W: World>(
     world: &W,
     job: &Job,
     index: u32,
     cursor: &mut CameraCursor,
     book: &mut Bookkeeping<'_>,
-) -> Option<RayState8> {
+) -> RayState8 {
     let (settings, tiles, learned, iteration) = (&job.settings, &job.tiles, world.learned(), world.iteration());
     // numbers of one pixel must not come back in another iteration, however many samples it had
     let (seed, first_sample) = match settings.adaptive {
@@ -95,9 +96,6 @@ pub(crate) fn camera_rays<W: World>(
         (root[lanes], record[lanes]) = opened;
         lanes += 1;
     }
-    if lanes == 0 {
-        return None;
-    }
     let key = Key8::camera(seed, U32x8::new(pixel), U32x8::new(sample));
     let [u0, u1, u2, u3] = key.pixel_and_lens();
     let px = F32x8::from_fn(|i| x[i] as f32) + u0;
@@ -105,7 +103,7 @@ pub(crate) fn camera_rays<W: World>(
     let lens = if W::EFFECTS.contains(Effects::LENS) { [u2, u3] } else { [F32x8::ZERO; 2] };
     let (o, d) = camera::generate(world.scene().camera, settings.size, px, py, lens);
     book.counters.camera_rays += lanes as u64;
-    Some(RayState8 {
+    RayState8 {
         active: Mask8::first(lanes),
         ray: Ray8::unbounded(o, d),
         from: o,
@@ -118,5 +116,5 @@ pub(crate) fn camera_rays<W: World>(
         key: key.next_vertex(),
         albedo_product: F32x8::ONE,
         error_weight: Vec3x8::from_fn(|i| weight[i]),
-    })
+    }
 }

@@ -11,14 +11,12 @@
 //! contain it are incomplete, so they are not logged either. Nothing else changes; the image never passes through here.
 
 use super::free_list::FreeList;
+pub(crate) use crate::learn::cache::NO_BIN;
 use crate::memory::{Carver, Measure, MemoryError};
 use bytemuck::{Pod, Zeroable};
 
 /// No record.
 pub(crate) const NO_RECORD: u32 = u32::MAX;
-
-/// The bin of vertices whose samples are not learned from.
-pub(crate) const NO_BIN: u32 = u32::MAX;
 
 /// Part of a sample's estimate is missing.
 const INCOMPLETE: u32 = 1 << 31;

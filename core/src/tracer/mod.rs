@@ -38,6 +38,8 @@ mod scatter;
 mod settle;
 mod shading;
 mod shard;
+#[cfg(test)]
+mod stage_tests;
 mod trace;
 mod vertex;
 

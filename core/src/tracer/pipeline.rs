@@ -11,10 +11,11 @@
 //! Stages compute packets from packets and read nothing but the [`World`]; what outlives the packet goes to the books
 //! ([`Bookkeeping`](super::book::Bookkeeping)) or, as waiting vertices, to the [`Ring`](super::ring::Ring).
 
+use super::camera_rays::camera_rays;
 use super::emission;
 use super::nee::{sample_lights, shadow_rays};
 use super::occlude::occlude;
-use super::refill::{Refill, refill};
+use super::refill::{Refill, refill, samples};
 use super::roulette::roulette;
 use super::scatter::scatter;
 use super::settle::settle;
@@ -32,11 +33,11 @@ pub(super) fn turn<W: World>(shard: &mut Shard<'_>, world: &W) -> bool {
     let Shard { job, cursor, ring, book, comb, .. } = shard;
     let settings = &job.settings;
 
-    let rays = match refill(world, job, index, cursor, ring, book) {
+    let rays = match refill(cursor, ring, book) {
         Refill::Done => return false,
-        Refill::Empty => return true,
-        Refill::Camera(rays) => rays,
-        Refill::Samples(samples) => {
+        Refill::Camera => camera_rays(world, job, index, cursor, book),
+        Refill::Samples(taken) => {
+            let samples = samples(world, ring, book, &taken);
             let light = sample_lights(world, &samples);
             let scattered = scatter(world, &samples, light.as_ref().map(|l| l.wi));
             if let Some(light) = light {
@@ -101,7 +102,7 @@ pub(super) fn turn<W: World>(shard: &mut Shard<'_>, world: &W) -> bool {
         return true;
     }
 
-    let decision = roulette(world, settings, book, comb, ring.free(), &arrival);
+    let decision = roulette(world, settings, book, comb, ring.free(), &mut arrival);
     settle(book, ring, &arrival, &decision);
     book.counters.ring_peak = book.counters.ring_peak.max(ring.waiting() as u64);
     true

@@ -2,12 +2,10 @@
 //! eight camera samples.
 
 use super::book::Bookkeeping;
-use super::camera_rays::{CameraCursor, camera_rays};
+use super::camera_rays::CameraCursor;
 use super::class::{PacketClass, Queue};
-use super::job::Job;
 use super::path::Path8;
-use super::ray_state::RayState8;
-use super::ring::{RESERVE, Ring};
+use super::ring::{RESERVE, Ring, Taken8};
 use super::vertex::PathVertex8;
 use crate::rng::Key8;
 use crate::world::World;
@@ -33,54 +31,47 @@ pub(crate) struct Samples8 {
 }
 
 /// What a packet is filled with.
-#[expect(clippy::large_enum_variant, reason = "taken apart at once by its only caller")]
+#[derive(Clone, Copy, Debug)]
 pub(crate) enum Refill {
     /// Samples of waiting vertices.
-    Samples(Samples8),
-    /// Camera rays.
-    Camera(RayState8),
-    /// No lane this time; there may be some next time.
-    Empty,
+    Samples(Taken8),
+    /// Camera samples.
+    Camera,
     /// Nothing, and nothing will come.
     Done,
 }
 
-/// The next packet of shard `index`.
+/// Decides what the next packet is filled with, and takes samples out of the ring: those of the fullest queue, or of
+/// the next from which one fits. They are booked on their roots and ledger records: a lane each, less the vertex if it
+/// is drained.
 #[inline(always)]
-pub(crate) fn refill<W: World>(
-    world: &W,
-    job: &Job,
-    index: u32,
-    cursor: &mut CameraCursor,
-    ring: &mut Ring<'_>,
-    book: &mut Bookkeeping<'_>,
-) -> Refill {
+pub(crate) fn refill(cursor: &CameraCursor, ring: &mut Ring<'_>, book: &mut Bookkeeping<'_>) -> Refill {
     let room = ring.free() >= 2 * RESERVE && !cursor.is_finished();
     match ring.fullest() {
         Some((fullest, pending)) if pending >= 8 || !room => {
-            samples(world.max_depth(), fullest, ring, book).map_or(Refill::Empty, Refill::Samples)
+            let mut take = |q| ring.take(q, |v, lanes, drained| book.draw(v, lanes, drained));
+            take(fullest).or_else(|| Queue::all().find_map(take)).map_or(Refill::Done, Refill::Samples)
         }
-        _ if room => camera_rays(world, job, index, cursor, book).map_or(Refill::Empty, Refill::Camera),
+        _ if room => Refill::Camera,
         _ => Refill::Done,
     }
 }
 
-/// Samples of the fullest queue, or of the next from which a sample fits; booked on their roots and ledger records: a
-/// lane each, less the vertex if it is drained.
-fn samples(max_depth: u32, fullest: Queue, ring: &mut Ring<'_>, book: &mut Bookkeeping<'_>) -> Option<Samples8> {
-    let mut queues = core::iter::once(fullest).chain(Queue::all());
-    let batch = queues.find_map(|q| ring.take(q, |v, lanes, drained| book.draw(v, lanes, drained)))?;
-    let v = batch.vertex;
-    let active = Mask8::first(batch.lanes);
-    book.counters.scatter.count(batch.lanes as u32);
-    book.counters.vertex_samples += batch.lanes as u64;
-    Some(Samples8 {
+/// A packet of the samples that were just taken.
+#[inline(always)]
+pub(crate) fn samples<W: World>(world: &W, ring: &Ring<'_>, book: &mut Bookkeeping<'_>, taken: &Taken8) -> Samples8 {
+    let vertex = ring.vertices(taken);
+    let active = Mask8::first(taken.lanes);
+    let (class, with_nee) = (taken.queue.class(), taken.queue.with_nee());
+    book.counters.scatter.count(taken.lanes as u32);
+    book.counters.vertex_samples += taken.lanes as u64;
+    Samples8 {
         active,
-        continues: active & v.path.depth.lt(U32x8::splat(max_depth)),
-        class: batch.class,
-        with_nee: batch.with_nee,
-        path: Path8 { record: book.open_samples(v.path.record, batch.lanes, batch.with_nee), ..v.path },
-        key: v.key.sample(batch.sample),
-        vertex: v,
-    })
+        continues: active & vertex.path.depth.lt(U32x8::splat(world.max_depth())),
+        class,
+        with_nee,
+        path: Path8 { record: book.open_samples(vertex.path.record, taken.lanes, with_nee), ..vertex.path },
+        key: vertex.key.sample(taken.sample),
+        vertex,
+    }
 }

@@ -39,17 +39,15 @@ pub(crate) const BYTES_PER_VERTEX: usize = size_of::<PathVertex>() + size_of::<u
 
 /// Samples of one queue for one packet.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct SampleBatch8 {
-    /// Vertices, one per lane; lanes from `lanes` on repeat lane 0.
-    pub vertex: PathVertex8,
+pub(crate) struct Taken8 {
+    /// Slots of their vertices ([`Ring::vertices`]), one per lane; lanes from `lanes` on repeat lane 0.
+    slots: [u32; 8],
     /// Number of the sample within its vertex.
     pub sample: U32x8,
     /// How many lanes are filled.
     pub lanes: usize,
-    /// Kernel that they need.
-    pub class: PacketClass,
-    /// Do they draw light samples?
-    pub with_nee: bool,
+    /// Where they waited.
+    pub queue: Queue,
 }
 
 /// All waiting vertices of a shard.
@@ -163,7 +161,7 @@ impl<'m> Ring<'m> {
     /// Takes up to eight samples from a queue, but only so many that there is a slot for each vertex they may lead to.
     /// A vertex that has no light samples left goes over to the other queue of its class. Calls
     /// `taken(vertex, lanes, drained)` per vertex. `None` if no sample fits.
-    pub(crate) fn take(&mut self, queue: Queue, mut taken: impl FnMut(&PathVertex, u32, bool)) -> Option<SampleBatch8> {
+    pub(crate) fn take(&mut self, queue: Queue, mut taken: impl FnMut(&PathVertex, u32, bool)) -> Option<Taken8> {
         let q = queue.index();
         let (mut slot, mut sample) = ([0u32; 8], [0u32; 8]);
         let (mut lanes, mut room) = (0usize, self.free_len);
@@ -208,9 +206,13 @@ impl<'m> Ring<'m> {
         }
         let first = slot[0];
         slot[lanes..].fill(first);
-        let vertex = PathVertex8::from_records(slot.map(|s| &self.slots[s as usize]));
-        let (class, with_nee) = (queue.class(), queue.with_nee());
-        Some(SampleBatch8 { vertex, sample: U32x8::new(sample), lanes, class, with_nee })
+        Some(Taken8 { slots: slot, sample: U32x8::new(sample), lanes, queue })
+    }
+
+    /// The vertices of samples that were just taken: before anything else is stored.
+    #[inline(always)]
+    pub(crate) fn vertices(&self, taken: &Taken8) -> PathVertex8 {
+        PathVertex8::from_records(taken.slots.map(|s| &self.slots[s as usize]))
     }
 }
 
@@ -256,7 +258,7 @@ mod tests {
                         let mut queues = ring.fullest().map(|(q, _)| q).into_iter().chain(Queue::all());
                         let batch = queues.find_map(|q| ring.take(q, |_, _, _| ()));
                         let batch = batch.expect("some queue must always have a sample that fits");
-                        waiting_nee -= if batch.with_nee { batch.lanes as u64 } else { 0 };
+                        waiting_nee -= if batch.queue.with_nee() { batch.lanes as u64 } else { 0 };
                         assert!(ring.free() >= batch.lanes, "a lane has no slot to go on to");
                         taken += batch.lanes as u64;
                         batch.lanes
@@ -299,15 +301,16 @@ mod tests {
             assert_eq!((ring.waiting(), ring.free()), (4, 12));
             let mut order = Vec::new();
             let batch = ring.take(a.queue(true), |v, lanes, drained| order.push((v.count(), lanes, drained))).unwrap();
-            assert_eq!((batch.lanes, batch.class, batch.with_nee), (3, a, true));
+            assert_eq!((batch.lanes, batch.queue), (3, a.queue(true)));
             assert_eq!(order, [(1, 1, false), (0, 1, true), (2, 1, false)]);
             order.clear();
             let batch = ring.take(a.queue(false), |v, lanes, drained| order.push((v.count(), lanes, drained))).unwrap();
-            assert_eq!((batch.lanes, batch.class, batch.with_nee), (3, a, false));
+            assert_eq!((batch.lanes, batch.queue), (3, a.queue(false)));
             assert_eq!(order, [(0, 2, true), (0, 1, true)]);
             assert_eq!(batch.sample.to_array()[..3], [1, 2, 1], "numbers of samples go on where they were");
             assert!(ring.take(a.queue(true), |_, _, _| ()).is_none());
-            assert_eq!(ring.take(b.queue(false), |_, _, _| ()).unwrap().lanes, 5);
+            let batch = ring.take(b.queue(false), |_, _, _| ()).unwrap();
+            assert_eq!((batch.lanes, ring.vertices(&batch).samples.lane(0) & 0xff), (5, 0));
             assert_eq!((ring.waiting(), ring.fullest()), (0, None));
         });
     }

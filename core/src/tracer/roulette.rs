@@ -7,7 +7,7 @@ use super::cache_key::cache_lookup;
 use super::ledger::NO_BIN;
 use super::ring::RESERVE;
 use super::shading::Arrival8;
-use super::vertex::{PathVertex8, pack_samples};
+use super::vertex::pack_samples;
 use crate::bsdf;
 use crate::rrs::{self, Learned8, Vertices8};
 use crate::scene::Scene;
@@ -17,9 +17,6 @@ use crate::world::World;
 use croupier_simd::{F32x8, Mask8, U32x8};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
-
-/// Phong exponent of a perfect mirror.
-const MIRROR_SHININESS: f32 = 1e4;
 
 /// Numbers of the combs of one shard in one iteration: one for each packet, so they depend on the order of packets,
 /// which is a function of scene and settings.
@@ -39,31 +36,25 @@ impl CombNumbers {
 }
 
 /// What roulette decided for eight vertices.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Decision8 {
-    /// The vertices with their samples.
-    pub vertex: PathVertex8,
     /// Samples of each; 0 ends the path.
     pub n: [u32; 8],
     /// How many of them draw a light sample.
     pub with_nee: [u32; 8],
 }
 
-/// Phong exponents that correspond to the materials' GGX widths: 2 / alpha^2 - 2.
+/// Phong exponents of the materials; 0 where there is none.
 fn shininess(scene: &Scene<'_>, a: &Arrival8) -> F32x8 {
     let material = a.vertex.material.to_array();
     F32x8::from_fn(|i| {
-        let m = scene.materials.get(material[i] as usize);
-        match MaterialKind::from_u32(a.kind[i]) {
-            Some(MaterialKind::Diffuse | MaterialKind::Plastic | MaterialKind::RoughPlastic) | None => 0.0,
-            Some(MaterialKind::RoughConductor | MaterialKind::RoughDielectric) => {
-                m.map_or(0.0, |m| (2.0 / (m.alpha * m.alpha) - 2.0).clamp(0.0, MIRROR_SHININESS))
-            }
-            Some(_) => MIRROR_SHININESS,
-        }
+        let kind = MaterialKind::from_u32(a.kind[i]);
+        kind.zip(scene.materials.get(material[i] as usize)).map_or(0.0, |(kind, m)| bsdf::shininess(kind, m))
     })
 }
 
-/// Rounds the factors of the vertices that paths have arrived at; `free` are the slots left in the ring.
+/// Rounds the factors of the vertices that paths have arrived at, and gives the vertices their samples; `free` are the
+/// slots left in the ring.
 #[inline(always)]
 pub(crate) fn roulette<W: World>(
     world: &W,
@@ -71,7 +62,7 @@ pub(crate) fn roulette<W: World>(
     book: &mut Bookkeeping<'_>,
     comb: &mut CombNumbers,
     free: usize,
-    a: &Arrival8,
+    a: &mut Arrival8,
 ) -> Decision8 {
     let strategy = settings.strategy;
     let (v, active) = (&a.vertex, a.active);
@@ -115,15 +106,13 @@ pub(crate) fn roulette<W: World>(
     let plays = settings.shadow_roulette && key.is_some();
     let nee_probability = if plays { learned.nee_probability(beta, a.albedo) } else { F32x8::ONE };
     let with_nee = if plays { samples_with_nee(comb, n, nee_probability, a) } else { n };
-    let vertex = PathVertex8 {
-        beta,
-        nee_probability,
-        albedo_product: v.albedo_product * a.albedo.mean(),
-        samples: U32x8::from_fn(|i| pack_samples(n[i], with_nee[i])),
-        bin: key.map_or(U32x8::splat(NO_BIN), |k| k.bin),
-        ..*v
-    };
-    Decision8 { vertex, n, with_nee }
+    let v = &mut a.vertex;
+    v.beta = beta;
+    v.nee_probability = nee_probability;
+    v.albedo_product *= a.albedo.mean();
+    v.samples = U32x8::from_fn(|i| pack_samples(n[i], with_nee[i]));
+    v.bin = key.map_or(U32x8::splat(NO_BIN), |k| k.bin);
+    Decision8 { n, with_nee }
 }
 
 /// How many of the `n` samples of each vertex draw a light sample, if each does with probability `nee_probability`: one

@@ -9,8 +9,8 @@ use super::shading::Arrival8;
 /// Stores the arrived vertices that go on by decision `d`; closes the others.
 #[inline(always)]
 pub(crate) fn settle(book: &mut Bookkeeping<'_>, ring: &mut Ring<'_>, a: &Arrival8, d: &Decision8) {
-    let records = d.vertex.records();
-    let path = &d.vertex.path;
+    let records = a.vertex.records();
+    let path = &a.vertex.path;
     let (root, record, depth) = (path.root.to_array(), path.record.to_array(), path.depth.to_array());
     for i in a.active.lanes() {
         let Some(class) = PacketClass::of_material(a.kind[i]).filter(|_| d.n[i] > 0) else {

@@ -120,7 +120,7 @@ pub fn bake(
     done(stage);
 
     let stage = staged(Stage::Materials);
-    let materials = materials::bake(scene, &emission)?;
+    let materials = materials::bake(scene)?;
     done(stage);
 
     let stage = staged(Stage::Lights);

@@ -24,8 +24,9 @@ pub(super) fn scene(scene: &Records<'_>) -> Result<Effects, SceneError> {
     let surfaces = geometry::triangles(scene)?;
     let lights = lights::lights(scene)?;
     let environment = environment::environment(scene)?;
+    lights::table(scene, environment.emits)?;
     tree::tree(scene)?;
-    Ok(surfaces.with(lights).with(environment).with(lens))
+    Ok(surfaces.with(lights).with(environment.effects).with(lens))
 }
 
 /// The record that is being checked.

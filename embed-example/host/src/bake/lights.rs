@@ -65,9 +65,6 @@ pub(super) fn bake(
     }
     let weights = environment::light_weights(&out.lights, out.environment.first(), &out.env_texels, geometry.radius());
     out.alias = alias::build(&weights);
-    for (light, entry) in out.lights.iter_mut().zip(&out.alias) {
-        light.probability = entry.probability;
-    }
     Ok(out)
 }
 

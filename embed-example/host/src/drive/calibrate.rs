@@ -3,8 +3,8 @@
 
 use crate::blob::AlignedBytes;
 use croupier::Scene;
-use croupier::learn::cache::{Cache, Kind, Training};
-use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::learn::cache::{Cache, Training, VertexKind, VertexKind8};
+use croupier::simd::{F32x8, Mask8, Vec3x8};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -28,7 +28,7 @@ pub(super) fn calibrate(cache: &Cache<'_>, scene: &Scene<'_>) -> Option<Calibrat
     let mut random = Random(scene.hash | 1);
     let vertices: Vec<_> = (0..PACKETS).map(|_| Packet::new(scene, &mut random)).collect();
     let all = Mask8::first(8);
-    let diffuse = U32x8::splat(Kind::Diffuse as u32);
+    let diffuse = VertexKind8::splat(VertexKind::Diffuse);
     let bin = |i: usize| cache.find_jittered(diffuse, vertices[i].p, vertices[i].n, vertices[i].jitter, all);
     let look_up = seconds_of(|| {
         for i in 0..PACKETS {

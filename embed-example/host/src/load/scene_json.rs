@@ -2,7 +2,10 @@
 
 use super::json::{self, Place};
 use super::{LoadError, Loader, obj};
-use crate::description::{Camera, Emitter, Environment, Material, Model, Reflectance, SceneDescription, ThinLens};
+use crate::description::{
+    Camera, Emitter, Environment, Material, Model, ParameterSource, Reflectance, SceneDescription, ThinLens,
+};
+use croupier::scene::blob::MaterialKind;
 use std::path::Path;
 
 pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription, LoadError> {
@@ -62,39 +65,49 @@ fn material(
     name: &str,
     m: &Place<'_>,
 ) -> Result<Material, LoadError> {
-    let mut reflectance = || reflectance(loader, scene, folder, &m.get("reflectance")?);
-    let float = |key| m.get(key)?.float();
-    let rgb = |key| m.get(key)?.rgb();
     let kind = m.get("type")?;
-    let model = match kind.text()? {
-        "diffuse" => Model::Diffuse { reflectance: reflectance()? },
-        "mirror" => Model::Mirror { reflectance: reflectance()? },
-        "conductor" => Model::Conductor { eta: rgb("eta")?, k: rgb("k")?, reflectance: reflectance()? },
-        "roughconductor" => Model::RoughConductor {
-            eta: rgb("eta")?,
-            k: rgb("k")?,
-            reflectance: reflectance()?,
-            alpha: float("alpha")?,
-        },
-        "dielectric" => Model::Dielectric { int_ior: float("int_ior")?, ext_ior: float("ext_ior")? },
-        "roughdielectric" => {
-            Model::RoughDielectric { int_ior: float("int_ior")?, ext_ior: float("ext_ior")?, alpha: float("alpha")? }
-        }
-        "thindielectric" => Model::ThinDielectric { int_ior: float("int_ior")?, ext_ior: float("ext_ior")? },
-        "plastic" => {
-            Model::Plastic { reflectance: reflectance()?, int_ior: float("int_ior")?, ext_ior: float("ext_ior")? }
-        }
-        "roughplastic" => Model::RoughPlastic {
-            reflectance: reflectance()?,
-            int_ior: float("int_ior")?,
-            ext_ior: float("ext_ior")?,
-            alpha: float("alpha")?,
-        },
-        "null" => Model::Null,
-        other => return Err(kind.error(format!("unknown material type `{other}`"))),
-    };
+    let name_of_kind = kind.text()?;
+    let kind = MaterialKind::from_name(name_of_kind)
+        .ok_or_else(|| kind.error(format!("unknown material type `{name_of_kind}`")))?;
+    let model = Model::from_source(kind, &mut Parameters { loader, scene, folder, m })?;
     let two_sided = m.find("twosided")?.map_or(Ok(false), |t| t.flag())?;
     Ok(Material { name: name.into(), two_sided, model })
+}
+
+/// Parameters of a material, all required.
+struct Parameters<'a, 'v> {
+    loader: &'a mut Loader,
+    scene: &'a mut SceneDescription,
+    folder: &'a Path,
+    m: &'a Place<'v>,
+}
+
+impl ParameterSource for Parameters<'_, '_> {
+    type Error = LoadError;
+
+    fn reflectance(&mut self) -> Result<Reflectance, LoadError> {
+        reflectance(self.loader, self.scene, self.folder, &self.m.get("reflectance")?)
+    }
+
+    fn eta(&mut self) -> Result<[f32; 3], LoadError> {
+        self.m.get("eta")?.rgb()
+    }
+
+    fn k(&mut self) -> Result<[f32; 3], LoadError> {
+        self.m.get("k")?.rgb()
+    }
+
+    fn int_ior(&mut self) -> Result<f32, LoadError> {
+        self.m.get("int_ior")?.float()
+    }
+
+    fn ext_ior(&mut self) -> Result<f32, LoadError> {
+        self.m.get("ext_ior")?.float()
+    }
+
+    fn alpha(&mut self) -> Result<f32, LoadError> {
+        self.m.get("alpha")?.float()
+    }
 }
 
 fn reflectance(

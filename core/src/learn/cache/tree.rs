@@ -9,7 +9,8 @@
 //! look-up needs two descents.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
-use super::bins::BINS;
+use super::bins::{BINS, NO_BIN};
+use super::kind::{VertexKind, VertexKind8};
 use crate::memory::{Carver, Measure, MemoryError};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
@@ -17,10 +18,14 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 pub(super) const MAX_DEPTH: u32 = 16;
 /// Most leaves: their numbers have 26 bits.
 pub(super) const MAX_LEAVES: u32 = 1 << 26;
-/// Octrees.
-pub(super) const ROOTS: u32 = 4;
+/// Octrees: one for each kind of vertex. Their roots are the first nodes.
+pub(super) const ROOTS: u32 = VertexKind::ALL.len() as u32;
 /// Children lie at multiples of 8, so the roots have eight words as well.
 const FIRST_CHILD: u32 = 8;
+const _: () = assert!(ROOTS <= FIRST_CHILD);
+
+// no bin of any leaf has the number of none
+const _: () = assert!(MAX_LEAVES as u64 * BINS as u64 <= NO_BIN as u64);
 
 const LEAF: u32 = 1 << 31;
 const NUMBER: u32 = MAX_LEAVES - 1;
@@ -187,7 +192,8 @@ impl<'m> Tree<'m> {
     /// First bin of the leaf per lane. With `jitter` in [0, 1) of the leaf around a place that was moved by
     /// `jitter - 0.5` of the edge of its own leaf, but not out of the cube.
     #[inline(always)]
-    pub(super) fn find(&self, root: U32x8, p: Vec3x8, jitter: Option<[F32x8; 3]>) -> U32x8 {
+    pub(super) fn find(&self, kind: VertexKind8, p: Vec3x8, jitter: Option<[F32x8; 3]>) -> U32x8 {
+        let root = kind.octree();
         let place = self.place(p);
         let mut word = self.descend(root, place);
         if let Some([a, b, c]) = jitter {

@@ -2,7 +2,7 @@
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use super::bins::{BinRecord, ShadowRecord};
-use super::cache::CacheSize;
+use super::size::CacheSize;
 use crate::memory::{Carver, Layout, Measure, MemoryError};
 
 /// Records of one shard, one for every bin that the cache may ever have.
@@ -34,17 +34,17 @@ impl<'m> Training<'m> {
         Ok(Self { records: c.take_unset(size.bins())?, shadows: c.take_unset(size.bins())?, used: 0 })
     }
 
-    /// Forgets everything and takes samples of bins below `used_bins` ([`super::cache::Cache::bins`]).
+    /// Forgets everything and takes samples of bins below `used_bins` ([`super::Cache::bins`]).
     pub fn clear(&mut self, used_bins: u32) {
         self.used = (used_bins as usize).min(self.records.len());
         self.used_mut().fill(bytemuck::Zeroable::zeroed());
         self.shadows_mut().fill(bytemuck::Zeroable::zeroed());
     }
 
-    /// Adds a sample. Negative values count as 0, values above [`super::cache::MAX_VALUE`] as that.
+    /// Adds a sample. Negative values count as 0, values above [`MAX_VALUE`](super::MAX_VALUE) as that.
     ///
     /// `false` if it was not taken: the bin does not exist, a number is not finite, or the bin has
-    /// [`super::cache::BIN_LIMIT`] samples of this iteration. A full bin keeps the first ones, so what it says leans to
+    /// [`BIN_LIMIT`](super::BIN_LIMIT) samples of this iteration. A full bin keeps the first ones, so what it says leans to
     /// the tiles that the shard begins with; factors, and so the noise, are a little off then, but no picture is
     /// biased. [`crate::Counters::samples_refused`] counts them.
     #[inline]
@@ -72,8 +72,8 @@ impl<'m> Training<'m> {
     }
 
     /// Adds a shadow ray from a vertex in the leaf of `bin` towards its directions
-    /// ([`super::cache::Cache::bins_towards`]), and whether it met nothing. `false` if it was not taken: the bin does
-    /// not exist or has 65,535 of this iteration, the first ones; [`crate::Counters::shadows_refused`] counts them.
+    /// ([`super::Cache::bins_towards`]), and whether it met nothing. `false` if it was not taken: the bin does
+    /// not exist or has [`BIN_LIMIT`](super::BIN_LIMIT) of this iteration, the first ones; [`crate::Counters::shadows_refused`] counts them.
     #[inline]
     pub fn log_shadow(&mut self, bin: u32, visible: bool) -> bool {
         self.shadows_mut().get_mut(bin as usize).is_some_and(|s| s.add(visible))

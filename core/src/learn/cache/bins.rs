@@ -5,9 +5,12 @@ use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, U32x8, Vec3x8};
 
 /// Direction bins of a leaf.
-pub(super) const BINS: usize = 16;
+pub(in crate::learn) const BINS: usize = 16;
 
-/// Samples (and pairs) that one bin takes from one shard in one iteration: below it no f32 sum stalls.
+/// Number of no bin: of vertices whose samples are not learned from. Above the number of every bin.
+pub const NO_BIN: u32 = u32::MAX;
+
+/// Samples, pairs and shadow rays that one bin takes from one shard in one iteration, each: below it no f32 sum stalls.
 pub const BIN_LIMIT: u16 = u16::MAX;
 
 /// Values and costs above 2^55 count as 2^55: [`BIN_LIMIT`] of their squares are still finite.
@@ -81,7 +84,7 @@ pub(super) struct ShadowRecord {
 impl ShadowRecord {
     /// Adds a ray; `false` if the record is full.
     pub(super) fn add(&mut self, visible: bool) -> bool {
-        if self.rays == u16::MAX {
+        if self.rays == BIN_LIMIT {
             return false;
         }
         self.rays += 1;

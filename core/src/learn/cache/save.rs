@@ -7,7 +7,7 @@
 //! | 1920 per leaf | sums of the leaves in the order of the shape |
 //!
 //! All numbers are little-endian. The header says what the sums hang on: the bounds, which place the cells, and the
-//! objective, because values of [first vertices](super::cache::Kind::FirstDiffuse) are in units of their pixel under the
+//! objective, because values of [first vertices](super::VertexKind::FirstDiffuse) are in units of their pixel under the
 //! relative one, and radiance under the absolute one. Nothing else has to agree: after a change of strategy, norm,
 //! depth, camera or scene the sums are what they were of a render alike, in the same units, and fade as new ones come.
 //!
@@ -16,9 +16,9 @@
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use super::bins::{BINS, BinSums};
-use super::cache::Cache;
-use super::settings::Objective;
+use super::shared::Cache;
 use super::tree::{MAX_DEPTH, OctreeNode, ROOTS};
+use crate::learn::settings::Objective;
 use crate::scene::blob::content_hash;
 use bytemuck::{Pod, Zeroable};
 use core::fmt;
@@ -29,6 +29,9 @@ const MAGIC: u64 = u64::from_le_bytes(*b"CRPCACHE");
 const VERSION: u32 = 4;
 /// Largest sum: adding up such files, or squaring their means, stays finite.
 const MAX_SUM: f64 = 1e100;
+
+// Any of these is part of the layout: another number of octrees, bins or sums needs another version.
+const _: () = assert!(VERSION == 4 && ROOTS == 4 && BINS == 16 && size_of::<BinSums>() == 15 * 8);
 
 const HEADER: usize = size_of::<Header>();
 const LEAF_BYTES: usize = BINS * size_of::<BinSums>();

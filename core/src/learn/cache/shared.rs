@@ -1,62 +1,28 @@
-//! The cache of statistics by place and direction (EARS, SIGGRAPH 2022, section 5; Müller et al. 2017 for the tree).
-//!
-//! An octree over the scene has 4x4 direction bins in every leaf. A bin keeps count, sums and squared sums of the
-//! *values* of samples (reflected radiance over albedo, linear rgb) that were drawn at vertices in it, and of their
-//! counted cost. Sums also exist of half the squared difference of two samples of the same vertex: their mean is the
-//! variance at a point, whereas `moment - mean^2` has the spread of the mean over the cell in it as well. And it keeps
-//! how many shadow rays from the leaf towards its directions met nothing, and the squared sums of light samples alone.
-//!
-//! There are several octrees, for kinds of vertices that should not be mixed, and the direction is the caller's choice:
-//! see [`Kind`]. Shards look up in what [`Cache::freeze`] computed and log into their own [`Training`]; between
-//! iterations those are absorbed in shard order, so the cache is the same whatever the threads did.
+//! The side of the cache that all shards look up in.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
-pub use super::bins::{BIN_LIMIT, Local8, MAX_VALUE};
-pub use super::save::CacheError;
-pub use super::training::Training;
-
-use super::bins::{BINS, BinSums, Frozen, freeze_leaf};
-use super::settings::Objective;
-use super::tree::{MAX_DEPTH, MAX_LEAVES, OctreeNode, ROOTS, Tree, direction_bin};
+use super::bins::{BINS, BinSums, Frozen, Local8, NO_BIN, freeze_leaf};
+use super::kind::VertexKind8;
+use super::size::CacheSize;
+use super::training::Training;
+use super::tree::{MAX_DEPTH, OctreeNode, ROOTS, Tree, direction_bin};
+use crate::learn::settings::Objective;
 use crate::memory::{Carver, Layout, Measure, MemoryError};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Samples that the surroundings of a cell count for in it.
 const PRIOR_SAMPLES: f64 = 4.0;
 
-/// Kinds of vertices, each with an octree of its own.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum Kind {
-    /// Diffuse, keyed by the shading normal.
-    Diffuse = 0,
-    /// All others, keyed by the direction that decides what they show.
-    Glossy = 1,
-    /// Diffuse ones that the camera sees. Their values are in units of their pixel.
-    FirstDiffuse = 2,
-    /// The other ones that the camera sees.
-    FirstGlossy = 3,
-}
-
-/// How many nodes and leaves there is room for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CacheSize {
-    subdivisions: u32,
-}
-
 impl CacheSize {
-    /// Trees that never split.
-    pub const SMALLEST: Self = Self { subdivisions: 0 };
-
     /// The largest cache whose shared side and `shards` training sides fit in `bytes` together; `None` if none does.
-    /// The smallest, four leaves that never split, takes 9.7 KiB and 3.25 KiB more for each shard.
+    /// The smallest, four leaves that never grow, takes 9.7 KiB and 3.25 KiB more for each shard.
     pub fn within(bytes: usize, shards: u32) -> Option<Self> {
         let fits = |subdivisions: u32| Self { subdivisions }.bytes(shards).is_some_and(|b| b <= bytes);
         if !fits(0) {
             return None;
         }
         // largest that fits, by bisection; `fits(low)` always holds
-        let (mut low, mut high) = (0, (MAX_LEAVES - ROOTS) / 7 + 1);
+        let (mut low, mut high) = (0, Self::MAX_SUBDIVISIONS + 1);
         while high - low > 1 {
             let middle = low + (high - low) / 2;
             if fits(middle) { low = middle } else { high = middle }
@@ -68,15 +34,6 @@ impl CacheSize {
     pub fn bytes(self, shards: u32) -> Option<usize> {
         let training = Training::layout(self)?.size.checked_mul(shards as usize)?;
         Cache::layout(self)?.size.checked_add(training)
-    }
-
-    /// Leaves of all octrees.
-    pub fn leaves(self) -> u32 {
-        ROOTS + 7 * self.subdivisions
-    }
-
-    pub(super) fn bins(self) -> usize {
-        self.leaves() as usize * BINS
     }
 }
 
@@ -136,26 +93,26 @@ impl<'m> Cache<'m> {
         Ok(cache)
     }
 
-    /// The bins of eight vertices, `u32::MAX` in inactive lanes. `kind` holds [`Kind`]s, `dir` unit vectors in world
-    /// space. Places outside the bounds belong to the nearest leaf.
+    /// The bins of eight vertices, [`NO_BIN`] in inactive lanes. `dir`: unit vectors, world space. Places outside
+    /// the bounds belong to the nearest leaf.
     #[inline]
-    pub fn find(&self, kind: U32x8, p: Vec3x8, dir: Vec3x8, active: Mask8) -> U32x8 {
-        self.bins_of(self.tree.find(kind & U32x8::splat(ROOTS - 1), p, None), dir, active)
+    pub fn find(&self, kind: VertexKind8, p: Vec3x8, dir: Vec3x8, active: Mask8) -> U32x8 {
+        self.bins_of(self.tree.find(kind, p, None), dir, active)
     }
 
     /// As [`Self::find`], of places moved by `jitter - 0.5` of the edge of their leaf, `jitter` in [0, 1). So what is
     /// looked up has no visible borders: it is a box filter over the leaves, by sampling.
     #[inline]
-    pub fn find_jittered(&self, kind: U32x8, p: Vec3x8, dir: Vec3x8, jitter: [F32x8; 3], active: Mask8) -> U32x8 {
-        self.bins_of(self.tree.find(kind & U32x8::splat(ROOTS - 1), p, Some(jitter)), dir, active)
+    pub fn find_jittered(&self, kind: VertexKind8, p: Vec3x8, dir: Vec3x8, jitter: [F32x8; 3], active: Mask8) -> U32x8 {
+        self.bins_of(self.tree.find(kind, p, Some(jitter)), dir, active)
     }
 
     #[inline(always)]
     fn bins_of(&self, first: U32x8, dir: Vec3x8, active: Mask8) -> U32x8 {
-        U32x8::select(active, first + direction_bin(dir), U32x8::splat(u32::MAX))
+        U32x8::select(active, first + direction_bin(dir), U32x8::splat(NO_BIN))
     }
 
-    /// The bins of the same leaves as `bin` for other directions: unit vectors `dir`, world space. `u32::MAX` in
+    /// The bins of the same leaves as `bin` for other directions: unit vectors `dir`, world space. [`NO_BIN`] in
     /// inactive lanes and where `bin` is no bin.
     #[inline]
     pub fn bins_towards(&self, bin: U32x8, dir: Vec3x8, active: Mask8) -> U32x8 {
@@ -178,7 +135,7 @@ impl<'m> Cache<'m> {
         // beyond the bins in use lies whatever the caller's memory held
         let used = self.frozen.get(..self.bins() as usize).unwrap_or(&[]);
         let row = |b: u32| used.get(b as usize).unwrap_or(&Frozen::ZERO);
-        let [a, b, c, d, e, f, g, h] = U32x8::select(active, bin, U32x8::splat(u32::MAX)).to_array();
+        let [a, b, c, d, e, f, g, h] = U32x8::select(active, bin, U32x8::splat(NO_BIN)).to_array();
         Local8::gather([row(a), row(b), row(c), row(d), row(e), row(f), row(g), row(h)])
     }
 

@@ -1,0 +1,55 @@
+//! Eight pixels of the noisy picture: which are present, and their color divided by albedo.
+
+use super::grid::Grid;
+use super::noisy::{COLOR_LIMIT, Noisy};
+use croupier_simd::{F32x8, Mask8};
+
+/// Smallest divisor: below it radiance is hardly the surface's own color.
+const ALBEDO_FLOOR: f32 = 0.1;
+
+/// Eight neighbouring pixels of a row as the filter sees them.
+pub(super) struct Pixels {
+    /// Which are in the picture and finite.
+    pub present: Mask8,
+    /// Color divided by albedo; 0 unless present.
+    pub e: [F32x8; 3],
+    /// Variance of `e`, summed over rgb; 0 unless present.
+    pub variance: F32x8,
+    /// The albedo that it is divided by.
+    pub divisor: [F32x8; 3],
+    pub albedo: [F32x8; 3],
+}
+
+impl Pixels {
+    /// Pixels `x`, `x + 1`, ... of row `y`. The same bits whenever it is called.
+    #[inline(always)]
+    pub(super) fn read(noisy: &Noisy<'_>, grid: Grid, x: usize, y: usize) -> Self {
+        let at = y * grid.columns + x;
+        let mut present = Mask8::first(grid.columns.saturating_sub(x));
+        let albedo: [F32x8; 3] = core::array::from_fn(|c| load_or(noisy.albedo[c], at, 1.0).clamp(0.0, 1.0));
+        let divisor = albedo.map(|a| a.max(F32x8::splat(ALBEDO_FLOOR)));
+        let color: [F32x8; 3] = core::array::from_fn(|c| load_or(noisy.color[c], at, 0.0));
+        let square: [F32x8; 3] = core::array::from_fn(|c| load_or(noisy.variance[c], at, 0.0));
+        for c in 0..3 {
+            // Comparisons with NaN are false.
+            present &= color[c].abs().le(F32x8::splat(COLOR_LIMIT));
+            present &= square[c].le(F32x8::splat(COLOR_LIMIT * COLOR_LIMIT));
+        }
+        let mut variance = F32x8::ZERO;
+        let e = core::array::from_fn(|c| {
+            let inverse = 1.0 / divisor[c];
+            variance += F32x8::ZERO.max(square[c]) * inverse.sqr();
+            present.zero_unless(color[c] * inverse)
+        });
+        Self { present, e, variance: present.zero_unless(variance), divisor, albedo }
+    }
+}
+
+/// Eight values from `at`, `default` where there are none.
+#[inline(always)]
+pub(super) fn load_or(plane: &[f32], at: usize, default: f32) -> F32x8 {
+    match plane.get(at..).and_then(|p| p.first_chunk()) {
+        Some(a) => F32x8::new(*a),
+        None => F32x8::from_fn(|i| plane.get(at + i).copied().unwrap_or(default)),
+    }
+}

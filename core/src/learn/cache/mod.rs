@@ -1,0 +1,37 @@
+//! The cache of statistics by position and direction (EARS, SIGGRAPH 2022, section 5; Müller et al. 2017 for the tree).
+//!
+//! An octree over the scene has 4x4 direction bins in every leaf. A bin keeps count, sums and squared sums of the
+//! *values* of samples (reflected radiance over albedo, linear rgb) that were drawn at vertices in it, and of their
+//! counted cost. Sums also exist of half the squared difference of two samples of the same vertex: their mean is the
+//! variance at a point, whereas `moment - mean^2` has the spread of the mean over the cell in it as well. And it keeps
+//! how many shadow rays from the leaf towards its directions met nothing, and the squared sums of light samples alone.
+//!
+//! There are several octrees, for kinds of vertices that should not be mixed, and the direction is the caller's choice:
+//! see [`VertexKind`]. Shards look up in what [`Cache::freeze`] computed and log into their own [`Training`]; between
+//! iterations those are absorbed in shard order, so the cache is the same whatever the threads did.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `kind` | [`VertexKind`]: one octree for each |
+//! | `bins` | statistics of one bin: of an iteration, of all of them, as look-ups read them |
+//! | `tree` | octrees: the leaf around a position, the bin of a direction |
+//! | `size` | [`CacheSize`]: room for leaves |
+//! | `training` | [`Training`]: one shard's side, of the current iteration |
+//! | `shared` | [`Cache`]: the side that all shards look up in |
+//! | `save` | the cache as bytes |
+
+mod bins;
+mod kind;
+mod save;
+mod shared;
+mod size;
+mod training;
+mod tree;
+
+pub(super) use bins::BINS;
+pub use bins::{BIN_LIMIT, Local8, MAX_VALUE, NO_BIN};
+pub use kind::{VertexKind, VertexKind8};
+pub use save::CacheError;
+pub use shared::Cache;
+pub use size::CacheSize;
+pub use training::Training;
