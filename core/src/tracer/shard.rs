@@ -146,8 +146,9 @@ impl<'m> Shard<'m> {
         let mut next = tiles.next_of(self.index, 0);
         let mut slot = 0;
         while let Some(tile) = next {
+            let start = tiles.start(tile);
             for k in 0..TILE_PIXELS {
-                if let (Some(p), Some(stats)) = (tiles.pixel(tile, k), self.state.book.pixels.get(slot)) {
+                if let (Some(p), Some(stats)) = (tiles.pixel(start, k), self.state.book.pixels.get(slot)) {
                     f(tiles.film_index(p), stats, self.state.book.aovs.get(slot));
                 }
                 slot += 1;
