@@ -213,7 +213,7 @@ fn learning_with<P: Profile + Sync, I: Intersector + Sync>(
     }
 }
 
-/// A block as a host's pool may give it: NaNs, and indices beyond everything. Nothing may hang on what it holds.
+/// A block as a host's pool may give it: NaNs, and indices beyond everything. Nothing may depend on what it holds.
 fn used_memory(bytes: usize) -> AlignedBytes {
     let mut block = AlignedBytes::zeroed(bytes);
     block.as_mut().fill(0xff);

@@ -27,7 +27,7 @@ fn dielectric_fresnel() {
             for l in 0..8 {
                 let (c, r) = (f64::from(cos.lane(l)), f64::from(i.reflectance.lane(l)));
                 let error = (r - fresnel_dielectric(c, 1.0, e)).abs();
-                // e^2 = cos^2 - critical is known to 1e-7; where it is small, so is what hangs on it
+                // e^2 = cos^2 - critical is known to 1e-7; where it is small, so is what depends on it
                 let slack = 1e-7 / (c * c - critical).abs().max(1e-4);
                 let class = if slack > 1e-5 { 2 } else { usize::from((e - 1.0).abs() < 0.05) };
                 worst[class] = worst[class].max(error);

@@ -158,7 +158,7 @@ fn strategies_that_learn_agree_on_all_materials() {
 fn mirrors_and_glass_play_learned_roulette() {
     let mirror = Model::Mirror { reflectance: Reflectance::Constant([1.0; 3]) };
     for (what, model) in [("mirror", mirror), ("glass", Model::Dielectric { int_ior: 1.5, ext_ior: 1.0 })] {
-        let mut s = under_white_sky(camera([0.0, 0.6, 0.8], [0.0; 3], 5.0, [16, 16]));
+        let mut s = in_white_environment(camera([0.0, 0.6, 0.8], [0.0; 3], 5.0, [16, 16]));
         s.environment = Some(Environment::Constant { radiance: [0.03; 3] });
         let [floor, side] = [grey(0.8), model].map(|m| s.add_material(what, m));
         add_quad(&mut s, "floor", floor, facing_y(0.3, 0.0, 1.0));

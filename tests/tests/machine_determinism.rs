@@ -44,9 +44,9 @@ fn schedules_do_not_change_a_bit() {
     }
 }
 
-/// What is learned, and everything that hangs on it, is as indifferent to schedules as the rest. Killed by: statistics
-/// that are absorbed in the order of completion, a cache that changes within an iteration, an estimate of the picture
-/// summed per thread, adaptive counts that a shard makes for itself.
+/// What is learned, and everything that depends on it, is as indifferent to schedules as the rest. Killed by:
+/// statistics that are absorbed in the order of completion, a cache that changes within an iteration, an estimate of
+/// the picture summed per thread, adaptive counts that a shard makes for itself.
 #[test]
 fn schedules_do_not_change_what_is_learned() {
     for (name, scene) in [("cornell", cornell([24, 20])), ("everything", everything([24, 20]))] {

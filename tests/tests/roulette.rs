@@ -108,7 +108,7 @@ fn winners_follow_their_rule() {
         let v = Vertices8 { shininess: F32x8::splat(shininess), ..vertices(beta, 0.5, 1) };
         Strategy::parse(&format!("winners{options}")).unwrap().factor(&v).lane(0)
     };
-    // a matte surface: sqrt(1 + 3) = 2
+    // a diffuse surface: sqrt(1 + 3) = 2
     assert_eq!(winners("", 0.5, 0.0), 0.5);
     assert_eq!(winners("", 2.0, 0.0), 2.0);
     // (1 + 1)^2 = 4: sqrt(1 + 3 / 4)

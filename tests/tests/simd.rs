@@ -257,10 +257,10 @@ fn vectors_work_lane_by_lane() {
             std::array::from_fn(|_| std::array::from_fn(|_| r.between(-2.0, 2.0) as f32))
         };
         let (a, b) = (draw(&mut r), draw(&mut r));
-        let spoil = |v: [[f32; 3]; 8]| {
+        let corrupt = |v: [[f32; 3]; 8]| {
             Vec3x8::from_fn(|i| if live >> i & 1 == 1 { v[i] } else { [f32::NAN, f32::INFINITY, -0.0] })
         };
-        let (x, y) = (spoil(a), spoil(b));
+        let (x, y) = (corrupt(a), corrupt(b));
         let (d, c, n) = (x.dot(y), x.cross(y), x.normalize());
         let frame = Frame8::from_normal(n);
         let clean = Frame8::from_normal(Vec3x8::from_fn(|i| a[i]).normalize());

@@ -18,12 +18,12 @@ pub struct AlignedBytes {
 }
 
 impl AlignedBytes {
-    /// That many zeros. The system provides large ones page by page when they are first touched.
+    /// Zeros of that length. The system provides large ones page by page when they are first touched.
     pub fn zeroed(length: usize) -> Self {
         Self { lines: bytemuck::zeroed_vec(length.div_ceil(ALIGN)), length }
     }
 
-    /// The same, or `None` where that much memory is not to be had.
+    /// Zeros of that length, or `None` where the system has not enough memory.
     pub fn try_zeroed(length: usize) -> Option<Self> {
         Some(Self { lines: bytemuck::try_zeroed_vec(length.div_ceil(ALIGN)).ok()?, length })
     }

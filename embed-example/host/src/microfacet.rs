@@ -3,7 +3,7 @@
 use croupier::unstable::scene::blob::TRANSMITTANCE_ENTRIES;
 use std::f64::consts::PI;
 
-/// What a rough coat does to light that scatters below it.
+/// Transmittance and internal reflectance of a rough coat.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoughPlasticTable {
     /// T: energy transmitted from outside at cosines 0, 1/63, ... 1: the mean over visible normals of (1 - F)

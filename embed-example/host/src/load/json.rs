@@ -1,4 +1,4 @@
-//! JSON values that know their place, so that every message can name it.
+//! JSON values with their paths, so that every message can name them.
 
 use super::LoadError;
 use serde_json::{Map, Value};
