@@ -2,7 +2,7 @@
 //! writer that turns its parts into bytes. Corrupting a part and writing it again gives a blob with a valid hash.
 
 use bytemuck::{Pod, Zeroable};
-use croupier::scene::blob::*;
+use croupier::unstable::scene::blob::*;
 
 /// Bytes at an address that is a multiple of 64.
 #[derive(Clone, Debug)]
@@ -143,7 +143,7 @@ impl Parts {
         let material = |kind: &MaterialKind| Material {
             kind: *kind as u32,
             texture: NONE,
-            table: if *kind == MaterialKind::RoughPlastic { 0 } else { NONE },
+            table: if kind.facts().parameters.contains(&Parameter::TransmittanceTable) { 0 } else { NONE },
             reflectance: [0.5, 0.6, 0.7],
             alpha: 0.2,
             eta: [1.5, 0.2, 1.1],

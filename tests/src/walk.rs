@@ -2,7 +2,7 @@
 //! and that is out of range panics.
 
 use croupier::Scene;
-use croupier::scene::blob::*;
+use croupier::unstable::scene::blob::*;
 
 /// Entries of a traversal stack that pushes all children of a node but the one it enters.
 const STACK: usize = 256;
@@ -78,7 +78,7 @@ fn tree(scene: &Scene<'_>) -> usize {
 
 fn material(scene: &Scene<'_>, m: &Material) {
     let kind = MaterialKind::from_u32(m.kind).unwrap();
-    if kind == MaterialKind::RoughPlastic {
+    if kind.facts().parameters.contains(&Parameter::TransmittanceTable) {
         let table = &scene.tables[m.table as usize..][..TRANSMITTANCE_ENTRIES];
         assert!(table.iter().all(|x| (0.0..=1.0).contains(x)));
     }

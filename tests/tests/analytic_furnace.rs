@@ -1,9 +1,9 @@
 //! Everything under light from everywhere: radiance is the albedo, and 1 where nothing is lost.
 
 use croupier::Settings;
-use croupier::scene::blob::MaterialKind;
+use croupier::unstable::scene::blob::MaterialKind;
 use croupier_host::description::{Model, Reflectance};
-use croupier_tests::bsdf::{Case, at_angle};
+use croupier_tests::bsdf::{Case, assert_every_kind, at_angle};
 use croupier_tests::runner::{Image, render, settings};
 use croupier_tests::scenes::*;
 use croupier_tests::stats::{FAMILY_ALPHA, normal_quantile_upper, sidak};
@@ -56,6 +56,7 @@ fn pairs() -> Vec<(Model, Case)> {
         all.push(pair(RoughDielectric, zero, glass, zero, alpha));
         all.push(pair(RoughPlastic, colour, glass, zero, alpha));
     }
+    assert_every_kind(&all.iter().map(|(_, c)| c.kind).collect::<Vec<_>>(), |_| true);
     all
 }
 

@@ -6,7 +6,7 @@
 //! multiple importance sampling must give the same.
 
 use croupier::Settings;
-use croupier::scene::blob::MaterialKind;
+use croupier::unstable::scene::blob::MaterialKind;
 use croupier_host::description::*;
 use croupier_tests::bsdf::{Case, unit};
 use croupier_tests::light_oracle::{Map, cross, dot, length, sub, wide};

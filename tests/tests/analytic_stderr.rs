@@ -1,7 +1,7 @@
 //! What the film says about its own error is true.
 
 use croupier::Settings;
-use croupier::film::{PixelStats, REL_MSE_EPSILON};
+use croupier::unstable::film::{PixelStats, REL_MSE_EPSILON};
 use croupier_tests::runner::{Image, Schedule, render, scheduled, settings};
 use croupier_tests::scenes::*;
 use croupier_tests::stats::normal_tail;

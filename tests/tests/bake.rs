@@ -1,8 +1,8 @@
 //! Descriptions into blobs: what is kept, what is dropped, what is refused, and the same bytes every time.
 
 use croupier::Scene;
-use croupier::scene::Effects;
-use croupier::scene::blob::{ALIGN, Header, LightKind, NONE, Section, TRIANGLE_SMOOTH, content_hash};
+use croupier::unstable::scene::Effects;
+use croupier::unstable::scene::blob::{ALIGN, Header, LightKind, NONE, Section, TRIANGLE_SMOOTH, content_hash};
 use croupier_host::bake::{BakeOptions, Baked, Stage, bake};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin::{cornell_box, sky};

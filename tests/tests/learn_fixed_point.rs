@@ -2,9 +2,9 @@
 //! 2) against a numerical minimum, and in the machine, where they settle.
 
 use croupier::Settings;
-use croupier::learn::Learning;
-use croupier::rrs::{Learned8, MAX_FACTOR, MIN_FACTOR, Norm, Strategy, Vertices8};
-use croupier::simd::{F32x8, U32x8, Vec3x8};
+use croupier::unstable::learn::Learning;
+use croupier::unstable::rrs::{Learned8, Local8, MAX_FACTOR, MIN_FACTOR, Norm, Strategy, Vertices8};
+use croupier::unstable::simd::{F32x8, U32x8, Vec3x8};
 use croupier_tests::minimum::minimise;
 use croupier_tests::runner::{Learned, Schedule, learning, settings};
 use croupier_tests::scenes::{blob, cornell};
@@ -85,12 +85,14 @@ impl Example {
                     error_weight: rgb(&|_, c| self.error_weight[c]),
                     norm: Norm::Mean,
                     cost_over_variance: F32x8::splat((self.cost(&s) / self.variance(&s)) as f32),
-                    mean: rgb(&|k, c| self.mean[k][c]),
-                    moment: rgb(&|k, c| self.variance[k][c] + self.mean[k][c].powi(2)),
-                    variance: rgb(&|k, c| self.variance[k][c]),
-                    cost: F32x8::from_fn(|k| self.cost[k] as f32),
-                    nee_share: F32x8::ONE,
-                    count: F32x8::splat(1e6),
+                    local: Local8 {
+                        mean: rgb(&|k, c| self.mean[k][c]),
+                        moment: rgb(&|k, c| self.variance[k][c] + self.mean[k][c].powi(2)),
+                        variance: rgb(&|k, c| self.variance[k][c]),
+                        cost: F32x8::from_fn(|k| self.cost[k] as f32),
+                        nee_share: F32x8::ONE,
+                        count: F32x8::splat(1e6),
+                    },
                 },
             });
             s = factors.to_array().map(f64::from).to_vec();

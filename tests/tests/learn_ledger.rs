@@ -1,9 +1,9 @@
 //! What the machine logs is what a recursive oracle finds with the same random numbers, and a ledger that is too small
 //! spoils nothing.
 
-use croupier::accel::WideBvh;
-use croupier::learn::cache::{Cache, CacheSize, VertexKind};
-use croupier::learn::{Learning, Objective, PixelEstimator};
+use croupier::unstable::accel::WideBvh;
+use croupier::unstable::learn::cache::{Cache, CacheSize, VertexKind};
+use croupier::unstable::learn::{Learning, Objective, PixelEstimator};
 use croupier::{Counters, Scene, Settings};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::description::{Model, Reflectance, SceneDescription};
@@ -21,7 +21,7 @@ fn whole_leaves(scene: &[u8], max_depth: u32) -> Settings {
     let learning = Learning {
         cache_bytes: 16_000,
         ledger: 1 << 14,
-        estimate: PixelEstimator::Blocks,
+        pixel_estimator: PixelEstimator::Blocks,
         objective: Objective::Absolute,
         samples: u32::MAX,
         ..s.learning

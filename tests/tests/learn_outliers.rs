@@ -2,8 +2,8 @@
 //! decide all factors.
 
 use croupier::Settings;
-use croupier::film::PixelStats;
-use croupier::learn::{Learning, PictureStatistics};
+use croupier::unstable::film::PixelStats;
+use croupier::unstable::learn::{Learning, PictureStatistics};
 use croupier_host::description::*;
 use croupier_tests::cache::{FIELDS, Oracle};
 use croupier_tests::runner::{Learned, Schedule, learning, settings};

@@ -1,13 +1,14 @@
 //! Numbers that must not do harm: bad ones are counted and stay out of the film, large, small and far away scenes look
 //! like others, bounds of steps and counters hold.
 
-use croupier::accel::{Intersector, WideBvh};
-use croupier::film::{PixelAov, PixelStats};
-use croupier::geometry::{Hit8, Ray8};
-use croupier::profile::Full;
-use croupier::scene::blob::NONE;
-use croupier::simd::{F32x8, Mask8, U32x8};
-use croupier::{Budget, Counters, MAX_PATH_LENGTH, Plan, Scene, Session, Settings, Shard, StepResult};
+use croupier::unstable::MAX_PATH_LENGTH;
+use croupier::unstable::accel::{Intersector, WideBvh};
+use croupier::unstable::film::{PixelAov, PixelStats};
+use croupier::unstable::geometry::{Hit8, Ray8};
+use croupier::unstable::profile::Full;
+use croupier::unstable::scene::blob::NONE;
+use croupier::unstable::simd::{F32x8, Mask8, U32x8};
+use croupier::{Budget, Counters, Plan, Scene, Session, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::description::*;
 use croupier_tests::runner::{Image, Schedule, render, render_with, scheduled, settings};

@@ -1,7 +1,7 @@
 //! Factors, their rounding and their bounds.
 
-use croupier::rrs::{COMB_ONE, Learned8, MAX_FACTOR, MIN_FACTOR, Norm, Strategy, Vertices8, comb};
-use croupier::simd::{F32x8, U32x8, Vec3x8};
+use croupier::unstable::rrs::{COMB_ONE, Learned8, Local8, MAX_FACTOR, MIN_FACTOR, Norm, Strategy, Vertices8, comb};
+use croupier::unstable::simd::{F32x8, U32x8, Vec3x8};
 use croupier_tests::stats::SplitMix;
 
 /// Mean of n over all u on a grid of `m` equally spaced values that includes 0: exact for a comb in fixed point whose
@@ -142,12 +142,14 @@ fn learned(mean: f32, moment: f32, variance: f32, cost: f32) -> Vertices8 {
         error_weight: Vec3x8::ONE,
         norm: Norm::Mean,
         cost_over_variance: F32x8::ONE,
-        mean: grey(mean),
-        moment: grey(moment),
-        variance: grey(variance),
-        cost: F32x8::splat(cost),
-        nee_share: F32x8::ONE,
-        count: F32x8::splat(1e12),
+        local: Local8 {
+            mean: grey(mean),
+            moment: grey(moment),
+            variance: grey(variance),
+            cost: F32x8::splat(cost),
+            nee_share: F32x8::ONE,
+            count: F32x8::splat(1e12),
+        },
     };
     Vertices8 { beta: grey(1.0), albedo: grey(0.5), learned, ..vertices(1.0, 0.5, 1) }
 }
@@ -212,7 +214,7 @@ fn factors_are_the_most_efficient_ones() {
     };
     assert_eq!(change(&|_| ()), 0.5);
     assert_eq!(change(&|v| v.beta = v.beta * 0.5), 0.25);
-    assert_eq!(change(&|v| v.learned.cost = F32x8::splat(4.0)), 0.25);
+    assert_eq!(change(&|v| v.learned.local.cost = F32x8::splat(4.0)), 0.25);
     assert_eq!(change(&|v| v.learned.cost_over_variance = F32x8::splat(4.0)), 1.0);
     assert_eq!(change(&|v| v.learned.error_weight = v.learned.error_weight * 4.0), 1.0);
     // (1 + 4 x 2 + 0) / 3 of a moment of 0.25
@@ -243,20 +245,21 @@ fn ignorance_is_classic() {
                 f(&mut l);
                 with(strategy, &Vertices8 { learned: l, ..vertices(0.25, 0.5, depth) })
             };
-            assert_eq!(with(&|l| l.count = F32x8::ZERO), classic, "{strategy}: an empty bin");
+            assert_eq!(with(&|l| l.local.count = F32x8::ZERO), classic, "{strategy}: an empty bin");
             assert_eq!(with(&|l| l.cost_over_variance = F32x8::ZERO), classic, "{strategy}: no picture");
             assert!(with(&|_| ()) < 0.06, "{strategy} knows that nothing is there");
         }
     }
     for strategy in ["adrr", "adrrs"] {
-        let empty = Learned8 { count: F32x8::ZERO, ..learned(0.5, 1.0, 1.0, 1.0).learned };
+        let mut empty = learned(0.5, 1.0, 1.0, 1.0).learned;
+        empty.local.count = F32x8::ZERO;
         let v = Vertices8 { learned: empty, ..vertices(0.25, 0.5, 6) };
         assert_eq!(with(strategy, &v), factor("classic", 0.25, 0.5, 6));
     }
     // in between: neither classic's 1 nor the rule's 0.05, and nearer to the rule with more samples
     let at = |count: f32| {
         let mut v = learned(1e-3, 1e-6, 1e-6, 1.0);
-        v.learned.count = F32x8::splat(count);
+        v.learned.local.count = F32x8::splat(count);
         with("ears", &v)
     };
     let few = [1.0, 10.0, 100.0, 1e4].map(at);
@@ -293,8 +296,8 @@ fn light_samples_play_by_the_rule() {
         );
         let (share, ratio) = (random(1e-3, 1.0), random(1e-2, 10.0));
         let mut l = learned(0.1, 1.0, 1.0, 7.0).learned;
-        (l.moment, l.error_weight) = (rgb(moment), rgb(error_weight));
-        (l.nee_share, l.cost_over_variance) = (F32x8::splat(share), F32x8::splat(ratio));
+        (l.local.moment, l.error_weight) = (rgb(moment), rgb(error_weight));
+        (l.local.nee_share, l.cost_over_variance) = (F32x8::splat(share), F32x8::splat(ratio));
         let chance = |square: &dyn Fn(usize) -> f64, factor: f64| {
             let mean = (0..3).map(|c| square(c) * f64::from(error_weight[c])).sum::<f64>() / 3.0;
             (mean * factor * f64::from(ratio) / 0.5).sqrt()
@@ -325,13 +328,13 @@ fn light_samples_are_drawn_where_nothing_is_known() {
         l.nee_probability(grey(beta), grey(0.5)).lane(1)
     };
     assert_eq!(with(0.5, &|_| ()), MIN_FACTOR);
-    assert_eq!(with(0.5, &|l| l.count = F32x8::ZERO), 1.0);
+    assert_eq!(with(0.5, &|l| l.local.count = F32x8::ZERO), 1.0);
     assert_eq!(with(0.5, &|l| l.cost_over_variance = F32x8::ZERO), 1.0);
     for bad in [f32::NAN, f32::INFINITY] {
-        assert_eq!(with(0.5, &|l| l.nee_share = F32x8::splat(bad)), 1.0);
-        assert_eq!(with(0.5, &|l| l.moment = grey(bad)), 1.0);
+        assert_eq!(with(0.5, &|l| l.local.nee_share = F32x8::splat(bad)), 1.0);
+        assert_eq!(with(0.5, &|l| l.local.moment = grey(bad)), 1.0);
     }
-    let half = with(0.5, &|l| l.count = F32x8::splat(256.0));
+    let half = with(0.5, &|l| l.local.count = F32x8::splat(256.0));
     assert!((half - 0.5).abs() < 0.01, "{half}");
     for (beta, expected) in [(4.0, 0.2), (16.0, 0.8), (400.0, 1.0)] {
         assert!((with(beta, &|_| ()) - expected).abs() < 1e-5, "throughput {beta}");

@@ -1,6 +1,6 @@
 //! The eight-lane types: masks, selection, minima, rounding, integers, reductions, frames, normalisation.
 
-use croupier::simd::{F32x8, Frame8, I32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::simd::{F32x8, Frame8, I32x8, Mask8, U32x8, Vec3x8};
 use croupier_tests::math::{Random, canonical_bits};
 
 /// Zeros, subnormal and normal limits, 1 and neighbours, halves, integer limits, largest, infinity, NaN; both signs.
@@ -271,7 +271,7 @@ fn vectors_work_lane_by_lane() {
                 assert_eq!(kept.lane(i).map(f32::to_bits), [0; 3]);
                 continue;
             }
-            if croupier::simd::REPRODUCIBLE {
+            if croupier::unstable::simd::REPRODUCIBLE {
                 assert_eq!(d.lane(i), p[2] * q[2] + (p[1] * q[1] + p[0] * q[0]));
             }
             let want = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];

@@ -22,8 +22,9 @@
 //! should be, or the scenes are not there; 1 otherwise.
 
 use clap::Parser;
-use croupier::learn::{ControlVariate, Learning, PixelEstimator};
-use croupier::{Counters, MIN_RING, Settings, Strategy};
+use croupier::unstable::MIN_RING;
+use croupier::unstable::learn::{ControlVariate, Learning, PixelEstimator};
+use croupier::{Counters, Settings, Strategy};
 use croupier_benches::results::{Results, Table};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
@@ -144,8 +145,12 @@ impl Trial {
             Self::Budget => s.split_budget = 4,
             Self::Small => {
                 (s.ring, s.shadow_roulette, s.control_variate) = (MIN_RING, true, ControlVariate::Cached);
-                s.learning =
-                    Learning { ledger: 4, cache_bytes: 16 << 10, estimate: PixelEstimator::Blocks, ..s.learning };
+                s.learning = Learning {
+                    ledger: 4,
+                    cache_bytes: 16 << 10,
+                    pixel_estimator: PixelEstimator::Blocks,
+                    ..s.learning
+                };
             }
         }
     }

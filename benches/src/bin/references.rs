@@ -23,7 +23,7 @@ use croupier::{Scene, Settings};
 use croupier_benches::results::{Results, Table};
 use croupier_benches::subject::Subject;
 use croupier_benches::variant::Variant;
-use croupier_host::compare::{Bias, BiasOptions, BlockZ, Estimate, Ratio, block_scores, ratio};
+use croupier_host::compare::{Bias, BiasOptions, BlockZ, MeanImage, Ratio, block_scores, ratio};
 use croupier_host::drive::{Options, Unobserved, drive_scene};
 use croupier_host::image::{Picture, Rgb};
 use croupier_host::render::Target;
@@ -282,7 +282,7 @@ fn test(subject: &Subject, spp: u32, args: &Args, plan: &Plan, strategy: &str) -
         let [width, height] = rendered.size.map(|s| s as usize);
         images.push(Rgb::new(width, height, rendered.image()).ok_or("a picture without its pixels")?);
     }
-    let image = Estimate::from_seeds(&images)?;
+    let image = MeanImage::from_seeds(&images)?;
     let name = plan.depth.map_or(strategy.into(), |d| format!("{strategy}, depth {d}"));
     if let Some(folder) = &args.save {
         save(&image, &folder.join(format!("{} {name}.exr", subject.name).replace([' ', ':', ','], "_")))?;
@@ -313,7 +313,7 @@ fn test(subject: &Subject, spp: u32, args: &Args, plan: &Plan, strategy: &str) -
     })
 }
 
-fn save(image: &Estimate, path: &Path) -> Result<(), Box<dyn Error>> {
+fn save(image: &MeanImage, path: &Path) -> Result<(), Box<dyn Error>> {
     let layer =
         |pixels: &[[f64; 3]], f: fn(f64) -> f64| -> Vec<_> { pixels.iter().map(|p| p.map(|x| f(x) as f32)).collect() };
     let mut picture = Picture::new(image.width, image.height);

@@ -20,7 +20,7 @@ struct Args {
     write: bool,
 }
 
-const NAME: &str = if croupier::simd::REPRODUCIBLE { "ulp" } else { "ulp-fast" };
+const NAME: &str = if croupier::unstable::simd::REPRODUCIBLE { "ulp" } else { "ulp-fast" };
 const PARTS: u64 = 64;
 
 fn exhaustive(f: &'static Unary) -> Sweep {

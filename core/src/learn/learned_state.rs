@@ -10,7 +10,7 @@ use crate::cost::COST_BOUNCE;
 use crate::counters::Counters;
 use crate::film::Film;
 use crate::memory::{Carver, Measure, MemoryError};
-use crate::rrs::{Learned8, Space};
+use crate::rrs::{Learned8, Local8, Space};
 use crate::scene::Scene;
 use crate::tiles::BlockGrid;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -162,12 +162,13 @@ impl<'m> LearnedState<'m> {
         let Some(cache) = &self.cache else { return };
         let l = cache.local(bin, active);
         let square = unscale * unscale;
-        learned.mean = l.mean * unscale;
-        learned.moment = l.moment * square;
-        learned.variance = l.variance * square;
-        learned.cost = l.cost.max(F32x8::splat(COST_BOUNCE));
-        learned.nee_share = l.nee_share;
-        learned.count = l.count;
+        learned.local = Local8 {
+            mean: l.mean * unscale,
+            moment: l.moment * square,
+            variance: l.variance * square,
+            cost: l.cost.max(F32x8::splat(COST_BOUNCE)),
+            ..l
+        };
     }
 
     /// The picture per camera sample: of the last iteration, and as factors use it.

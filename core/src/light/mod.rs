@@ -94,9 +94,10 @@ impl LightSample8 {
 /// one above 0: point and directional lights are found in no other way. How good the choice is shows in the noise only.
 ///
 /// ```
-/// use croupier::light::LightSelector;
-/// use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
-/// use croupier::{Plan, Scene, Session, SessionError, accel::WideBvh, profile::Full};
+/// use croupier::unstable::light::LightSelector;
+/// use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
+/// use croupier::{Plan, Scene, Session, SessionError};
+/// use croupier::unstable::{accel::WideBvh, profile::Full};
 ///
 /// /// All lights alike.
 /// struct Uniform(u32);

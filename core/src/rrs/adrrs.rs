@@ -39,7 +39,7 @@ pub(super) fn window(v: F32x8) -> F32x8 {
 pub(super) fn guarded(v: &Vertices8) -> F32x8 {
     let l = &v.learned;
     let s = window(l.contribution(v.beta));
-    let t = l.trust(TRUST);
+    let t = l.local.trust(TRUST);
     Classic::default().factor(v) * (F32x8::ONE - t) + s * t
 }
 

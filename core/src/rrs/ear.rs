@@ -29,6 +29,6 @@ impl RrsStrategy for Ear {
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
         let l = &v.learned;
-        ears::grown(v, l.efficient_square(v.beta, l.moment).sqrt(), self.plain).min(F32x8::ONE)
+        ears::grown(v, l.efficient_square(v.beta, l.local.moment).sqrt(), self.plain).min(F32x8::ONE)
     }
 }

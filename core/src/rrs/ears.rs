@@ -49,7 +49,7 @@ pub(super) fn parse_plain(options: &str) -> Option<bool> {
 #[inline(always)]
 pub(super) fn split_or_kill(l: &Learned8, beta: Vec3x8) -> F32x8 {
     let one = F32x8::ONE;
-    let (kill, split) = (l.efficient_square(beta, l.moment), l.efficient_square(beta, l.variance));
+    let (kill, split) = (l.efficient_square(beta, l.local.moment), l.efficient_square(beta, l.local.variance));
     kill.le(one).select(kill, split.max(one)).sqrt()
 }
 
@@ -77,15 +77,15 @@ pub(super) fn least_throughput(beta: Vec3x8, albedo: Vec3x8) -> F32x8 {
 pub(super) fn grown(v: &Vertices8, s: F32x8, plain: bool) -> F32x8 {
     let l = &v.learned;
     let classic = Classic::default().factor(v);
-    let known = l.count.gt(F32x8::ZERO) & l.cost_over_variance.gt(F32x8::ZERO);
+    let known = l.local.count.gt(F32x8::ZERO) & l.cost_over_variance.gt(F32x8::ZERO);
     if plain {
         return known.select(s, classic);
     }
     let blend = |a: F32x8, b: F32x8, t: F32x8| a + (b - a) * t;
     let window = adrrs::window(l.contribution(v.beta));
     let broken = known.and_not(s.is_finite() & window.is_finite());
-    let learned = blend(level(window), level(s), l.trust(TRUST_MOMENT));
-    let s = known.select(from_level(blend(level(classic), learned, l.trust(TRUST_MEAN))), classic);
+    let learned = blend(level(window), level(s), l.local.trust(TRUST_MOMENT));
+    let s = known.select(from_level(blend(level(classic), learned, l.local.trust(TRUST_MEAN))), classic);
     // what is killed out of ignorance comes back as a few samples of enormous weight: no factor below 1 brings the
     // throughput over the limit
     let s = s.max(least_throughput(v.beta, v.albedo));

@@ -54,7 +54,43 @@ pub enum Space {
     Image,
 }
 
-/// Statistics that were frozen before the iteration began, one vertex per lane.
+/// Local statistics of the samples of eight vertices, one vertex per lane. All values are finite and none is negative.
+#[derive(Clone, Copy, Debug)]
+pub struct Local8 {
+    /// Mean of one sample's reflected radiance, rgb (EARS, eq. 36).
+    pub mean: Vec3x8,
+    /// Mean of its square, at least `mean^2` (eq. 35).
+    pub moment: Vec3x8,
+    /// Its variance at a point, without the spread of the mean over the cell as far as pairs of samples of one vertex
+    /// tell; at most `moment` (eq. 37).
+    pub variance: Vec3x8,
+    /// Mean counted cost of one sample ([`crate::cost::COST_BOUNCE`] and its like; eq. 38).
+    pub cost: F32x8,
+    /// Mean square of its light sample over `moment`, over all channels, at most 1.
+    pub nee_share: F32x8,
+    /// Confidence: samples behind these numbers, older ones discounted; 0 where nothing is known.
+    pub count: F32x8,
+}
+
+impl Local8 {
+    /// Nothing known.
+    pub const NONE: Self = Self {
+        mean: Vec3x8::ZERO,
+        moment: Vec3x8::ZERO,
+        variance: Vec3x8::ZERO,
+        cost: F32x8::ONE,
+        nee_share: F32x8::ONE,
+        count: F32x8::ZERO,
+    };
+
+    /// Confidence in [0, 1): half at `samples`.
+    #[inline(always)]
+    pub fn trust(&self, samples: f32) -> F32x8 {
+        self.count / (self.count + F32x8::splat(samples))
+    }
+}
+
+/// Statistics that were frozen before the iteration began, one vertex per lane: of the picture and of the vertex.
 #[derive(Clone, Copy, Debug)]
 pub struct Learned8 {
     /// What a squared error of the pixel's rgb counts in the error of the picture: 1 / (I^2 + 0.01) for the relative
@@ -64,46 +100,27 @@ pub struct Learned8 {
     pub norm: Norm,
     /// Mean cost of a camera sample over its mean error (eqs. 33, 34); 0 while unknown.
     pub cost_over_variance: F32x8,
-    /// Mean of one sample's reflected radiance (eq. 36).
-    pub mean: Vec3x8,
-    /// Mean of its square (eq. 35).
-    pub moment: Vec3x8,
-    /// Its variance at a point (eq. 37).
-    pub variance: Vec3x8,
-    /// Mean cost of one sample (eq. 38).
-    pub cost: F32x8,
-    /// Mean square of the sample's light sample over `moment`, at most 1.
-    pub nee_share: F32x8,
-    /// Samples behind these; 0 means that nothing is known.
-    pub count: F32x8,
+    /// Statistics of the vertex's samples, in radiance.
+    pub local: Local8,
 }
 
 impl Learned8 {
     /// Nothing known: errors count absolutely.
-    pub const NONE: Self = Self {
-        error_weight: Vec3x8::ONE,
-        norm: Norm::Mean,
-        cost_over_variance: F32x8::ZERO,
-        mean: Vec3x8::ZERO,
-        moment: Vec3x8::ZERO,
-        variance: Vec3x8::ZERO,
-        cost: F32x8::ONE,
-        nee_share: F32x8::ONE,
-        count: F32x8::ZERO,
-    };
+    pub const NONE: Self =
+        Self { error_weight: Vec3x8::ONE, norm: Norm::Mean, cost_over_variance: F32x8::ZERO, local: Local8::NONE };
 
     /// The square of the factor that is best for samples whose square is expected to be `r`: eq. 32 for prefix weight
     /// `beta`.
     #[inline(always)]
     pub fn efficient_square(&self, beta: Vec3x8, r: Vec3x8) -> F32x8 {
         let error = self.norm.of(beta * beta * self.error_weight * r);
-        error * self.cost_over_variance / self.cost
+        error * self.cost_over_variance / self.local.cost
     }
 
     /// The expected contribution of a vertex in units of its pixel, mean over the channels.
     #[inline(always)]
     pub fn contribution(&self, beta: Vec3x8) -> F32x8 {
-        (beta * self.mean * self.root_error_weight()).mean()
+        (beta * self.local.mean * self.root_error_weight()).mean()
     }
 
     /// Per channel: 1 over the pixel for the relative objective, 1 for the absolute.
@@ -111,12 +128,6 @@ impl Learned8 {
     pub fn root_error_weight(&self) -> Vec3x8 {
         let i = self.error_weight;
         Vec3x8::new(i.x.sqrt(), i.y.sqrt(), i.z.sqrt())
-    }
-
-    /// Confidence in [0, 1): half at `samples`.
-    #[inline(always)]
-    pub fn trust(&self, samples: f32) -> F32x8 {
-        self.count / (self.count + F32x8::splat(samples))
     }
 }
 

@@ -18,10 +18,10 @@ impl Learned8 {
     #[inline(always)]
     pub fn nee_probability(&self, beta: Vec3x8, albedo: Vec3x8) -> F32x8 {
         let one = F32x8::ONE;
-        let error = self.norm.of(beta * beta * self.error_weight * self.moment) * self.nee_share;
+        let error = self.norm.of(beta * beta * self.error_weight * self.local.moment) * self.local.nee_share;
         let best = (error * self.cost_over_variance * F32x8::splat(1.0 / COST_SHADOW)).sqrt();
-        let known = self.count.gt(F32x8::ZERO) & self.cost_over_variance.gt(F32x8::ZERO) & best.is_finite();
-        let grown = one + (best.min(one) - one) * self.trust(TRUST_MOMENT);
+        let known = self.local.count.gt(F32x8::ZERO) & self.cost_over_variance.gt(F32x8::ZERO) & best.is_finite();
+        let grown = one + (best.min(one) - one) * self.local.trust(TRUST_MOMENT);
         known.select(grown.max(least_throughput(beta, albedo)).clamp(MIN_FACTOR, 1.0), one)
     }
 

@@ -33,7 +33,7 @@ pub use contribution::Contribution;
 pub use ear::Ear;
 pub use ears::Ears;
 pub use fixed::Fixed;
-pub use learned::{Learned8, Norm, Space};
+pub use learned::{Learned8, Local8, Norm, Space};
 pub use none::None;
 pub use threshold::Threshold;
 pub use throughput::Throughput;

@@ -4,7 +4,7 @@
 //! the estimator divides by differ, and the estimate is biased by the difference (NUMERICS SMP-3). Here the weights
 //! become integer widths first; the widths, the thresholds and the probabilities then follow exactly.
 
-use croupier::scene::blob::Alias;
+use croupier::unstable::scene::blob::Alias;
 use std::cmp::Ordering;
 
 /// How many 32-bit numbers there are.

@@ -21,7 +21,7 @@ pub use error::BakeError;
 use crate::blob::{AlignedBytes, BlobWriter};
 use crate::bvh;
 use crate::description::SceneDescription;
-use croupier::scene::blob::{SceneInfo, SectionKind};
+use croupier::unstable::scene::blob::{SceneInfo, SectionKind};
 
 /// Choices of baking.
 #[derive(Clone, Copy, Debug, Default)]

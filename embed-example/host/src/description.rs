@@ -21,7 +21,7 @@
 //! # Ok::<(), croupier_host::bake::BakeError>(())
 //! ```
 
-use croupier::scene::blob::MaterialKind;
+use croupier::unstable::scene::blob::MaterialKind;
 
 /// A whole scene. Indices are positions in the `Vec`s here.
 #[derive(Clone, Debug)]
@@ -99,7 +99,7 @@ pub enum Reflectance {
 }
 
 /// Parameters that a model has, by their keys in scene files; see the core's `bsdf` for the formulas and
-/// [`Parameter`](croupier::scene::blob::Parameter) for the ranges.
+/// [`Parameter`](croupier::unstable::scene::blob::Parameter) for the ranges.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ModelParameters {
     /// Diffuse albedo, or scale of a specular reflection.

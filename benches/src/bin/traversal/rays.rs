@@ -1,8 +1,8 @@
 //! The scene of the benchmark, and its sets of rays in the layouts of the kernels.
 
-use croupier::accel::{Intersector, WideBvh};
-use croupier::geometry::Ray8;
-use croupier::simd::{F32x8, Mask8, Vec3x8};
+use croupier::unstable::accel::{Intersector, WideBvh};
+use croupier::unstable::geometry::Ray8;
+use croupier::unstable::simd::{F32x8, Mask8, Vec3x8};
 use glam::Vec3;
 use obvhs::ray::Ray;
 use std::path::Path;

@@ -1,6 +1,7 @@
 //! The statistics of one bin, in the three forms they take: gathered, kept, looked up.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
+use crate::rrs::Local8;
 use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, U32x8, Vec3x8};
 
@@ -275,35 +276,17 @@ pub(super) fn freeze_leaf(
     }
 }
 
-/// What the cache knows of eight bins. All values are finite and none is negative; of a leaf without
-/// samples all are 0. Means and variances are up to 2^-7 (0.8 %) too small, moments too large.
-#[derive(Clone, Copy, Debug)]
-pub struct Local8 {
-    /// Mean of the values.
-    pub mean: Vec3x8,
-    /// Mean of their squares, at least `mean^2`.
-    pub moment: Vec3x8,
-    /// Their variance at a point, without the spread of the mean over the cell as far as pairs tell; at most `moment`.
-    pub variance: Vec3x8,
-    /// Mean counted cost of a sample ([`crate::cost::COST_BOUNCE`] and its like).
-    pub cost: F32x8,
-    /// Mean square of their light samples over `moment`, over all channels, at most 1.
-    pub nee_share: F32x8,
-    /// Confidence: samples of the bin itself, older ones discounted. Its surroundings, which the other numbers lean on,
-    /// do not count.
-    pub count: F32x8,
-}
-
-impl Local8 {
+impl Frozen {
+    /// Rows of eight bins, one per lane.
     #[inline(always)]
-    pub(super) fn gather(rows: [&Frozen; 8]) -> Self {
-        let row = |f: &Frozen| F32x8::new(*bytemuck::cast_ref::<_, [f32; 8]>(f));
+    pub(super) fn transpose(rows: [&Self; 8]) -> Local8 {
+        let row = |f: &Self| F32x8::new(*bytemuck::cast_ref::<_, [f32; 8]>(f));
         let [f0, f1, f2, f3, f4, f5, f6, f7] = rows;
         let rows = [row(f0), row(f1), row(f2), row(f3), row(f4), row(f5), row(f6), row(f7)];
         let [count, cost, a, b, c, d, e, nee_share] = F32x8::transpose(rows);
         let below = |w: F32x8| F32x8::from_bits(w.to_bits() << 16);
         let above = |w: F32x8| F32x8::from_bits(w.to_bits() & U32x8::splat(0xffff_0000));
-        Self {
+        Local8 {
             mean: Vec3x8::new(below(a), above(a), below(b)),
             moment: Vec3x8::new(above(b), below(c), above(c)),
             variance: Vec3x8::new(below(d), above(d), below(e)),

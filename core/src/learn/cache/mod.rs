@@ -29,7 +29,7 @@ mod training;
 mod tree;
 
 pub(super) use bins::BINS;
-pub use bins::{BIN_LIMIT, Local8, MAX_VALUE, NO_BIN};
+pub use bins::{BIN_LIMIT, MAX_VALUE, NO_BIN};
 pub use kind::{VertexKind, VertexKind8};
 pub use save::CacheError;
 pub use shared::Cache;

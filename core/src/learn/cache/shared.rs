@@ -1,13 +1,14 @@
 //! The side of the cache that all shards look up in.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
-use super::bins::{BINS, BinSums, Frozen, Local8, NO_BIN, freeze_leaf};
+use super::bins::{BINS, BinSums, Frozen, NO_BIN, freeze_leaf};
 use super::kind::VertexKind8;
 use super::size::CacheSize;
 use super::training::Training;
 use super::tree::{MAX_DEPTH, OctreeNode, ROOTS, Tree, direction_bin};
 use crate::learn::settings::Objective;
 use crate::memory::{Carver, Layout, Measure, MemoryError};
+use crate::rrs::Local8;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Samples that the surroundings of a cell count for in it.
@@ -129,14 +130,16 @@ impl<'m> Cache<'m> {
         F32x8::new(bin.to_array().map(one)) / F32x8::splat(255.0)
     }
 
-    /// What is known of eight bins; 0 in inactive lanes and for bins that are not in use.
+    /// What is known of eight bins; all 0 in inactive lanes, for bins that are not in use and in leaves without samples.
+    /// Values are those that were logged. Means and variances are up to 2^-7 (0.8 %) too small, moments too large.
+    /// `count` has the samples of the bin itself; its surroundings, which the other numbers lean on, do not count.
     #[inline]
     pub fn local(&self, bin: U32x8, active: Mask8) -> Local8 {
         // beyond the bins in use lies whatever the caller's memory held
         let used = self.frozen.get(..self.bins() as usize).unwrap_or(&[]);
         let row = |b: u32| used.get(b as usize).unwrap_or(&Frozen::ZERO);
         let [a, b, c, d, e, f, g, h] = U32x8::select(active, bin, U32x8::splat(NO_BIN)).to_array();
-        Local8::gather([row(a), row(b), row(c), row(d), row(e), row(f), row(g), row(h)])
+        Frozen::transpose([row(a), row(b), row(c), row(d), row(e), row(f), row(g), row(h)])
     }
 
     /// Begins the end of an iteration: everything so far counts `keep` times as much, 0 to 1.

@@ -2,8 +2,8 @@
 
 use super::BakeError;
 use crate::description::{SceneDescription, Triangle, Vertex};
-use croupier::scene::blob::MAX_COORDINATE;
-use croupier::scene::blob::{self, NONE, TRIANGLE_SMOOTH};
+use croupier::unstable::scene::blob::MAX_COORDINATE;
+use croupier::unstable::scene::blob::{self, NONE, TRIANGLE_SMOOTH};
 use glam::Vec3;
 
 /// Geometry of the blob, and what else baking needs of it.
