@@ -9,6 +9,7 @@ pub fn of_this_run(bin: &str) -> Vec<(String, String)> {
         ("commit", Some(commit())),
         ("command", Some(command(bin))),
         ("machine", Some(machine())),
+        ("load before", load()),
         ("compiler", Some(COMPILER.into())),
         ("instruction set", Some(instruction_set())),
         ("arithmetic", Some(ARITHMETIC.into())),
@@ -82,6 +83,11 @@ fn machine() -> String {
     let kind = kind.map_or(String::new(), |(family, model)| format!(" (family {family}, model {model})"));
     let cores = std::thread::available_parallelism().map_or("unknown".into(), |n| n.to_string());
     format!("{model}{kind}, {cores} cores")
+}
+
+/// Processes that wanted a core in the minute before, on average: what else the machine did, which times tell of.
+fn load() -> Option<String> {
+    Some(std::fs::read_to_string("/proc/loadavg").ok()?.split(' ').next()?.into())
 }
 
 /// Output of a program without its line end; `None` if it cannot run or fails.

@@ -42,8 +42,8 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 const NAME: &str = "equivalence";
-const COLUMNS: &str = "scene, strategy, max depth, seeds, difference, standard error, Mrays, splits, terminated, limited, \
-                       verdict";
+const COLUMNS: &str =
+    "scene, strategy, max depth, seeds, difference, standard error, Mrays, splits, terminated, limited, verdict";
 
 /// Half-width of what counts as equal, relative to the mean.
 const DELTA: f64 = 0.002;

@@ -28,7 +28,8 @@ struct Args {
     /// Runs of each row for its speed; 0 leaves the speed out.
     #[arg(long, default_value_t = 5)]
     rounds: usize,
-    /// Compare the deterministic columns of the built-in scene with benches/results/machine.md; exit status 1 if they differ.
+    /// Compare the deterministic columns of the built-in scene with benches/results/machine.md; exit status 1 if they
+    /// differ.
     #[arg(long)]
     check: bool,
     /// Write benches/results/machine.md; needs all three scenes.
