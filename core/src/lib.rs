@@ -63,6 +63,7 @@
 //! Comments that say `NUMERICS XXX-n` refer to the rows of docs/NUMERICS.md: hard numerical cases and their tests.
 #![no_std]
 #![forbid(unsafe_code)]
+#![deny(clippy::expect_used, clippy::panic, clippy::unreachable, clippy::unwrap_used)]
 
 mod accel;
 mod bsdf;

@@ -314,10 +314,10 @@ fn scattering_samples_the_bsdf() {
                 assert!(cos > 0.0 && out.rays.ray.o.lane(i)[2] > 0.0);
                 close(out.rays.pdf.lane(i), cos / PI);
                 close(out.nee.pdf.lane(i), 1.0 / PI);
-                for c in 0..3 {
-                    close(out.rays.weight.lane(i)[c], FLOOR[c]);
-                    close(out.rays.beta.lane(i)[c], 2.0 * FLOOR[c]);
-                    close(out.nee.f.lane(i)[c], FLOOR[c] / PI);
+                for (c, rho) in FLOOR.into_iter().enumerate() {
+                    close(out.rays.weight.lane(i)[c], rho);
+                    close(out.rays.beta.lane(i)[c], 2.0 * rho);
+                    close(out.nee.f.lane(i)[c], rho / PI);
                 }
             }
             assert_eq!(out.rays.path.depth.to_array(), [2; 8]);
