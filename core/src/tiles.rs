@@ -78,7 +78,9 @@ impl BlockGrid {
 /// Assignment of a picture's tiles to shards, interleaved so that neighbours in both directions differ.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tiles {
-    grid: BlockGrid,
+    size: [u32; 2],
+    columns: u32,
+    rows: u32,
     shards: u32,
     /// Tiles to skip per row, so that a column does not belong to one shard.
     skew: u32,
@@ -93,40 +95,41 @@ impl Tiles {
     pub(crate) fn new(size: [u32; 2], shards: u32) -> Self {
         // near the golden section of the shard count: rows start far apart
         let skew = (f64::from(shards) * 0.618_034) as u32;
-        Self { grid: BlockGrid::tiles(size), shards, skew }
+        let BlockGrid { columns, rows, .. } = BlockGrid::tiles(size);
+        Self { size, columns, rows, shards, skew }
     }
 
     fn owner(&self, tile: u32) -> u32 {
-        let (x, y) = (tile % self.grid.columns, tile / self.grid.columns);
+        let (x, y) = (tile % self.columns, tile / self.columns);
         ((u64::from(x) + u64::from(y) * u64::from(self.skew.max(1))) % u64::from(self.shards)) as u32
     }
 
-    /// The first tile of `shard` at or after `tile`.
+    /// First tile of `shard` at or after `tile`.
     pub(crate) fn next_of(&self, shard: u32, tile: u32) -> Option<u32> {
-        (tile..self.grid.count() as u32).find(|&t| self.owner(t) == shard)
+        (tile..self.columns * self.rows).find(|&t| self.owner(t) == shard)
     }
 
     /// Upper bound of the tiles that a shard owns.
     pub(crate) fn most_tiles(&self) -> usize {
         // per row of tiles the owners run through all shards in turn
-        (self.grid.rows as usize).saturating_mul(self.grid.columns.div_ceil(self.shards) as usize)
+        (self.rows as usize).saturating_mul(self.columns.div_ceil(self.shards) as usize)
     }
 
     /// First column and row of a tile.
     pub(crate) fn start(&self, tile: u32) -> [u32; 2] {
-        self.grid.start(tile)
+        [tile % self.columns * TILE, tile / self.columns * TILE]
     }
 
     /// Column and row of slot `slot` (Morton order) of the tile that starts at `[x, y]`, if inside the picture.
     #[inline]
     pub(crate) fn pixel(&self, [x, y]: [u32; 2], slot: u32) -> Option<[u32; 2]> {
         let (x, y) = (x + even_bits(slot), y + even_bits(slot >> 1));
-        (x < self.grid.size[0] && y < self.grid.size[1]).then_some([x, y])
+        (x < self.size[0] && y < self.size[1]).then_some([x, y])
     }
 
     /// Film index of a pixel.
     pub(crate) fn film_index(&self, pixel: [u32; 2]) -> usize {
-        film_index(self.grid.size, pixel)
+        film_index(self.size, pixel)
     }
 }
 

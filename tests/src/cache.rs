@@ -104,7 +104,7 @@ pub fn iterate(cache: &mut Cache<'_>, shards: &mut [Training<'_>], n: usize, spl
             assert!(t.log(bin, x, (rng.bits() >> 61) as f32));
             assert!(t.log_pair(bin, x));
             assert!(t.log_shadow(bin, x[0] < 0.02));
-            t.log_light(bin, x, 0.5);
+            t.log_nee(bin, x, 0.5);
         }
     }
     cache.begin_merge(1.0);

@@ -207,7 +207,7 @@ fn sums_equal_an_oracle() {
                 let cost = 20.0 * rng.f32();
                 assert!(t.log(bin as u32, x, cost) && t.log_pair(bin as u32, pair));
                 assert!(t.log_shadow(bin as u32, x[0] < 3.0));
-                t.log_light(bin as u32, x, 0.25);
+                t.log_nee(bin as u32, x, 0.25);
                 let e = &mut expected[bin];
                 e[14] += 0.25 * x.map(|x| f64::from(x) * f64::from(x)).iter().sum::<f64>();
                 e[12] += 1.0;
@@ -254,7 +254,7 @@ fn a_billion_samples_keep_their_mean() {
     }
     assert!(!t.log(7, [1.0; 3], 1.0) && !t.log_pair(7, [1.0; 3]));
     assert!(t.log(8, [1.0; 3], 1.0) && t.log_pair(8, [1.0; 3]));
-    t.log_light(7, [1.0; 3], 1.0);
+    t.log_nee(7, [1.0; 3], 1.0);
     assert!((0..BIN_LIMIT).all(|k| t.log_shadow(7, k % 2 == 0)) && !t.log_shadow(7, true) && t.log_shadow(8, true));
     cache.absorb(t);
     let once = Oracle::new(&saved(&cache)).leaves[0][7];
@@ -275,7 +275,7 @@ fn a_billion_samples_keep_their_mean() {
     }
     assert!(!t.log(cache.bins(), [1.0; 3], 1.0) && !t.log(NO_BIN, [1.0; 3], 1.0) && !t.log_pair(NO_BIN, [1.0; 3]));
     for _ in 0..BIN_LIMIT {
-        (0..9).for_each(|_| t.log_light(3, [f32::MAX; 3], f32::MAX));
+        (0..9).for_each(|_| t.log_nee(3, [f32::MAX; 3], f32::MAX));
         assert!(t.log(3, [f32::MAX, -5.0, 2.0], f32::MAX) && t.log_pair(3, [f32::MAX; 3]));
     }
     cache.absorb(t);
@@ -447,13 +447,13 @@ fn light_shares_are_of_all_squares() {
         // halved
         t.log(0, [2.0, 3.0, 4.0], 1.0);
         if k % 2 == 0 {
-            t.log_light(0, [2.0, 6.0, 0.0], 0.5);
+            t.log_nee(0, [2.0, 6.0, 0.0], 0.5);
         }
         t.log(1, [1.0, 0.0, 0.0], 1.0);
-        t.log_light(1, [0.0, 1.0, 2.0], 1.0);
+        t.log_nee(1, [0.0, 1.0, 2.0], 1.0);
     }
-    [f32::NAN, f32::INFINITY].iter().for_each(|x| t.log_light(0, [1.0, *x, 1.0], 1.0));
-    [cache.bins(), NO_BIN].iter().for_each(|none| t.log_light(*none, [1.0; 3], 1.0));
+    [f32::NAN, f32::INFINITY].iter().for_each(|x| t.log_nee(0, [1.0, *x, 1.0], 1.0));
+    [cache.bins(), NO_BIN].iter().for_each(|none| t.log_nee(*none, [1.0; 3], 1.0));
     cache.begin_merge(1.0);
     cache.absorb(t);
     cache.freeze(f64::INFINITY);

@@ -32,11 +32,11 @@ pub(super) struct Setup {
     pub near: [[f32; 8]; 3],
     /// Origins moved for far planes.
     pub far: [[f32; 8]; 3],
-    /// `-1/d`.
+    /// Negative inverse directions, `-1/d`.
     pub ninv: [[f32; 8]; 3],
-    /// `d[kx]/d[kz]`, `d[ky]/d[kz]`, `1/d[kz]` with the axes of [`Setup::axes`].
+    /// Shear constants `d[kx]/d[kz]`, `d[ky]/d[kz]`, `1/d[kz]` with the axes of [`Setup::axes`].
     pub shear: [[f32; 8]; 3],
-    /// `max(tmin, 0)`.
+    /// Smallest parameter: `max(tmin, 0)`.
     pub tmin: [f32; 8],
     /// Largest float below `tmax`: inside the traversal limits are inclusive.
     pub limit: [f32; 8],
@@ -49,7 +49,7 @@ pub(super) struct Setup {
 }
 
 impl Setup {
-    /// `extent`: largest |coordinate| of the tree.
+    /// Constants of eight rays; `extent` is the largest |coordinate| of the tree.
     #[inline(always)]
     pub(super) fn new(rays: &Ray8, active: Mask8, extent: f32) -> Self {
         let a = rays.d.abs();
@@ -91,7 +91,7 @@ impl Setup {
         }
     }
 
-    /// The axes of lane `i`, cyclic so that the shear keeps orientation; the last is the major one. From a table: the
+    /// Axes of lane `i`, cyclic so that the shear keeps orientation; the last is the major one. From a table: the
     /// next ray's axes cannot be predicted from this one's.
     #[inline(always)]
     pub(super) fn axes(&self, i: usize) -> [usize; 3] {
@@ -106,7 +106,7 @@ impl Setup {
         each(|k| if self.negative[k] >> i & 1 == 1 { k + 3 } else { k })
     }
 
-    /// The lanes among `of` with the octant and the major axis of lane `i`.
+    /// Lanes among `of` with the octant and the major axis of lane `i`.
     #[inline(always)]
     pub(super) fn alike(&self, i: usize, of: u32) -> u32 {
         let same = |bits: u32| bits ^ (bits >> i & 1).wrapping_sub(1);

@@ -233,7 +233,7 @@ impl<'m> Bookkeeping<'m> {
         }
         for i in (visible & logged).lanes() {
             let (x, scale) = (local.lane(i), self.ledger.scale(v.path.record.lane(i)));
-            training.log_light(v.bin.lane(i), [0, 1, 2].map(|c| x[c] * scale[c]), v.nee_probability.lane(i));
+            training.log_nee(v.bin.lane(i), [0, 1, 2].map(|c| x[c] * scale[c]), v.nee_probability.lane(i));
         }
     }
 

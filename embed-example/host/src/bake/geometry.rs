@@ -108,7 +108,7 @@ impl Geometry {
     }
 
     /// Half the diagonal of the bounds.
-    pub fn radius(&self) -> f64 {
+    pub(crate) fn radius(&self) -> f64 {
         let [lo, hi] = self.bounds.map(|p| Vec3::from_array(p).as_dvec3());
         (hi - lo).length() / 2.0
     }
