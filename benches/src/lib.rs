@@ -1,6 +1,8 @@
-//! What the benchmarks share: scenes with their references, CPU time, watched renders, medians, generated results.
+//! What the benchmarks share: scenes with their references, CPU time, watched renders, medians, generated results, and
+//! the check of the figures that documents cite from them.
 
 pub mod clock;
+pub mod figures;
 pub mod measure;
 pub mod provenance;
 pub mod results;

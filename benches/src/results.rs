@@ -4,6 +4,7 @@
 //! The format is Markdown with one row per line, which reads well on a web page and in a diff; [`Results::read`] reads
 //! it back for checks.
 
+use crate::provenance;
 use std::error::Error;
 use std::fmt::{self, Write};
 use std::path::{Path, PathBuf};
@@ -26,6 +27,21 @@ impl Table {
         Self { title: title.into(), columns, rows: Vec::new() }
     }
 
+    /// Adds a row; cells must not contain a bar.
+    pub fn add(&mut self, cells: impl IntoIterator<Item = impl Into<String>>) {
+        self.rows.push(cells.into_iter().map(Into::into).collect());
+    }
+
+    /// The names of the columns as lines of Markdown.
+    pub fn head(&self) -> String {
+        format!("{}\n|{}\n", line(&self.columns), "---|".repeat(self.columns.len()))
+    }
+
+    /// The newest row as a line of Markdown: long runs print rows as they come.
+    pub fn last(&self) -> String {
+        self.rows.last().map_or(String::new(), |r| line(r))
+    }
+
     /// Index of a column.
     pub fn column(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|c| c == name)
@@ -42,10 +58,13 @@ impl fmt::Display for Table {
         if !self.title.is_empty() {
             writeln!(f, "## {}\n", self.title)?;
         }
-        writeln!(f, "| {} |", self.columns.join(" | "))?;
-        writeln!(f, "|{}", "---|".repeat(self.columns.len()))?;
-        self.rows.iter().try_for_each(|r| writeln!(f, "| {} |", r.join(" | ")))
+        f.write_str(&self.head())?;
+        self.rows.iter().try_for_each(|r| writeln!(f, "{}", line(r)))
     }
+}
+
+fn line(cells: &[String]) -> String {
+    format!("| {} |", cells.join(" | "))
 }
 
 /// A file of results.
@@ -58,6 +77,12 @@ pub struct Results {
 }
 
 impl Results {
+    /// Without tables yet, with the provenance of this run of a benchmark. To be made when the run starts: while it
+    /// lasts, others may commit.
+    pub fn of_this_run(name: &str) -> Self {
+        Self { header: provenance::of_this_run(name), tables: Vec::new() }
+    }
+
     /// Reads a file of results, by the name of its benchmark.
     pub fn read(name: &str) -> Result<Self, Box<dyn Error>> {
         let path = path(name);
@@ -105,6 +130,14 @@ impl Results {
     /// The table with this title.
     pub fn table(&self, title: &str) -> Option<&Table> {
         self.tables.iter().find(|t| t.title == title)
+    }
+
+    /// Reports where this differs from the committed results in what `keys` of the header say; figures of another
+    /// instruction set are no measure.
+    pub fn differs_in(&self, other: &Self, keys: &[&str]) -> Option<String> {
+        let key = keys.iter().find(|k| self.header(k) != other.header(k))?;
+        let value = |r: &Self| r.header(key).unwrap_or("unknown").to_string();
+        Some(format!("{key} is {}, in the committed results {}", value(self), value(other)))
     }
 
     /// The whole text of the file.

@@ -1,7 +1,7 @@
 //! A shared scene, baked, with the picture it should give.
 
 use croupier_host::bake::{BakeOptions, Baked, bake};
-use croupier_host::compare::{CompareError, Estimate, relmse_of, relmse_of_per_pixel, relmse_per_pixel};
+use croupier_host::compare::{CompareError, MeanImage, relmse_of, relmse_of_per_pixel, relmse_per_pixel};
 use croupier_host::image::Rgb;
 use croupier_host::load::load;
 use std::error::Error;
@@ -16,7 +16,7 @@ pub struct Subject {
     /// `reference.exr`.
     pub image: Rgb,
     /// The same with `reference_stderr.exr`.
-    pub reference: Estimate,
+    pub reference: MeanImage,
 }
 
 impl Subject {
@@ -27,7 +27,7 @@ impl Subject {
         let baked = bake(&scene, &BakeOptions::default(), |_, _| ())?;
         let image = Rgb::read_exr(&folder.join("reference.exr"))?;
         let stderr = Rgb::read_exr(&folder.join("reference_stderr.exr"))?;
-        let reference = Estimate::from_image(&image, Some(&stderr))?;
+        let reference = MeanImage::from_image(&image, Some(&stderr))?;
         Ok(Self { name: name.into(), baked, image, reference })
     }
 

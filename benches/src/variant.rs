@@ -1,6 +1,6 @@
 //! What a row of a table renders with: a roulette strategy, and perhaps other choices.
 
-use croupier::learn::{ControlVariate, Learning, PixelEstimator};
+use croupier::unstable::learn::{ControlVariate, Learning, PixelEstimator};
 use croupier::{Settings, Strategy};
 
 /// Other choices by name, and what they are.
@@ -61,7 +61,7 @@ impl Variant {
         if self.has("small") {
             (s.shards, s.ring) = (1, 128);
             s.learning =
-                Learning { cache_bytes: 152 << 10, ledger: 256, estimate: PixelEstimator::Blocks, ..s.learning };
+                Learning { cache_bytes: 152 << 10, ledger: 256, pixel_estimator: PixelEstimator::Blocks, ..s.learning };
         }
         s
     }

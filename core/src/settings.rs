@@ -20,7 +20,7 @@ settings! {
     /// [`Self::for_scene`] or [`Self::with_scene`] fill it in.
     pub struct Settings {
         size: [u32; 2] = [0, 0] =>
-            "size", "Columns and rows of the picture in pixels",
+            "size", "Size of the picture in pixels",
             SettingRange::Size { max_pixels: 1 << 31 }, scene;
         seed: u64 = 0 =>
             "seed", "Seed of all random numbers: another one gives another, independent image";
@@ -41,21 +41,21 @@ settings! {
         /// Beyond it factors are at most 1 (unbiased, counted).
         split_budget: u32 = 4096 =>
             "split-budget", "Samples that splitting may add to one camera sample";
-        /// The denoised estimate of the pixels that strategies learn with is better with them.
+        /// Denoising, that of the pixel estimate included, is better with them.
         aovs: bool = false =>
-            "aovs", "Albedo, normal, depth and roulette factors of the first hits besides the picture";
+            "aovs", "Albedo, normal and depth of the first hits, and mean roulette factors, besides the picture";
         /// From the second iteration on. Every pixel gets one at least, and every iteration counts as much in all of
         /// them, so that no pixel's mean depends on its own noise.
         adaptive: bool = false =>
             "adaptive", "More samples for pixels with much error, fewer for others";
-        /// With the most efficient factor: before their shadow ray is traced, and with strategies that learn before they
-        /// are drawn. Those also learn where light samples are hidden. Worth it with [`crate::rrs::Ears`], whose rule it
-        /// is.
+        /// With the most efficient factor, before the shadow ray is traced, and with strategies that learn from the
+        /// scene before the light sample is drawn; those also learn visibility. Pays with [`crate::rrs::Ears`], whose
+        /// rule it is.
         shadow_roulette: bool = false =>
-            "shadow-roulette", "Roulette for light samples and their shadow rays too";
+            "shadow-roulette", "Russian roulette of next event estimation: of light samples and of their shadow rays";
         control_variate: ControlVariate = ControlVariate::Off =>
             "control-variate",
-            "Radiance that stands in for samples that roulette skips: none, the learned mean, or the same everywhere";
+            "Control variate of roulette, the radiance assumed for skipped samples: 0, the learned mean, or a number";
     }
     nested {
         /// Settings of the strategies that learn.
@@ -114,7 +114,7 @@ impl Settings {
             features: self.aovs,
             space: self.strategy.space(),
             cache,
-            pixels: pixels.then_some(self.learning.estimate),
+            pixels: pixels.then_some(self.learning.pixel_estimator),
             adaptive: self.adaptive,
             learning: self.learning,
         }
@@ -153,7 +153,7 @@ impl fmt::Display for SettingsError {
             }
             Self::Cache { needed, given } => write!(f, "cache of {given} bytes: with so many shards it needs {needed}"),
             Self::ControlVariate => f.write_str(
-                "the control variate of roulette cannot serve threshold; the cached mean needs ear, ears, adrr or adrrs",
+                "a control variate cannot serve threshold, and the cached mean needs ear, ears, adrr or adrrs",
             ),
             Self::Memory => f.write_str("these settings need more memory than can be addressed"),
         }

@@ -115,10 +115,15 @@ impl Tiles {
         (self.rows as usize).saturating_mul(self.columns.div_ceil(self.shards) as usize)
     }
 
-    /// Column and row of slot `slot` of `tile` (Morton order), if inside the picture.
-    pub(crate) fn pixel(&self, tile: u32, slot: u32) -> Option<[u32; 2]> {
-        let x = tile % self.columns * TILE + even_bits(slot);
-        let y = tile / self.columns * TILE + even_bits(slot >> 1);
+    /// First column and row of a tile.
+    pub(crate) fn start(&self, tile: u32) -> [u32; 2] {
+        [tile % self.columns * TILE, tile / self.columns * TILE]
+    }
+
+    /// Column and row of slot `slot` (Morton order) of the tile that starts at `[x, y]`, if inside the picture.
+    #[inline]
+    pub(crate) fn pixel(&self, [x, y]: [u32; 2], slot: u32) -> Option<[u32; 2]> {
+        let (x, y) = (x + even_bits(slot), y + even_bits(slot >> 1));
         (x < self.size[0] && y < self.size[1]).then_some([x, y])
     }
 
@@ -149,7 +154,7 @@ mod tests {
                     while let Some(tile) = next {
                         let [from, to] = grid.corners(tile);
                         let mut inside = 0;
-                        for [x, y] in (0..TILE_PIXELS).filter_map(|slot| tiles.pixel(tile, slot)) {
+                        for [x, y] in (0..TILE_PIXELS).filter_map(|slot| tiles.pixel(tiles.start(tile), slot)) {
                             let film = tiles.film_index([x, y]);
                             assert_eq!(pixel_at(size, film as u32), [x, y]);
                             assert_eq!(grid.of_pixel(film as u32), tile, "{size:?}");

@@ -2,7 +2,7 @@
 //! writer that turns its parts into bytes. Corrupting a part and writing it again gives a blob with a valid hash.
 
 use bytemuck::{Pod, Zeroable};
-use croupier::scene::blob::*;
+use croupier::unstable::scene::blob::*;
 
 /// Bytes at an address that is a multiple of 64.
 #[derive(Clone, Debug)]
@@ -143,7 +143,7 @@ impl Parts {
         let material = |kind: &MaterialKind| Material {
             kind: *kind as u32,
             texture: NONE,
-            table: if *kind == MaterialKind::RoughPlastic { 0 } else { NONE },
+            table: if kind.facts().parameters.contains(&Parameter::TransmittanceTable) { 0 } else { NONE },
             reflectance: [0.5, 0.6, 0.7],
             alpha: 0.2,
             eta: [1.5, 0.2, 1.1],
@@ -152,26 +152,25 @@ impl Parts {
             ..Material::zeroed()
         };
         let mut materials: Vec<_> = MaterialKind::ALL.iter().map(material).collect();
-        materials[0].emission = [4.0, 3.0, 2.0];
         materials[0].flags = MATERIAL_TWO_SIDED;
         materials[8].texture = 0;
         let light_alias = alias(&[3, 3, 8, 1, 1]);
-        let light = |i: usize, kind, triangle, area, vector, emission| Light {
+        let light = |kind: LightKind, triangle, area, vector, emission| Light {
             kind: kind as u32,
             triangle,
-            probability: light_alias[i].probability,
             area,
             vector,
             emission,
-            reserved: [0; 2],
+            reserved: 0,
+            params: [0.0; 6],
         };
-        let (zero, glow) = ([0.0; 3], materials[0].emission);
+        let (zero, glow) = ([0.0; 3], [4.0, 3.0, 2.0]);
         let lights = vec![
-            light(0, LightKind::Area, 2, 0.5, zero, glow),
-            light(1, LightKind::Area, 3, 0.5, zero, glow),
-            light(2, LightKind::Environment, NONE, 0.0, zero, zero),
-            light(3, LightKind::Point, NONE, 0.0, [0.0, 2.0, 0.0], [1.0, 2.0, 3.0]),
-            light(4, LightKind::Directional, NONE, 0.0, [0.0, 0.6, 0.8], [0.5; 3]),
+            light(LightKind::Area, 2, 0.5, zero, glow),
+            light(LightKind::Area, 3, 0.5, zero, glow),
+            light(LightKind::Environment, NONE, 0.0, zero, zero),
+            light(LightKind::Point, NONE, 0.0, [0.0, 2.0, 0.0], [1.0, 2.0, 3.0]),
+            light(LightKind::Directional, NONE, 0.0, [0.0, 0.6, 0.8], [0.5; 3]),
         ];
         let mut parts = Self {
             info: vec![SceneInfo { max_depth: 8, ..SceneInfo::zeroed() }],
@@ -238,8 +237,7 @@ impl Parts {
         let flat = |vertex| Triangle { vertex, material: 0, light: NONE, flags: 0 };
         parts.triangles = (0..side * side).flat_map(quad).map(flat).collect();
         parts.light_alias = alias(&[1]);
-        parts.lights =
-            vec![Light { kind: LightKind::Environment as u32, probability: 1.0, triangle: NONE, ..Light::zeroed() }];
+        parts.lights = vec![Light { kind: LightKind::Environment as u32, triangle: NONE, ..Light::zeroed() }];
         parts.environment[0].kind = EnvironmentKind::Constant as u32;
         parts.environment[0].light = 0;
         (parts.env_texels, parts.env_alias) = (Vec::new(), Vec::new());

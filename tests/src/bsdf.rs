@@ -2,10 +2,10 @@
 //! equations over complex indices), written without looking at the vector code, and the table of cases under test.
 
 use crate::quadrature::{jittered, midpoint};
-use croupier::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
-use croupier::scene::blob::{Camera, Material, MaterialKind, NONE, SceneInfo};
-use croupier::scene::{Effects, Records, Scene};
-use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
+use croupier::unstable::scene::blob::{Camera, Material, MaterialKind, NONE, SceneInfo};
+use croupier::unstable::scene::{Effects, Records, Scene};
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_host::microfacet;
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
@@ -144,7 +144,10 @@ impl Case {
     /// Does `wo` below the surface scatter?
     pub fn two_sided(&self) -> bool {
         use MaterialKind::*;
-        matches!(self.kind, Dielectric | RoughDielectric | ThinDielectric | Null)
+        match self.kind {
+            Dielectric | RoughDielectric | ThinDielectric | Null => true,
+            Diffuse | Mirror | Conductor | RoughConductor | Plastic | RoughPlastic => false,
+        }
     }
 
     /// Is transmission of a rough dielectric a delta lobe by contract?
@@ -212,7 +215,11 @@ impl Case {
     /// The microfacet part alone.
     pub fn microfacets(&self, wo: V, wi: V) -> Value {
         use MaterialKind::*;
-        if !matches!(self.kind, RoughConductor | RoughDielectric | RoughPlastic) || wo[2] == 0.0 || wi[2] == 0.0 {
+        match self.kind {
+            RoughConductor | RoughDielectric | RoughPlastic => {}
+            Diffuse | Mirror | Conductor | Dielectric | ThinDielectric | Plastic | Null => return Value::default(),
+        }
+        if wo[2] == 0.0 || wi[2] == 0.0 {
             return Value::default();
         }
         if self.kind != RoughDielectric && (wo[2] <= 0.0 || wi[2] <= 0.0) {
@@ -249,14 +256,17 @@ impl Case {
         if wo[2] <= 0.0 || wi[2] <= 0.0 {
             return Value::default();
         }
+        use MaterialKind::*;
         let pdf = wi[2] * FRAC_1_PI;
         match self.kind {
-            MaterialKind::Diffuse => Value { f: self.rho().map(|r| r * pdf), pdf },
-            MaterialKind::Plastic | MaterialKind::RoughPlastic => {
+            Diffuse => Value { f: self.rho().map(|r| r * pdf), pdf },
+            Plastic | RoughPlastic => {
                 let scale = self.coat(wo[2]) * self.coat(wi[2]) / self.eta().powi(2) * pdf;
                 Value { f: self.base().map(|r| r * scale), pdf }
             }
-            _ => Value::default(),
+            Mirror | Conductor | RoughConductor | Dielectric | RoughDielectric | ThinDielectric | Null => {
+                Value::default()
+            }
         }
     }
 
@@ -302,7 +312,7 @@ impl Case {
                 }
                 lobes
             }
-            _ => vec![],
+            Diffuse | RoughConductor | RoughDielectric | RoughPlastic => vec![],
         }
     }
 
@@ -490,6 +500,18 @@ fn all_cases() -> Vec<Case> {
     all.push(Case::new(Plastic, colour, [1.0 / 1.5; 3], zero, 0.0));
     all.push(Case::new(RoughPlastic, colour, [1.0 / 1.5; 3], zero, 0.3));
     all
+}
+
+/// Panics unless `tried` has every kind that `wanted` asks for: a row of the table without a case in this test.
+#[track_caller]
+pub fn assert_every_kind(tried: &[MaterialKind], wanted: impl Fn(&MaterialKind) -> bool) {
+    let missing: Vec<_> = MaterialKind::ALL.iter().filter(|k| wanted(k) && !tried.contains(k)).collect();
+    assert!(missing.is_empty(), "no case of {missing:?}");
+}
+
+/// Has it lobes that `eval` knows?
+pub fn has_density(kind: &MaterialKind) -> bool {
+    !kind.facts().delta
 }
 
 /// Viewing angles in degrees, normal to grazing.

@@ -2,11 +2,11 @@
 
 use crate::stats::SplitMix;
 use bytemuck::{Pod, Zeroable};
-use croupier::learn::Objective;
-use croupier::learn::cache::{Cache, CacheSize, Training, VertexKind, VertexKind8};
-use croupier::rrs::Local8;
-use croupier::scene::blob::content_hash;
-use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::learn::Objective;
+use croupier::unstable::learn::cache::{Cache, CacheSize, Training, VertexKind, VertexKind8};
+use croupier::unstable::rrs::Local8;
+use croupier::unstable::scene::blob::content_hash;
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C, align(64))]

@@ -2,8 +2,8 @@
 
 use bytemuck::Zeroable;
 use croupier::Scene;
-use croupier::scene::blob::*;
-use croupier::scene::{Effects, Records};
+use croupier::unstable::scene::blob::*;
+use croupier::unstable::scene::{Effects, Records};
 use croupier_host::{alias, environment};
 
 /// Owns what a [`Scene`] borrows.
@@ -17,7 +17,7 @@ pub struct LightScene {
     pub textures: Vec<Texture>,
     /// Texels.
     pub texels: Vec<u32>,
-    /// Lights; probabilities are set by [`Self::finish`].
+    /// Lights.
     pub lights: Vec<Light>,
     /// Selection table, set by [`Self::finish`].
     pub light_alias: Vec<Alias>,
@@ -111,9 +111,6 @@ impl LightScene {
     /// Selects with the given weights.
     pub fn select_by(mut self, weights: &[f64]) -> Self {
         self.light_alias = alias::build(weights);
-        for (light, entry) in self.lights.iter_mut().zip(&self.light_alias) {
-            light.probability = entry.probability;
-        }
         self
     }
 

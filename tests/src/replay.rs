@@ -6,16 +6,17 @@
 
 use crate::cache::Sums;
 use crate::hit::{area_pdf, area_radiance, surface_point};
-use croupier::accel::{Intersector, WideBvh};
-use croupier::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
-use croupier::cost::COST_SHADOW;
-use croupier::geometry::{Ray8, offset, shadow_ray};
-use croupier::learn::cache::{Cache, VertexKind, VertexKind8};
-use croupier::light::{LightSample8, PowerSelector, power_heuristic, sample};
-use croupier::rng::Key8;
-use croupier::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind};
-use croupier::simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
-use croupier::{Scene, camera};
+use croupier::Scene;
+use croupier::unstable::accel::{Intersector, WideBvh};
+use croupier::unstable::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
+use croupier::unstable::camera;
+use croupier::unstable::cost::COST_SHADOW;
+use croupier::unstable::geometry::{Ray8, offset, shadow_ray};
+use croupier::unstable::learn::cache::{Cache, VertexKind, VertexKind8};
+use croupier::unstable::light::{LightSample8, PowerSelector, power_heuristic, sample};
+use croupier::unstable::rng::Key8;
+use croupier::unstable::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind};
+use croupier::unstable::simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
 
 /// Recursive render of a scene, and what it has counted so far.
 pub struct Replay<'a, 's> {

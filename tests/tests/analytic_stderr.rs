@@ -1,7 +1,7 @@
 //! The error that the film estimates is the true one.
 
 use croupier::Settings;
-use croupier::film::{PixelStats, REL_MSE_EPSILON};
+use croupier::unstable::film::{PixelStats, REL_MSE_EPSILON};
 use croupier_tests::runner::{Image, Schedule, render, scheduled, settings};
 use croupier_tests::scenes::*;
 use croupier_tests::stats::normal_tail;
@@ -9,7 +9,7 @@ use croupier_tests::stats::normal_tail;
 /// A grey wall under a white environment: every pixel's mean is exactly 0.5, and multiple importance sampling makes it
 /// noisy.
 fn grey_wall(size: [u32; 2]) -> Vec<u8> {
-    let mut s = under_white_sky(camera([0.0, 0.0, 10.0], [0.0; 3], 1.0, size));
+    let mut s = in_white_environment(camera([0.0, 0.0, 10.0], [0.0; 3], 1.0, size));
     let wall = s.add_material("wall", grey(0.5));
     add_quad(&mut s, "wall", wall, facing_z(1.0, 0.0, 1.0));
     blob(&s).to_vec()

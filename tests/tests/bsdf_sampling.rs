@@ -1,8 +1,8 @@
 //! Scattering models as a whole: samples follow their density, densities integrate to 1, energy is what quadrature of
 //! the oracle says.
 
-use croupier::scene::blob::MaterialKind;
-use croupier::simd::{F32x8, Mask8};
+use croupier::unstable::scene::blob::MaterialKind;
+use croupier::unstable::simd::{F32x8, Mask8};
 use croupier_tests::bsdf::*;
 use croupier_tests::quadrature::jittered;
 use croupier_tests::stats::*;
@@ -101,6 +101,7 @@ fn configurations() -> Vec<(Case, V)> {
 #[test]
 fn samples_follow_the_density() {
     let configurations = configurations();
+    assert_every_kind(&configurations.iter().map(|(c, _)| c.kind).collect::<Vec<_>>(), has_density);
     let level = sidak(FAMILY_ALPHA, configurations.len());
     let mut smallest = 1.0f64;
     for (seed, (case, wo)) in configurations.iter().enumerate() {
@@ -188,6 +189,7 @@ fn mean_weight(case: &Case, wo: V, packets: usize) -> V {
 fn furnace() {
     use MaterialKind::*;
     let mut worst = 0.0f64;
+    let mut tried = vec![];
     for case in cases() {
         for wo in views(case) {
             let o = unit(lane(splat(wo), 0));
@@ -196,11 +198,13 @@ fn furnace() {
             assert!(got.iter().all(|&x| x <= 1.0 + 1e-4), "{} {wo:?}: {got:?}", case.name());
             if matches!(case.kind, Dielectric | ThinDielectric | Null) {
                 assert!((got[0] - 1.0).abs() < 1e-6, "{} {wo:?}: {got:?}", case.name());
+                tried.push(case.kind);
                 continue;
             }
             if case.kind == RoughDielectric && (case.eta() - 1.0).abs() < 0.05 {
                 continue;
             }
+            tried.push(case.kind);
             let mut want = case.lobes(o).iter().fold([0.0; 3], |a, l| combine(a, 1.0, l.weight, 1.0));
             // at grazing angles the half of the normals that is visible ends in a crease
             let points = if grazing { 500 } else { 160 };
@@ -217,6 +221,7 @@ fn furnace() {
             }
         }
     }
+    assert_every_kind(&tried, |_| true);
     println!("furnace: largest difference {worst:.1e}");
 }
 

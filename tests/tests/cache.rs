@@ -1,7 +1,7 @@
 //! The statistics cache: bins of vertices, sums, growth of the tree, look-ups.
 
-use croupier::learn::cache::{BIN_LIMIT, Cache, CacheSize, MAX_VALUE, NO_BIN, VertexKind, VertexKind8};
-use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::learn::cache::{BIN_LIMIT, Cache, CacheSize, MAX_VALUE, NO_BIN, VertexKind, VertexKind8};
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_tests::cache::*;
 use croupier_tests::stats::{FAMILY_ALPHA, SplitMix, chi_square, sidak};
 use std::collections::{HashMap, HashSet};

@@ -47,7 +47,7 @@ fn gaussian(random: &mut Random, (w, h): (usize, usize), bias: f64, noise: f64) 
     (noisy, stderr)
 }
 
-/// By hand. Dies if the error is not divided by the reference's square, or by channels and pixels.
+/// Computed by hand. Killed by: an error that is not divided by the reference's square, or by channels and pixels.
 #[test]
 fn relmse_and_mse_by_hand() {
     let reference = Rgb::new(2, 1, vec![[1.0, 0.0, 0.5], [2.0, 0.1, 0.0]]).unwrap();
@@ -60,7 +60,7 @@ fn relmse_and_mse_by_hand() {
     assert_eq!(relmse(&reference, &reference, true).unwrap().value, 0.0);
 }
 
-/// 25 000 pixels: the worst two go. Dies if channels are discarded singly, or the best instead of the worst.
+/// 25 000 pixels, of which the worst two are left out. Killed by: channels discarded singly, the best instead of the worst.
 #[test]
 fn the_worst_ten_thousandth_is_discarded() {
     let reference = image(250, 100, |_, _| [1.0; 3]);
@@ -84,7 +84,7 @@ fn the_worst_ten_thousandth_is_discarded() {
     assert!((all.value / expected - 1.0).abs() < 1e-5, "{all:?} {expected}");
 }
 
-/// Dies if NaN pixels vanish from the mean: an image with three of them must not look good.
+/// An image with three NaN pixels must not look good. Killed by: NaN pixels that vanish from the mean.
 #[test]
 fn nonfinite_pixels_count() {
     let reference = image(100, 100, |_, _| [1.0; 3]);
@@ -100,7 +100,7 @@ fn nonfinite_pixels_count() {
     assert_eq!((bias.beyond6[0].x, bias.beyond6[0].y, bias.beyond6[0].channel), (0, 0, 0));
 }
 
-/// Dies if a size goes unchecked.
+/// Killed by: a size that goes unchecked.
 #[test]
 fn sizes_must_agree() {
     let (a, b) = (image(4, 4, |_, _| [1.0; 3]), image(4, 5, |_, _| [1.0; 3]));
@@ -114,33 +114,33 @@ fn sizes_must_agree() {
     assert!(one(&a, Some(&b), &a, None).is_err());
     assert!(one(&a, None, &a, Some(&b)).is_err());
     assert!(one(&a, Some(&a), &a, Some(&a)).is_ok());
-    assert!(Estimate::from_seeds(&[a.clone(), b]).is_err());
-    assert_eq!(Estimate::from_seeds(&[]), Err(CompareError::Empty));
+    assert!(MeanImage::from_seeds(&[a.clone(), b]).is_err());
+    assert_eq!(MeanImage::from_seeds(&[]), Err(CompareError::Empty));
     let empty = Rgb::new(0, 0, vec![]).unwrap();
     assert_eq!(relmse(&empty, &empty, false), Err(CompareError::Empty));
 }
 
-/// Gaussian noise of known size on both sides: 2.0e4 independent scores. Dies if either variance is forgotten, is not
-/// divided by the pixels, or partial blocks (the size is no multiple of 8) are averaged over 64 pixels.
+/// Gaussian noise of known size on both sides: 2.0e4 independent scores. Killed by: a variance that is left out or
+/// not divided by the pixels, partial blocks (the size is no multiple of 8) that are averaged over 64 pixels.
 #[test]
 fn scores_of_gaussian_noise_are_standard_normal() {
     let mut random = Random(1);
     let size = (644, 652);
     let (x, sx) = gaussian(&mut random, size, 1.0, 0.3);
     let (r, sr) = gaussian(&mut random, size, 1.0, 0.2);
-    let [x, r] = [(x, sx), (r, sr)].map(|(m, s)| Estimate::from_image(&m, Some(&s)).unwrap());
+    let [x, r] = [(x, sx), (r, sr)].map(|(m, s)| MeanImage::from_image(&m, Some(&s)).unwrap());
     let b = bias(&x, &r, &BiasOptions::default()).unwrap();
     assert_eq!(b.scores, 3 * 81 * 82);
     // Four standard deviations of each figure over 19 926 scores.
     assert!((b.beyond3 - 0.0027).abs() < 0.0015, "{b:?}");
     assert!(b.mean.abs() < 4.0 / 141.0 && (b.rms - 1.0).abs() < 0.02, "{b:?}");
     assert!(b.beyond6.is_empty() && b.max > 3.3, "{b:?}");
-    // The variances are constant: repairing them changes nothing but the edges between bright and dark.
+    // The variances are constant: correcting them changes nothing but the edges between bright and dark.
     let robust = bias(&x, &r, &BiasOptions { robust: true, ..Default::default() }).unwrap();
     assert!(robust.mean.abs() < 4.0 / 141.0 && robust.rms > 0.9 && robust.rms < 1.01, "{robust:?}");
 }
 
-/// Dies if the sign of z is lost or seeds are not averaged: 2 % must be seen where noise over a block is 1 %.
+/// 2 % must be seen where noise over a block is 1 %. Killed by: a lost sign of z, seeds that are not averaged.
 #[test]
 fn two_percent_is_detected() {
     let mut random = Random(2);
@@ -162,7 +162,7 @@ fn two_percent_is_detected() {
     let (x, sx) = gaussian(&mut random, size, 1.0, 0.05);
     let patch = |x: usize, y: usize| (64..80).contains(&x) && (32..48).contains(&y);
     let x = image(size.0, size.1, |i, j| x.pixels[j * size.0 + i].map(|v| if patch(i, j) { 1.1 * v } else { v }));
-    let [x, r] = [(x, sx), (r, sr)].map(|(m, s)| Estimate::from_image(&m, Some(&s)).unwrap());
+    let [x, r] = [(x, sx), (r, sr)].map(|(m, s)| MeanImage::from_image(&m, Some(&s)).unwrap());
     let b = bias(&x, &r, &BiasOptions::default()).unwrap();
     assert_eq!(b.beyond6.len(), 12);
     assert!(b.beyond6.iter().all(|b| patch(b.x, b.y) && b.z > 6.0 && b.image > b.reference), "{b:?}");
@@ -185,7 +185,7 @@ fn against_passes(random: &mut Random, bias: f64, rate: f64, energy: f64) -> Com
     let size = (200, 200);
     let seeds: Vec<Rgb> = (0..16).map(|_| with_fireflies(random, size, bias, rate, energy, 64.0)).collect();
     let passes: Vec<Rgb> = (0..16).map(|_| with_fireflies(random, size, 1.0, rate, energy, 32.0)).collect();
-    let reference = Estimate::from_seeds(&passes).unwrap();
+    let reference = MeanImage::from_seeds(&passes).unwrap();
     let store = |p: &[[f64; 3]]| Rgb::new(200, 200, p.iter().map(|p| p.map(|x| x as f32)).collect()).unwrap();
     let mean = store(&reference.mean);
     let stderr = store(&reference.variance.iter().map(|p| p.map(f64::sqrt)).collect::<Vec<_>>());
@@ -193,8 +193,8 @@ fn against_passes(random: &mut Random, bias: f64, rate: f64, energy: f64) -> Com
     compare(&inputs, &CompareOptions::default()).unwrap()
 }
 
-/// A reference that misses fireflies (2 in a block of 64 pixels) that the image has found. Dies if the variances are
-/// not spread: the plain test then drifts beyond 0.15 without any bias, which is asserted too.
+/// A reference that misses fireflies (2 in a block of 64 pixels) that the image has found. Killed by: variances
+/// that are not spread. The plain test then drifts beyond 0.15 without any bias, which is asserted too.
 #[test]
 fn fireflies_are_no_bias() {
     let mut random = Random(3);
@@ -213,14 +213,14 @@ fn fireflies_are_no_bias() {
     assert!(c.bias_robust.unwrap().mean > 1.0);
 }
 
-/// Standard errors from seeds against the known law, and relMSE of the reference. Dies with n for n - 1, or variance
-/// of one image for that of the mean.
+/// Standard errors from seeds against the known law, and relMSE of the reference. Killed by: n for n - 1, the
+/// variance of one image for that of the mean.
 #[test]
 fn errors_of_means_are_right() {
     let mut random = Random(4);
     let size = (200, 150);
     let seeds: Vec<Rgb> = (0..4).map(|_| gaussian(&mut random, size, 1.0, 0.1).0).collect();
-    let e = Estimate::from_seeds(&seeds).unwrap();
+    let e = MeanImage::from_seeds(&seeds).unwrap();
     let n = e.mean.len() as f64;
     let relative = |i: usize| e.variance[i][1] / truth(i % 200, i / 200).powi(2);
     let mean = (0..e.mean.len()).map(relative).sum::<f64>() / n;
@@ -241,7 +241,7 @@ fn errors_of_means_are_right() {
     assert!(c.bias.is_none() && c.ratio.stderr.is_none(), "no standard error, no test");
 }
 
-/// Tabulated values of the normal distribution (Abramowitz & Stegun, table 26.1). Dies with a wrong series.
+/// Tabulated values of the normal distribution (Abramowitz & Stegun, table 26.1). Killed by: a wrong series.
 #[test]
 fn normal_distribution() {
     for (x, p) in [
@@ -263,7 +263,7 @@ fn normal_distribution() {
     assert_eq!((normal_quantile(0.0), normal_quantile(1.0)), (f64::NEG_INFINITY, f64::INFINITY));
 }
 
-/// Dies if one of the two sides is not tested, or too little data counts as "equal".
+/// Killed by: one of the two sides untested, too little data that counts as "equal".
 #[test]
 fn equivalence_needs_evidence() {
     // Difference 0, margin 2 standard errors: p = 1 - cdf(2) on both sides.

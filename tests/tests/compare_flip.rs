@@ -31,7 +31,7 @@ fn mean(map: &[f64]) -> f64 {
 }
 
 /// Mean, and the errors of the pixels (20, 15) and (0, 0), as the authors' program (version 1.7, LDR, 67 pixels per
-/// degree, 32-bit floats) finds them for the same pixels. Dies with any constant, filter or exponent changed.
+/// degree, 32-bit floats) finds them for the same pixels. Killed by: a change of any constant, filter or exponent.
 #[test]
 fn agrees_with_the_published_evaluator() {
     let gray = |v: i64| move |_, _| [v; 3];
@@ -73,7 +73,7 @@ fn agrees_with_the_published_evaluator() {
     }
 }
 
-/// Dies if the metric is not one: 0 for equal images, symmetric, growing with the difference, within [0, 1].
+/// 0 for equal images, symmetric, growing with the difference, within [0, 1]. Killed by: a breach of any of these.
 #[test]
 fn is_a_difference() {
     let a = image(|x, y| [hash(x, y), x * 6, y * 8]);

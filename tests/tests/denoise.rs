@@ -1,7 +1,7 @@
 //! The denoiser: what it must keep, what it must remove, and input that must not harm it.
 
-use croupier::denoise::{DenoiseError, Noisy, Part, Planes, denoise, scratch_len};
-use croupier::film::{PixelAov, PixelStats};
+use croupier::unstable::denoise::{DenoiseError, Noisy, Part, Planes, denoise, scratch_len};
+use croupier::unstable::film::{PixelAov, PixelStats};
 use croupier_tests::stats::SplitMix;
 
 /// A mean of `n` exponentially distributed samples of mean 1, and its estimated variance: few samples carry much.

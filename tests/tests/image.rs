@@ -40,7 +40,7 @@ fn bits(values: &[f32]) -> Vec<u32> {
     values.iter().map(|x| x.to_bits()).collect()
 }
 
-/// Dies if a layer is dropped or misnamed, channels are swapped, values pass through f16 or are made finite.
+/// Killed by: a layer that is dropped or misnamed, swapped channels, values that pass through f16 or are made finite.
 #[test]
 fn every_layer_survives_bit_for_bit() {
     let dir = tempfile::tempdir().unwrap();
@@ -82,7 +82,7 @@ fn other_readers_see_the_picture() {
     assert_eq!(bits(seen.as_flattened()), bits(picture.rgb("").unwrap().pixels.as_flattened()));
 }
 
-/// Files of other programs: one part per layer, 16-bit samples. Dies if part names are ignored.
+/// Files of other programs: one part per layer, 16-bit samples. Killed by: part names that are ignored.
 #[test]
 fn parts_are_layers_too() {
     let dir = tempfile::tempdir().unwrap();
@@ -116,7 +116,7 @@ fn scenes() -> Option<PathBuf> {
     Some(path)
 }
 
-/// References of another renderer: the means that its own report states. Dies if rows or channels are lost.
+/// References of another renderer: the means that its own report states. Killed by: lost rows or channels.
 #[test]
 fn references_have_their_stated_means() {
     let Some(scenes) = scenes() else { return };
@@ -148,7 +148,8 @@ fn references_have_their_stated_means() {
     assert!(seen > 0, "no scene has a reference");
 }
 
-/// Every error names its file. Dies if a path is left out, or a half-written file replaces a good one.
+/// Every error names its file. Killed by: an error without a path, a half-written file that replaces
+/// a good one.
 #[test]
 fn errors_name_the_file() {
     let dir = tempfile::tempdir().unwrap();
@@ -217,7 +218,7 @@ fn damaged_files_do_not_panic() {
     assert!(refused > 500, "only {refused} damaged files were refused");
 }
 
-/// Dies if the exposure is no power of two, the transfer function is a plain gamma, or NaN shows as white.
+/// Killed by: an exposure that is no power of two, a plain gamma as transfer function, NaN as white.
 #[test]
 fn tone_mapping_is_srgb() {
     let image = Rgb::new(3, 1, vec![[0.0, 1.0, 0.5], [0.001, f32::NAN, f32::INFINITY], [-1.0, 0.25, 0.18]]).unwrap();

@@ -2,8 +2,7 @@
 
 use croupier::{ErrorEstimate, Film, Scene, Settings, Strategy};
 use croupier_host::drive::schedule::{LARGEST_ITERATION, Work, next};
-use croupier_host::drive::{Options, Rendered, Unobserved, drive};
-use croupier_host::render::{Observer, Progress, Target};
+use croupier_host::drive::{Observer, Options, Progress, Rendered, Target, Unobserved, drive};
 use croupier_tests::scenes::{blob, everything};
 use std::time::Duration;
 
@@ -23,8 +22,8 @@ fn bad_error() -> Option<ErrorEstimate> {
 fn growth_is_in_work_for_strategies_that_learn() {
     let all = work(16, 1600, 1.6);
     for (last, samples) in [
-        (work(8, 800, 0.8), 16),     // as ever
-        (work(8, 8 * 2000, 0.8), 1), // twenty times as dear
+        (work(8, 800, 0.8), 16),     // as before
+        (work(8, 8 * 2000, 0.8), 1), // twenty times as expensive
         (work(8, 8 * 25, 0.8), 64),  // a quarter
         (work(8, 8 * 390, 0.8), 4),  // to the nearest
         (work(8, 8 * 100_000, 0.8), 1),
@@ -37,7 +36,7 @@ fn growth_is_in_work_for_strategies_that_learn() {
     }
     for target in TARGETS {
         assert_eq!(next(target, true, &Work::default(), &Work::default(), None), 1);
-        // numbers without sense do no harm
+        // figures that make no sense are harmless
         for odd in [work(1, 0, 0.0), work(u32::MAX, u64::MAX, f64::INFINITY), work(3, 1, f64::NAN)] {
             assert!(next(target, true, &odd, &odd, bad_error()) <= LARGEST_ITERATION);
         }

@@ -3,11 +3,12 @@
 //! 12,800)). Tolerance 2e-3: rounding of the f32 maps under differences of 1/64 is about 1e-4, and up to 1e-3 where the
 //! density varies fast.
 
-use croupier::camera;
-use croupier::light::{PowerSelector, sample};
-use croupier::scene::blob::{Camera, MaterialKind};
-use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
-use croupier_tests::bsdf::{Case, at_angle, cases, lane, splat};
+use croupier::unstable::camera;
+use croupier::unstable::light::{PowerSelector, sample};
+use croupier::unstable::scene::Effects;
+use croupier::unstable::scene::blob::{Camera, LightKind, MaterialKind};
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier_tests::bsdf::{Case, assert_every_kind, at_angle, cases, has_density, lane, splat};
 use croupier_tests::jacobian::{Deviation, V, deviation};
 use croupier_tests::light_scene::{IDENTITY, LightScene};
 
@@ -31,21 +32,29 @@ fn scattering_models() {
         MaterialKind::RoughConductor | MaterialKind::RoughPlastic => c.alpha() >= 0.2,
         // near eta = 1 the transmitted lobe is narrower than the differences
         MaterialKind::RoughDielectric => c.alpha() >= 0.2 && (c.eta() - 1.0).abs() > 0.2,
-        _ => false,
+        // delta lobes have no density
+        MaterialKind::Mirror
+        | MaterialKind::Conductor
+        | MaterialKind::Dielectric
+        | MaterialKind::ThinDielectric
+        | MaterialKind::Null => false,
     };
-    let mut tried = 0;
+    let (mut tried, mut kinds) = (0, vec![]);
     for case in cases().iter().filter(smooth) {
         for degrees in [0.0, 20.0, 50.0, 70.0] {
             let up = at_angle(degrees, 0.7);
             let sides = if case.two_sided() { vec![up, [up[0], up[1], -up[2]]] } else { vec![up] };
             for wo in sides {
                 for high in [false, true] {
-                    tried += lobe(case, wo, high);
+                    let lobes = lobe(case, wo, high);
+                    tried += lobes;
+                    kinds.extend((lobes > 0).then_some(case.kind));
                 }
             }
         }
     }
     assert!(tried > 60, "{tried} lobes");
+    assert_every_kind(&kinds, has_density);
 }
 
 /// The lobe that the third number chooses when it is smallest (or largest). 1 if it exists.
@@ -110,11 +119,15 @@ fn lights() {
         (0..w * h).map(|k| [at(k), 0.5 * at(k), 0.25]).collect()
     };
     let map = LightScene::default().map(texels(16, 9), [16, 9], 1.0, IDENTITY).finish();
-    // (name, scene, wanted light, words that u and v go to, step)
     let tilted = LightScene::default().constant([0.5; 3]).finish();
-    for (name, scene) in [("area", area(triangle)), ("area, turned", area(facing)), ("constant", tilted)] {
+    let mut tried = vec![];
+    for (name, kind, scene) in [
+        ("area", LightKind::Area, area(triangle)),
+        ("area, turned", LightKind::Area, area(facing)),
+        ("constant", LightKind::Environment, tilted),
+    ] {
         let scene = scene.scene();
-        let is_area = name.starts_with("area");
+        let is_area = kind == LightKind::Area;
         let draw = |u: f64, v: f64| {
             let word = |x: f64| U32x8::splat((x.clamp(0.0, BELOW_ONE) * 4_294_967_296.0) as u32);
             // the first word chooses the light: find one that gives the wanted kind
@@ -136,13 +149,18 @@ fn lights() {
             // seen from behind: nothing to sample, which the other winding covers
             continue;
         }
-        let selection = |s: &croupier::light::LightSample8| {
+        let selection = |s: &croupier::unstable::light::LightSample8| {
             let table = scene.light_alias;
             f64::from(if s.infinite.lane(0) { table.last() } else { table.first() }.unwrap().probability)
         };
         let to = |u: f64, v: f64| draw(u, v).map_or([0.0; 3], |s| lane(s.wi, 0));
         let density = |u: f64, v: f64| draw(u, v).map(|s| f64::from(s.pdf.lane(0)) / selection(&s));
         check(name, deviation(16, STEP, &to, &density), 0.7);
+        tried.push(kind);
+    }
+    for kind in LightKind::ALL {
+        let delta = Effects::of_light(*kind).intersects(Effects::DELTA_LIGHTS);
+        assert!(delta || tried.contains(kind), "no case of {kind:?}");
     }
     // within cells of the map: the last word holds both coordinates
     let scene = map.scene();
@@ -160,7 +178,7 @@ fn lights() {
         };
         // the row's and the cell's probability, by the tables
         let (rows, width) = (8usize, 16usize);
-        let pick = |table: &[croupier::scene::blob::Alias], r: u32| {
+        let pick = |table: &[croupier::unstable::scene::blob::Alias], r: u32| {
             let x = u64::from(r) * table.len() as u64;
             let (i, low) = ((x >> 32) as usize, x as u32);
             if low < table[i].threshold || table[i].threshold == u32::MAX { i } else { table[i].alias as usize }

@@ -2,9 +2,9 @@
 //! 2) against a numerical minimum, and in renders, where they converge.
 
 use croupier::Settings;
-use croupier::learn::Learning;
-use croupier::rrs::{Learned8, Local8, MAX_FACTOR, MIN_FACTOR, Norm, Strategy, Vertices8};
-use croupier::simd::{F32x8, U32x8, Vec3x8};
+use croupier::unstable::learn::Learning;
+use croupier::unstable::rrs::{Learned8, Local8, MAX_FACTOR, MIN_FACTOR, Norm, Strategy, Vertices8};
+use croupier::unstable::simd::{F32x8, U32x8, Vec3x8};
 use croupier_tests::minimum::minimise;
 use croupier_tests::runner::{Learned, Schedule, learning, settings};
 use croupier_tests::scenes::{blob, cornell};

@@ -1,9 +1,9 @@
 //! Samples that the tracer logs equal those of a recursive oracle with the same random numbers, and a ledger that is
 //! too small biases nothing.
 
-use croupier::accel::WideBvh;
-use croupier::learn::cache::{Cache, CacheSize, VertexKind};
-use croupier::learn::{Learning, Objective, PixelEstimator};
+use croupier::unstable::accel::WideBvh;
+use croupier::unstable::learn::cache::{Cache, CacheSize, VertexKind};
+use croupier::unstable::learn::{Learning, Objective, PixelEstimator};
 use croupier::{Counters, Scene, Settings};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::description::{Model, Reflectance, SceneDescription};
@@ -21,7 +21,7 @@ fn whole_leaves(scene: &[u8], max_depth: u32) -> Settings {
     let learning = Learning {
         cache_bytes: 16_000,
         ledger: 1 << 14,
-        estimate: PixelEstimator::Blocks,
+        pixel_estimator: PixelEstimator::Blocks,
         objective: Objective::Absolute,
         samples: u32::MAX,
         ..s.learning
@@ -146,7 +146,7 @@ fn check(what: &str, b: &Both) {
 /// weight of the path before them, emission without its MIS weight, the first camera ray charged to a sample.
 #[test]
 fn single_samples_are_logged_as_recursion_has_them() {
-    for (name, scene) in [("lamp", lamp_box()), ("mirror and glass", mirror_and_glass())] {
+    for (name, scene) in [("lamp", box_with_emitter()), ("mirror and glass", mirror_and_glass())] {
         for max_depth in [2, 3, 5] {
             let b = both(&scene, max_depth, &[200]);
             let used = b.oracle.iter().filter(|s| s[0] > 0.0).count();
@@ -161,7 +161,7 @@ fn single_samples_are_logged_as_recursion_has_them() {
 /// vertex whose cost is counted once, a sum that is folded into the parent before it is complete.
 #[test]
 fn nested_splits_are_logged_as_recursion_has_them() {
-    for (name, scene) in [("lamp", lamp_box()), ("mirror and glass", mirror_and_glass())] {
+    for (name, scene) in [("lamp", box_with_emitter()), ("mirror and glass", mirror_and_glass())] {
         for (max_depth, spp) in [(2, 12), (3, 8), (4, 1)] {
             let b = both(&scene, max_depth, &[4, spp]);
             println!(
@@ -180,7 +180,7 @@ fn nested_splits_are_logged_as_recursion_has_them() {
 /// of the viewer alone, a mirror among the diffuse surfaces, first vertices in other units.
 #[test]
 fn faces_and_materials_in_one_cell_stay_apart() {
-    let mut s = under_white_sky(camera([0.0, 1.0, 1.0], [0.0; 3], 20.0, [16, 16]));
+    let mut s = in_white_environment(camera([0.0, 1.0, 1.0], [0.0; 3], 20.0, [16, 16]));
     let mirror = Model::Mirror { reflectance: Reflectance::Constant([0.5; 3]) };
     let [top, front, mirror] = [grey(0.8), grey(0.2), mirror].map(|m| s.add_material("face", m));
     let lying = |x: f32| [[x, 0.0, 0.0], [x + 1.0, 0.0, 0.0], [x + 1.0, 0.0, -1.0], [x, 0.0, -1.0]];
@@ -216,7 +216,7 @@ fn faces_and_materials_in_one_cell_stay_apart() {
 /// its record, a sample that is logged without what its children would have added.
 #[test]
 fn a_full_ledger_changes_no_picture() {
-    for scene in [blob(&lamp_box()), blob(&mirror_and_glass())] {
+    for scene in [blob(&box_with_emitter()), blob(&mirror_and_glass())] {
         for shards in [1, 3] {
             let mut s = Settings { shards, size: [16, 16], ..whole_leaves(&scene, 5) };
             s.learning.cache_bytes = 1 << 16;
@@ -269,7 +269,7 @@ fn shadow_roulette_does_not_change_what_is_logged() {
 /// all.
 #[test]
 fn nee_statistics_do_not_depend_on_its_probability() {
-    let scene = blob(&lamp_box());
+    let scene = blob(&box_with_emitter());
     let mut s = Settings { size: [16, 16], shadow_roulette: true, ..whole_leaves(&scene, 3) };
     (s.learning.decay, s.learning.factors) = (0.0, [1.0, 1.0]);
     // squares per sample in the iteration of 2,048 samples, which all use it in the first one
@@ -309,7 +309,7 @@ fn nee_statistics_do_not_depend_on_its_probability() {
 /// cheap and too dark).
 #[test]
 fn only_complete_samples_are_logged() {
-    let scene = blob(&lamp_box());
+    let scene = blob(&box_with_emitter());
     let means = |ledger: u32, max_depth: u32| {
         let mut s = Settings { size: [16, 16], ..whole_leaves(&scene, max_depth) };
         s.learning.ledger = ledger;

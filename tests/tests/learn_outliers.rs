@@ -2,8 +2,8 @@
 //! decide all factors.
 
 use croupier::Settings;
-use croupier::film::PixelStats;
-use croupier::learn::{Learning, PictureStatistics};
+use croupier::unstable::film::PixelStats;
+use croupier::unstable::learn::{Learning, PictureStatistics};
 use croupier_host::description::*;
 use croupier_tests::cache::{FIELDS, Oracle};
 use croupier_tests::runner::{Learned, Schedule, learning, settings};
@@ -15,7 +15,7 @@ const FIRST_MATTE: u32 = 2;
 
 /// Picture of an environment of radiance 1 with emitters of 1e4 that cover a quarter of a pixel each.
 fn starry(stars: usize) -> SceneDescription {
-    let mut s = under_white_sky(camera([0.0; 3], [0.0, 0.0, -1.0], 90.0, [64, 64]));
+    let mut s = in_white_environment(camera([0.0; 3], [0.0, 0.0, -1.0], 90.0, [64, 64]));
     let lamp = s.add_material("lamp", grey(0.0));
     for star in 0..stars {
         // pixels are 1/32 wide where the emitters are
@@ -110,7 +110,7 @@ fn moments_leave_fireflies_out() {
 #[test]
 fn first_vertices_count_in_pixels() {
     for radiance in [0.1f32, 100.0] {
-        let mut s = under_white_sky(camera([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], 40.0, [16, 16]));
+        let mut s = in_white_environment(camera([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], 40.0, [16, 16]));
         s.environment = Some(Environment::Constant { radiance: [radiance; 3] });
         let floor = s.add_material("floor", grey(0.5));
         add_quad(&mut s, "floor", floor, facing_y(1.0, 0.0, 1.0));

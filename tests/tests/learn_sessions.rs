@@ -1,10 +1,10 @@
 //! Learned statistics as part of a session: saved and loaded, decayed, counted, of another scene, in little memory, and
 //! with numbers that are not finite.
 
-use croupier::film::PixelStats;
-use croupier::learn::cache::{BIN_LIMIT, CacheError, CacheSize};
-use croupier::learn::{ControlVariate, Learning, Objective, PixelEstimator};
-use croupier::rrs::Norm;
+use croupier::unstable::film::PixelStats;
+use croupier::unstable::learn::cache::{BIN_LIMIT, CacheError, CacheSize};
+use croupier::unstable::learn::{ControlVariate, Learning, Objective, PixelEstimator};
+use croupier::unstable::rrs::Norm;
 use croupier::{Counters, Plan, Settings, SettingsError, Strategy};
 use croupier_host::description::*;
 use croupier_tests::cache::{FIELDS, Oracle, Sums, overwrite};
@@ -332,7 +332,7 @@ fn everything_fits_in_little_memory() {
     let scene = blob(&cornell([32, 32]));
     let mut s = learns(&scene, "ears", 6);
     (s.adaptive, s.shadow_roulette, s.control_variate, s.ring) = (true, true, ControlVariate::Cached, 128);
-    let small = Learning { cache_bytes: 96 << 10, ledger: 256, estimate: PixelEstimator::Blocks, ..s.learning };
+    let small = Learning { cache_bytes: 96 << 10, ledger: 256, pixel_estimator: PixelEstimator::Blocks, ..s.learning };
     let s = Settings { learning: small, ..s };
     let plan = Plan::new(&s).unwrap();
     let pixels = 32 * 32;
@@ -414,7 +414,7 @@ fn choices_that_make_no_sense_are_refused() {
             out_of_range(strategy, &|s| s.learning = learning, name);
         }
     }
-    let nobody = Strategy::Fixed(croupier::rrs::Fixed { factor: f32::NAN });
+    let nobody = Strategy::Fixed(croupier::unstable::rrs::Fixed { factor: f32::NAN });
     out_of_range("classic", &|s| s.strategy = nobody, "rrs");
     let needed = CacheSize::SMALLEST.bytes(1).unwrap();
     let few = SettingsError::Cache { needed, given: needed - 1 };

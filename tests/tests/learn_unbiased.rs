@@ -6,9 +6,9 @@
 //! than 1e-4. Here the iterations of a render are not independent; where that may matter the error comes from renders
 //! with different seeds.
 
-use croupier::film::{PixelAov, PixelStats};
-use croupier::learn::{ControlVariate, Learning, Objective, PixelEstimator};
-use croupier::rrs::Norm;
+use croupier::unstable::film::{PixelAov, PixelStats};
+use croupier::unstable::learn::{ControlVariate, Learning, Objective, PixelEstimator};
+use croupier::unstable::rrs::Norm;
 use croupier::{Settings, Strategy};
 use croupier_host::builtin;
 use croupier_host::description::*;
@@ -160,7 +160,7 @@ fn strategies_that_learn_agree_on_all_materials() {
 fn mirrors_and_glass_play_learned_roulette() {
     let mirror = Model::Mirror { reflectance: Reflectance::Constant([1.0; 3]) };
     for (what, model) in [("mirror", mirror), ("glass", Model::Dielectric { int_ior: 1.5, ext_ior: 1.0 })] {
-        let mut s = under_white_sky(camera([0.0, 0.6, 0.8], [0.0; 3], 5.0, [16, 16]));
+        let mut s = in_white_environment(camera([0.0, 0.6, 0.8], [0.0; 3], 5.0, [16, 16]));
         s.environment = Some(Environment::Constant { radiance: [0.03; 3] });
         let [floor, side] = [grey(0.8), model].map(|m| s.add_material(what, m));
         add_quad(&mut s, "floor", floor, facing_y(0.3, 0.0, 1.0));
@@ -218,7 +218,7 @@ fn choices_do_not_bias() {
     check("cache of 32 KiB", "ears", &|s| s.learning.cache_bytes = 32 << 10);
     check("no split budget", "ears:plain", &|s| s.split_budget = 0);
     check("everything small", "ears", &|s| {
-        (s.ring, s.learning.ledger, s.learning.cache_bytes, s.learning.estimate) =
+        (s.ring, s.learning.ledger, s.learning.cache_bytes, s.learning.pixel_estimator) =
             (16, 4, 16 << 10, PixelEstimator::Blocks);
         (s.adaptive, s.shadow_roulette, s.control_variate) = (true, true, ControlVariate::Cached);
     });
@@ -234,7 +234,7 @@ fn choices_do_not_bias() {
     check("control_variate of 0.3", "fixed:0.7", &|s| s.control_variate = ControlVariate::Number(0.3));
     check("control_variate of -0.2", "ears", &|s| s.control_variate = ControlVariate::Number(-0.2));
     check("absolute error", "ears", &|s| s.learning.objective = Objective::Absolute);
-    check("blocks", "ears:plain", &|s| s.learning.estimate = PixelEstimator::Blocks);
+    check("blocks", "ears:plain", &|s| s.learning.pixel_estimator = PixelEstimator::Blocks);
     for norm in [Norm::Max, Norm::Luminance] {
         check(&format!("{norm:?}"), "ears:plain", &|s| s.learning.norm = norm);
     }

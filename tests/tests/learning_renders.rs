@@ -1,10 +1,10 @@
 //! Input and output of renders that learn: saved statistics, denoised pictures, figures.
 
-use croupier::cost::COST_SHADOW;
-use croupier::denoise::{Planes, scratch_len};
-use croupier::learn::cache::CacheSize;
-use croupier::learn::{ControlVariate, Learning, Objective};
-use croupier::rrs::Norm;
+use croupier::unstable::cost::COST_SHADOW;
+use croupier::unstable::denoise::{Planes, scratch_len};
+use croupier::unstable::learn::cache::CacheSize;
+use croupier::unstable::learn::{ControlVariate, Learning, Objective};
+use croupier::unstable::rrs::Norm;
 use croupier::{Scene, Settings, Strategy};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::builtin;
@@ -42,7 +42,7 @@ fn smallest() -> usize {
     CacheSize::SMALLEST.bytes(2).unwrap()
 }
 
-/// Stops at once, or never.
+/// Observer that stops the render at once, or never.
 struct Stop(bool);
 
 impl Observer for Stop {
@@ -113,7 +113,7 @@ fn wrong_statistics_are_errors() {
     assert!(e.to_string().starts_with("statistics of another scene"), "{e}");
     let e = refused(scene(), &with(begun(&good), |s| s.learning.cache_bytes = smallest()));
     assert!(e.to_string().contains("there is room for"), "{e}");
-    // bolin-meyer learns, but of the picture
+    // bolin-meyer learns, but from the picture
     for strategy in ["classic", "none", "bolin-meyer"] {
         for o in [begun(&good), RenderOptions { save_cache: true, ..options(strategy, 2) }] {
             let e = refused(scene(), &with(o, |s| s.strategy = Strategy::parse(strategy).unwrap()));
@@ -188,7 +188,7 @@ fn the_denoiser_knows_what_the_first_hits_look_like() {
     assert_eq!(["R", "G", "B"].map(|c| layer.channel(c).unwrap().to_vec()), out);
 }
 
-/// Figures that are known otherwise. Killed by: paths over vertices instead of camera samples, a layer of the wrong
+/// Figures against the counts that they are derived from. Killed by: paths over vertices instead of camera samples, a layer of the wrong
 /// sums, the factor of another depth, an efficiency that is not the inverse product, parts of the time counted twice.
 #[test]
 fn figures_fit_together() {
@@ -236,7 +236,7 @@ fn figures_fit_together() {
         assert!(text.contains("path length") && text.contains("estimating pixels"), "{text}");
         assert_eq!(text.contains("looking up"), strategy == "ears");
     }
-    // these learn of the picture, not of the scene
+    // these learn from the picture, not from the scene
     let picture_alone = [with(options("classic", 3), |s| s.adaptive = true), options("classic:2:relative", 3)];
     for o in picture_alone {
         let s = rendered(&o).statistics;

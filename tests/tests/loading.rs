@@ -182,7 +182,7 @@ fn png_kinds_become_rgba() {
         let (scene, _) = load(&folder.path().join("a.obj")).unwrap_or_else(|e| panic!("{e}"));
         let t = &scene.textures[0];
         assert_eq!((t.width, t.height, t.texels.as_slice()), (2, 1, wanted.as_slice()), "{color:?} {depth:?}");
-        assert_eq!(scene.materials[0].model.reflectance(), Some(Reflectance::Texture(0)));
+        assert_eq!(scene.materials[0].model.parameters().reflectance, Some(Reflectance::Texture(0)));
     }
 }
 

@@ -1,7 +1,7 @@
 //! The scenes beside the repository load and bake whole. A clone without them skips these tests, and says so.
 
 use croupier::Scene;
-use croupier::scene::blob::MaterialKind;
+use croupier::unstable::scene::blob::MaterialKind;
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::load::{LoadError, load};
 use serde_json::Value;
@@ -84,7 +84,7 @@ fn every_scene_bakes_whole() {
         assert_eq!(view.lights.len() as u32, area_lights + environment, "{name}");
         let lit: Vec<u32> = view.triangles.iter().map(|t| t.light).filter(|l| *l != u32::MAX).collect();
         assert_eq!(lit, (0..area_lights).collect::<Vec<_>>(), "{name}");
-        let sum: f64 = view.lights.iter().map(|l| f64::from(l.probability)).sum();
+        let sum: f64 = view.light_alias.iter().map(|a| f64::from(a.probability)).sum();
         assert!((sum - 1.0).abs() < 1e-5, "{name}: light probabilities sum to {sum}");
     }
 }

@@ -1,15 +1,14 @@
-//! What an observer of a render is shown, and what it costs the render.
+//! What an observer of a render is shown, and that its time does not count as rendering.
 
 use croupier::{Film, Scene, Settings};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin;
-use croupier_host::drive::{Options, Unobserved, drive};
-use croupier_host::render::{Observer, Progress, Target};
+use croupier_host::drive::{Observer, Options, Progress, Target, Unobserved, drive};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Notes what each iteration shows, and dawdles.
+/// Records what each iteration shows, and pauses.
 #[derive(Default)]
 struct Slow {
     seen: Mutex<Vec<(u64, f64, f64)>>,
@@ -37,7 +36,7 @@ fn small() -> (AlignedBytes, Settings) {
     (scene, settings)
 }
 
-/// A clock of its own: ten seconds for each iteration.
+/// Clock of its own that counts ten seconds per iteration.
 #[derive(Default)]
 struct OwnClock(Mutex<f64>);
 

@@ -1,7 +1,7 @@
 //! Factors, their rounding and their bounds.
 
-use croupier::rrs::{COMB_ONE, Learned8, Local8, MAX_FACTOR, MIN_FACTOR, Norm, Strategy, Vertices8, comb};
-use croupier::simd::{F32x8, U32x8, Vec3x8};
+use croupier::unstable::rrs::{COMB_ONE, Learned8, Local8, MAX_FACTOR, MIN_FACTOR, Norm, Strategy, Vertices8, comb};
+use croupier::unstable::simd::{F32x8, U32x8, Vec3x8};
 use croupier_tests::stats::SplitMix;
 
 /// Mean of n over all u on a grid of `m` equally spaced values that includes 0: exact for a comb in fixed point whose

@@ -1,8 +1,9 @@
 //! The table of settings: every row is readable, writable, checked and described.
 
-use croupier::learn::{ControlVariate, Learning, Objective, PixelEstimator};
-use croupier::rrs::{Norm, ParseError};
-use croupier::{Plan, Scene, SettingError, SettingRange, SettingValue, Settings, SettingsError, Strategy};
+use croupier::unstable::learn::{ControlVariate, Learning, Objective, PixelEstimator};
+use croupier::unstable::rrs::{Norm, ParseError};
+use croupier::unstable::{SettingRange, SettingValue};
+use croupier::{Plan, Scene, SettingError, Settings, SettingsError, Strategy};
 use croupier_tests::scenes::{blob, cornell};
 
 fn of_a_scene() -> Settings {
@@ -167,7 +168,7 @@ fn texts_stand_for_these_values() {
         ("cache-bytes", "3MiB"),
         ("objective", "absolute"),
         ("norm", "luminance"),
-        ("estimate", "blocks"),
+        ("pixel-estimator", "blocks"),
         ("control-variate", "-0.5"),
         ("factors", "0.5:2"),
         ("size", "640x480"),
@@ -178,7 +179,7 @@ fn texts_stand_for_these_values() {
     }
     let l = s.learning;
     assert_eq!((l.cache_bytes, l.objective, l.norm), (3 << 20, Objective::Absolute, Norm::Luminance));
-    assert_eq!((l.estimate, l.factors), (PixelEstimator::Blocks, [0.5, 2.0]));
+    assert_eq!((l.pixel_estimator, l.factors), (PixelEstimator::Blocks, [0.5, 2.0]));
     assert_eq!((s.control_variate, s.size, s.seed), (ControlVariate::Number(-0.5), [640, 480], u64::MAX));
     assert_eq!(s.strategy, Strategy::parse("classic:7:relative").unwrap());
     s.set("control-variate", "cached").unwrap();

@@ -6,9 +6,9 @@
 //! difference is asserted to be below 0.06 %, so that equal means pass. The pictures are small and their light is soft,
 //! because noise costs time and bias does not depend on size.
 
-use croupier::accel::WideBvh;
-use croupier::light::LightSelector;
-use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::accel::WideBvh;
+use croupier::unstable::light::LightSelector;
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier::{Budget, Plan, Scene, Session, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin;

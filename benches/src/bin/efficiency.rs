@@ -5,7 +5,7 @@
 //! of core-seconds, the CPU time of its threads, everything inside: setting up, learning, estimating errors. Its error
 //! is relMSE against the scene's reference, without the worst 0.01 % of the pixels. It has two faults: small pictures
 //! keep fireflies in it, and it contains the noise of the reference, which pulls all ratios to 1 and has a column. So a
-//! second figure, with a star, leaves the worst 0.1 % of the pixels (`--outliers`) out and subtracts, in those that are
+//! second figure, with a star, leaves the worst 0.5 % of the pixels (`--outliers`) out and subtracts, in those that are
 //! left, the variance that the reference states for itself. relMSE falls as 1 / cost, so that their product hardly
 //! depends on when the render ended. Where a few bright samples carry the error, leaving pixels out flatters the render
 //! with fewer samples, which has met fewer of them: compare such rows at equal samples, or leave more out than any has
@@ -16,6 +16,9 @@
 //! its median. Renders of one seed follow each other, in another order for each seed, so that what else the machine
 //! does hits all strategies. A time to an error is read from the errors with a star after the iterations ([`time_to`]).
 //!
+//! `--write` puts a run of all scenes into `benches/results`: with the usual strategies into `efficiency.md`, with
+//! `--all` into `efficiency-all.md`, with `--overhead` into `efficiency-overhead.md`.
+//!
 //! `--equal-samples N` renders N samples per pixel and takes rays as the cost: its tables are the same on every
 //! machine.
 //!
@@ -23,6 +26,7 @@
 
 use clap::Parser;
 use croupier_benches::measure::{Run, Snapshot, render};
+use croupier_benches::results::{Results, Table};
 use croupier_benches::stats::{Median, coverage, digits, geometric_mean};
 use croupier_benches::subject::Subject;
 use croupier_benches::variant::Variant;
@@ -34,9 +38,9 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 const SCENES: [&str; 7] = ["kitchen", "bathroom", "living_room", "pool", "water_caustic", "cbox", "veach_mis"];
-const STRATEGIES: [&str; 7] = ["classic", "classic:5:relative", "throughput", "adrrs", "ear", "ears", "ears+shadow"];
+const STRATEGIES: [&str; 5] = ["classic", "throughput", "adrrs", "ears", "ears+shadow"];
 /// With `--all`.
-const ALL: [&str; 26] = [
+const ALL: [&str; 24] = [
     "none",
     "threshold",
     "contribution",
@@ -61,9 +65,9 @@ const ALL: [&str; 26] = [
     "ears+constant",
     "ears+small",
     "ears+truth",
-    "classic:200",
-    "ears+idle",
 ];
+/// With `--overhead`: the same paths without learning, and with it.
+const OVERHEAD: [&str; 2] = ["classic:200", "ears+idle"];
 const BASELINES: [&str; 2] = ["classic", "adrrs"];
 /// Errors to which times are stated.
 const LEVELS: [f64; 3] = [0.1, 0.03, 0.01];
@@ -81,20 +85,23 @@ struct Args {
     /// adaptive, shadow, constant, small, truth, idle); several with commas.
     #[arg(long = "strategy", value_name = "NAME", value_delimiter = ',', conflicts_with = "all")]
     strategies: Vec<String>,
-    /// Every strategy that needs no options.
+    /// Every strategy that needs no options: an overview from short renders.
     #[arg(long)]
     all: bool,
-    /// Independent seeds [default: 8, quick: 3].
+    /// What learning costs: rays per second of `ears+idle` over those of `classic:200`, which traces the same paths.
+    #[arg(long, conflicts_with_all = ["strategies", "all"])]
+    overhead: bool,
+    /// Independent seeds [default: 8, quick: 3, all and overhead: 2].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     seeds: Option<u32>,
     /// The first of them.
     #[arg(long, default_value_t = 0)]
     first_seed: u64,
-    /// Core-seconds of each render [default: 30, quick: 5].
+    /// Core-seconds of each render [default: 30, quick: 5, all: 4].
     #[arg(long)]
     seconds: Option<f64>,
     /// Per cent of the pixels that the figures with a star leave out, the worst ones.
-    #[arg(long, value_name = "PERCENT", default_value_t = 0.1)]
+    #[arg(long, value_name = "PERCENT", default_value_t = 0.5)]
     outliers: f64,
     /// Samples per pixel of each render, instead of a time.
     #[arg(long, value_name = "N", conflicts_with = "seconds", value_parser = clap::value_parser!(u32).range(1..))]
@@ -108,15 +115,37 @@ struct Args {
     /// Also write everything, with the errors over time, into this file after every scene.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Write the tables into benches/results; needs all scenes and one of the three sets of strategies.
+    #[arg(long, conflicts_with_all = ["only", "strategies", "first_seed", "equal_samples", "quick"])]
+    write: bool,
 }
 
 impl Args {
+    /// Name of the results.
+    fn name(&self) -> &'static str {
+        match (self.all, self.overhead) {
+            (true, _) => "efficiency-all",
+            (_, true) => "efficiency-overhead",
+            _ => "efficiency",
+        }
+    }
+
     fn seeds(&self) -> u32 {
-        self.seeds.unwrap_or(if self.quick { 3 } else { 8 })
+        let usual = match (self.quick, self.all || self.overhead) {
+            (true, _) => 3,
+            (_, true) => 2,
+            _ => 8,
+        };
+        self.seeds.unwrap_or(usual)
     }
 
     fn seconds(&self) -> f64 {
-        self.seconds.unwrap_or(if self.quick { 5.0 } else { 30.0 })
+        let usual = match (self.quick, self.all) {
+            (true, _) => 5.0,
+            (_, true) => 4.0,
+            _ => 30.0,
+        };
+        self.seconds.unwrap_or(usual)
     }
 
     fn target(&self) -> Target {
@@ -124,10 +153,11 @@ impl Args {
     }
 
     fn strategies(&self) -> Result<Vec<Variant>, String> {
-        let names: Vec<&str> = match (self.all, self.strategies.is_empty()) {
-            (false, false) => self.strategies.iter().map(|s| &**s).collect(),
-            (false, true) => STRATEGIES.to_vec(),
-            (true, _) => ALL.to_vec(),
+        let names: Vec<&str> = match (self.all, self.overhead, self.strategies.is_empty()) {
+            (true, ..) => ALL.to_vec(),
+            (_, true, _) => OVERHEAD.to_vec(),
+            (.., false) => self.strategies.iter().map(|s| &**s).collect(),
+            _ => STRATEGIES.to_vec(),
         };
         names.into_iter().map(Variant::parse).collect()
     }
@@ -236,33 +266,68 @@ impl Report<'_> {
         })
     }
 
-    fn head(&self) -> String {
-        let what = self.args.equal_samples.map_or_else(
-            || format!("{} core-seconds, one thread", digits(self.args.seconds())),
-            |n| format!("{n} samples per pixel"),
-        );
+    /// What holds for all tables.
+    fn facts(&self) -> Vec<(String, String)> {
         let n = self.args.seeds();
-        format!(
-            "# Error times cost\n\n\
-             Made by `cargo run --release -p croupier-benches --bin efficiency`; what the figures are is said in\n\
-             `benches/src/bin/efficiency.rs`. {n} seeds, {what}.\nMedians [intervals] over the seeds: the \
-             chance that the true median lies inside is {:.0} %. A star: without the worst {} % of\nthe pixels and \
-             without the reference's noise; else without 0.01 % and with it.",
-            100.0 * coverage(n as usize),
-            self.args.outliers
-        )
+        let what = self.args.equal_samples.map_or_else(
+            || format!("{n} seeds of {} core-seconds, one thread each", digits(self.args.seconds())),
+            |samples| format!("{n} seeds of {samples} samples per pixel"),
+        );
+        let coverage = 100.0 * coverage(n as usize);
+        let facts = [
+            ("renders", what),
+            ("figures", format!("medians over the seeds [intervals that hold the true median with {coverage:.0} %]")),
+            (
+                "star",
+                format!("without the worst {} % of the pixels and the reference's noise", self.args.outliers)
+                    + "; else without 0.01 % and with it",
+            ),
+        ];
+        facts.into_iter().map(|(key, value)| (key.into(), value)).collect()
     }
 
-    fn table(&self, g: &Group) -> String {
+    /// Speed-ups over `classic`, with a star: strategies in rows, scenes and their geometric mean in columns. `None`
+    /// without `classic`.
+    fn overview(&self) -> Option<Table> {
+        self.baselines()[0]?;
+        let names: Vec<&str> = self.groups.iter().map(|g| &*g.scene).collect();
+        let mut table = Table::new("Speed-up over classic", &format!("strategy, {}, mean", names.join(", ")));
+        for (s, variant) in self.strategies.iter().enumerate().filter(|(_, v)| v.name != BASELINES[0]) {
+            let scenes = self.groups.iter().map(|g| self.in_scene(g, s)[2]);
+            let figures = scenes.chain([self.in_all(s)[2]]).map(|m| known(m, |m| format!("{:.2}x", m.median)));
+            table.add([marked(variant)].into_iter().chain(figures));
+        }
+        Some(table)
+    }
+
+    /// Rays per second while learning over those of the same paths without; `None` unless both were rendered.
+    fn overhead(&self) -> Option<Table> {
+        let [plain, learns] = OVERHEAD.map(|name| self.strategies.iter().position(|s| s.name == name));
+        let (plain, learns) = (plain?, learns?);
+        let mut table = Table::new("Cost of learning", "scene, samples per pixel, rays/s");
+        let speed = |r: &Run| r.end.rays as f64 / r.end.core_seconds;
+        let mut means = Vec::new();
+        for g in &self.groups {
+            let quotients: Vec<f64> =
+                g.runs[learns].iter().zip(&g.runs[plain]).map(|(a, b)| speed(a) / speed(b)).collect();
+            let mean = geometric_mean(&quotients);
+            means.push(mean);
+            table.add([g.scene.clone(), known(g.median(learns, Run::spp), |m| digits(m.median)), format!("{mean:.2}")]);
+        }
+        table.add(["geometric mean".into(), "".into(), format!("{:.2}", geometric_mean(&means))]);
+        Some(table)
+    }
+
+    fn table(&self, g: &Group) -> Table {
         let by_rays = self.args.equal_samples.is_some();
         let columns = if by_rays {
-            "strategy | spp | rays/sample | V: variance of a sample | V* | reference noise x spp | 1 / (V x rays) | \
-             over classic | over adrrs | over classic* | over adrrs*"
+            "strategy, spp, rays/sample, V: variance of a sample, V*, reference noise x spp, 1 / (V x rays), \
+             over classic, over adrrs, over classic*, over adrrs*"
         } else {
-            "strategy | spp | rays/sample | Mrays/s | relMSE | relMSE* | reference noise | relMSE x core-s | \
-             over classic | over adrrs | over classic* | over adrrs* | s to 0.1* | s to 0.03* | s to 0.01*"
+            "strategy, spp, rays/sample, Mrays/s, relMSE, relMSE*, reference noise, relMSE x core-s, \
+             over classic, over adrrs, over classic*, over adrrs*, s to 0.1*, s to 0.03*, s to 0.01*"
         };
-        let mut text = format!("\n## {}\n\n{}", g.scene, table_head(columns));
+        let mut table = Table::new(&g.scene, columns);
         for (s, variant) in self.strategies.iter().enumerate() {
             let middle = |f: &dyn Fn(&Run) -> f64| known(g.median(s, f), |m| digits(m.median));
             let with_interval = |f: &dyn Fn(&Run) -> f64| known(g.median(s, f), |m| m.to_string());
@@ -291,19 +356,18 @@ impl Report<'_> {
                 let reached = |t: Option<Median>| known(t.filter(|t| t.median.is_finite()), |t| digits(t.median));
                 cells.extend(LEVELS.map(|level| reached(time(level))));
             }
-            text += &format!("| {} |\n", cells.join(" | "));
+            table.add(cells);
         }
-        text
+        table
     }
 
-    fn summary(&self) -> String {
-        let columns = "strategy | over classic | over adrrs | over classic* | over adrrs*";
-        let mut text = format!("\n## Geometric mean over the scenes ({})\n\n", self.groups.len());
-        text += &table_head(columns);
+    fn summary(&self) -> Table {
+        let columns = "strategy, over classic, over adrrs, over classic*, over adrrs*";
+        let mut table = Table::new("Geometric mean over the scenes", columns);
         for (s, variant) in self.strategies.iter().enumerate() {
-            text += &format!("| {} | {} |\n", marked(variant), self.in_all(s).map(speed_up).join(" | "));
+            table.add([marked(variant)].into_iter().chain(self.in_all(s).map(speed_up)));
         }
-        text
+        table
     }
 
     fn json(&self) -> Value {
@@ -334,10 +398,6 @@ impl Report<'_> {
     }
 }
 
-fn table_head(columns: &str) -> String {
-    format!("| {columns} |\n|{}\n", "---|".repeat(columns.matches('|').count() + 1))
-}
-
 /// A strategy's name. What ends paths for ever is quick, and its relMSE hides that while noise is larger.
 fn marked(variant: &Variant) -> String {
     format!("{}{}", variant.name, if variant.strategy.is_biased() { " (biased)" } else { "" })
@@ -353,18 +413,30 @@ fn speed_up(m: Option<Median>) -> String {
 }
 
 fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+    let mut results = Results::of_this_run(args.name());
+    if let Some(name) = args.only.iter().find(|name| !args.scenes.join(name).is_dir()) {
+        return Err(format!("there is no scene {name} in {}", args.scenes.display()).into());
+    }
     let mut report = Report { args, strategies: args.strategies()?, groups: Vec::new() };
-    println!("{}", report.head());
+    results.header.extend(report.facts());
+    report.facts().iter().for_each(|(key, value)| println!("- {key}: {value}"));
     for name in &args.only {
         let subject = Subject::open(&args.scenes, name).map_err(|e| format!("{name}: {e}"))?;
         let group = Group::render(&subject, &report.strategies, args)?;
-        print!("{}", report.table(&group));
+        print!("\n{}", report.table(&group));
         report.groups.push(group);
         if let Some(path) = &args.json {
             std::fs::write(path, report.json().to_string()).map_err(|e| format!("{}: {e}", path.display()))?;
         }
     }
-    print!("{}", report.summary());
+    let first: Vec<Table> = [report.overview(), report.overhead()].into_iter().flatten().collect();
+    first.iter().chain([&report.summary()]).for_each(|t| print!("\n{t}"));
+    if args.write {
+        results.tables = first;
+        results.tables.extend(report.groups.iter().map(|g| report.table(g)));
+        results.tables.push(report.summary());
+        eprintln!("wrote {}", results.write(args.name())?.display());
+    }
     Ok(())
 }
 

@@ -16,12 +16,16 @@
 //! pilot said) is rendered once more, longer, with new seeds, and they alone count. `threshold` is biased: its row is
 //! there to show that bias is found.
 //!
-//! The output is `benches/EQUIVALENCE.md`; it depends on nothing but the program and the scenes. Exit status: 0 all
-//! rows as they should be, or the scenes are not there; 1 otherwise.
+//! `--write` puts a run of all rows into `benches/results/equivalence.md`; its figures depend on nothing but the
+//! program and the scenes. In the table a star says that the noisiest pixels are left out; splits, paths that roulette
+//! ended and factors that were limited because the ring was full are per camera sample. Exit status: 0 all rows as they
+//! should be, or the scenes are not there; 1 otherwise.
 
 use clap::Parser;
-use croupier::learn::{ControlVariate, Learning, PixelEstimator};
-use croupier::{Counters, MIN_RING, Settings, Strategy};
+use croupier::unstable::MIN_RING;
+use croupier::unstable::learn::{ControlVariate, Learning, PixelEstimator};
+use croupier::{Counters, Settings, Strategy};
+use croupier_benches::results::{Results, Table};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::load::load;
@@ -36,6 +40,10 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
+
+const NAME: &str = "equivalence";
+const COLUMNS: &str =
+    "scene, strategy, max depth, seeds, difference, standard error, Mrays, splits, terminated, limited, verdict";
 
 /// Half-width of what counts as equal, relative to the mean.
 const DELTA: f64 = 0.002;
@@ -80,6 +88,9 @@ struct Args {
     /// Threads; 0 takes one per processor. Does not change the figures.
     #[arg(long, default_value_t = 0)]
     threads: usize,
+    /// Write benches/results/equivalence.md; needs every row.
+    #[arg(long, conflicts_with_all = ["only", "strategy", "quick", "all_pixels"])]
+    write: bool,
 }
 
 /// What is made hard for a strategy.
@@ -134,8 +145,12 @@ impl Trial {
             Self::Budget => s.split_budget = 4,
             Self::Small => {
                 (s.ring, s.shadow_roulette, s.control_variate) = (MIN_RING, true, ControlVariate::Cached);
-                s.learning =
-                    Learning { ledger: 4, cache_bytes: 16 << 10, estimate: PixelEstimator::Blocks, ..s.learning };
+                s.learning = Learning {
+                    ledger: 4,
+                    cache_bytes: 16 << 10,
+                    pixel_estimator: PixelEstimator::Blocks,
+                    ..s.learning
+                };
             }
         }
     }
@@ -488,36 +503,22 @@ fn each<T: Send>(threads: usize, seeds: Range<u64>, f: impl Fn(u64) -> T + Sync)
     done.into_iter().map(|d| d.1).collect()
 }
 
-const HEAD: &str = "\
-# Equivalence
-
-Made by `cargo run --release -p croupier-benches --bin equivalence > benches/EQUIVALENCE.md`: means of pictures with roulette
-and splitting against those without (`none` with the same max depth), which must be the same within 0.2 %; how is said in
-`benches/src/bin/equivalence.rs`. A star: without the noisiest 4 % of the pixels, found by renders without roulette (glints
-of a small light or of the sun in smooth surfaces, which make nearly all of the noise). Splits, kills by
-roulette and factors cut to 1 because the ring was full are per camera sample.
-
-| scene | strategy | max depth | seeds | difference | standard error | Mrays | splits | kills | cut | verdict |
-|---|---|---|---|---|---|---|---|---|---|---|";
-
-fn print(scene: &str, row: &Row, round: &Round) {
+fn cells(scene: &str, row: &Row, round: &Round) -> [String; 11] {
     let c = &round.counters;
     let per_sample = |n: u64| n as f64 / c.camera_samples as f64;
-    println!(
-        "| {scene} | {}{}{} | {} | {} | {:+.3} % | {:.3} % | {:.0} | {:.2} | {:.2} | {:.3} | {} |",
-        row.strategy,
-        row.trial.name(),
-        if row.calm { " *" } else { "" },
-        row.depth,
-        round.n,
-        100.0 * round.value(),
-        100.0 * round.error(),
-        round.mrays(),
-        per_sample(c.splits),
-        per_sample(c.paths_terminated),
-        per_sample(c.splits_limited_by_ring),
-        round.verdict(row).1,
-    );
+    [
+        scene.into(),
+        format!("{}{}{}", row.strategy, row.trial.name(), if row.calm { " *" } else { "" }),
+        row.depth.to_string(),
+        round.n.to_string(),
+        format!("{:+.3} %", 100.0 * round.value()),
+        format!("{:.3} %", 100.0 * round.error()),
+        format!("{:.0}", round.mrays()),
+        format!("{:.2}", per_sample(c.splits)),
+        format!("{:.2}", per_sample(c.paths_terminated)),
+        format!("{:.3}", per_sample(c.splits_limited_by_ring)),
+        round.verdict(row).1.into(),
+    ]
 }
 
 /// Unbiased strategies without a row of this scene.
@@ -532,7 +533,12 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         0 => std::thread::available_parallelism().map_or(1, NonZero::get),
         n => n,
     };
-    println!("{HEAD}");
+    let mut results = Results::of_this_run(NAME);
+    if let Some((name, ..)) = SCENES.iter().find(|s| args.write && !args.scenes.join(s.0).is_dir()) {
+        return Err(format!("--write: there is no scene {name}").into());
+    }
+    let mut table = Table::new("", COLUMNS);
+    print!("{}", table.head());
     let (mut good, mut all) = (0, 0);
     for (name, size, rows) in SCENES.iter().filter(|s| args.only.is_empty() || args.only.iter().any(|o| o == s.0)) {
         if let Some(strategy) = forgotten(rows).next() {
@@ -542,13 +548,19 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         for row in rows.iter().filter(|r| r.strategy.starts_with(&args.strategy) && (r.quick || !args.quick)) {
             let row = Row { calm: row.calm && !args.all_pixels, ..*row };
             let round = place.test(&row);
-            print(name, &row, &round);
+            table.add(cells(name, &row, &round));
+            println!("{}", table.last());
             all += 1;
             good += u32::from(round.verdict(&row).0);
         }
         eprintln!("{name}: {:.0} s", start.elapsed().as_secs_f64());
     }
     println!("\n{good} of {all} rows as they should be.");
+    if args.write {
+        results.header.push(("rows as they should be".into(), format!("{good} of {all}")));
+        results.tables.push(table);
+        eprintln!("wrote {}", results.write(NAME)?.display());
+    }
     Ok(good == all)
 }
 

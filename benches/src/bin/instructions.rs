@@ -3,8 +3,8 @@
 //! Every row is a small render on one thread, made by this program under valgrind. Two parts are counted, and nothing
 //! else: stepping the shards (paths, rays, learning's records), and ending iterations (merging, denoising, learning).
 //! The same build gives the same counts; another compiler may give others, and so may another C library, whose `memcpy`
-//! chooses its instructions when it runs. `--check` compares with `benches/results/instructions.md` and fails when a row
-//! has risen.
+//! chooses its instructions when it runs. `--check` compares with `benches/results/instructions.md` and fails when a
+//! figure has risen.
 //!
 //! Not made with gungraun (once iai-callgrind): it compares with runs that it keeps below `target/`, where this needs a
 //! committed table and figures per ray, and it needs a runner of its own version installed beside cargo.
@@ -174,12 +174,11 @@ fn inclusive(profile: &str, function: &str) -> u64 {
 }
 
 /// Prints each row beside the committed one; how many have risen.
-fn check(rows: &[Row], tolerance: f64) -> Result<usize, Box<dyn Error>> {
+fn check(rows: &[Row], tolerance: f64, results: &Results) -> Result<usize, Box<dyn Error>> {
     let committed = Results::read(NAME)?;
     let table = committed.tables.first().ok_or("no table in the committed results")?;
-    let compiler = committed.header("compiler").unwrap_or("unknown");
-    if compiler != provenance::COMPILER {
-        println!("the committed counts are of {compiler}, these of {}: they may differ for that", provenance::COMPILER);
+    if let Some(difference) = results.differs_in(&committed, &["compiler"]) {
+        println!("counts may differ because the {difference}");
     }
     let column = |name: &str| table.column(name).ok_or_else(|| format!("no column '{name}' in the committed results"));
     let columns = [column("step per ray")?, column("end_iteration per ray")?];
@@ -207,16 +206,12 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         println!("{}", render(blob, strategy)?);
         return Ok(true);
     }
-    if args.check {
-        let committed = Results::read(NAME)?;
-        let set = provenance::instruction_set();
-        for (key, this) in [("instruction set", &*set), ("arithmetic", provenance::ARITHMETIC)] {
-            let theirs = committed.header(key).unwrap_or("unknown");
-            if theirs != this {
-                println!("skipped: the committed counts are of {key} {theirs}, this build is of {this}");
-                return Ok(true);
-            }
-        }
+    let mut results = Results::of_this_run(NAME);
+    if args.check
+        && let Some(difference) = results.differs_in(&Results::read(NAME)?, &["instruction set", "arithmetic"])
+    {
+        println!("skipped: the {difference}");
+        return Ok(true);
     }
     let folder = Folder::new()?;
     let mut rows = Vec::new();
@@ -229,12 +224,15 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         for strategy in wanted {
             let row = count(&folder.0, &blob, scene, strategy)?;
             eprintln!("{}", row.cells().join(", "));
-            table.rows.push(row.cells());
+            table.add(row.cells());
             rows.push(row);
         }
     }
+    if rows.is_empty() {
+        return Err("no row fits".into());
+    }
     if args.check {
-        let risen = check(&rows, args.tolerance)?;
+        let risen = check(&rows, args.tolerance, &results)?;
         println!("{} rows of benches/results/{NAME}.md checked, {risen} figures above it", rows.len());
         if risen > 0 {
             println!("if that is meant: cargo run --release -p croupier-benches --bin {NAME} -- --write");
@@ -246,9 +244,9 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         if rows.len() < SCENES.len() * STRATEGIES.len() {
             return Err("only a run of all scenes may replace the committed results".into());
         }
-        let mut header = provenance::of_this_run(NAME);
-        header.push(("valgrind".into(), provenance::version_of("valgrind")));
-        println!("wrote {}", Results { header, tables: vec![table] }.write(NAME)?.display());
+        results.header.push(("valgrind".into(), provenance::version_of("valgrind")));
+        results.tables.push(table);
+        println!("wrote {}", results.write(NAME)?.display());
     }
     Ok(true)
 }

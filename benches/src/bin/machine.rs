@@ -1,19 +1,18 @@
 //! How full the lanes of the packet machine are, how many vertices wait, what a path's state weighs and how many rays a
 //! whole render traces per second, by ring size and roulette strategy.
 //!
-//! Everything but the speed depends on nothing but scene and settings: [`SNAPSHOT`] holds it, and `--check` fails when
-//! a build gives other numbers. Every render is one iteration of 16 shards, stepped one after the other on one thread;
-//! runs of all rows take turns, and a run's time is the CPU time of this thread where the system tells it.
+//! Everything but the speed depends on nothing but scene and settings: `benches/results/machine.md` holds it, and
+//! `--check` fails when a build gives other numbers. Every render has 16 shards, stepped one after the other on one
+//! thread; runs of all rows take turns, and a run's time is the CPU time of this thread where the system tells it.
 
 use clap::Parser;
-use croupier::profile::{AnyProfile, DiffuseOnly, Full, Profile};
-use croupier::{BYTES_PER_PATH, Budget, Counters, Plan, Scene, Session, Settings, Shard, StepResult, Strategy};
-use croupier_benches::clock::Clock;
+use croupier::unstable::BYTES_PER_PATH;
+use croupier::{Counters, Plan, Scene, Settings, Strategy};
+use croupier_benches::results::{Results, Table};
+use croupier_benches::serial;
 use croupier_host::bake::{BakeOptions, Baked, bake};
-use croupier_host::blob::AlignedBytes;
 use croupier_host::{builtin, load};
 use std::error::Error;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -29,18 +28,22 @@ struct Args {
     /// Runs of each row for its speed; 0 leaves the speed out.
     #[arg(long, default_value_t = 5)]
     rounds: usize,
-    /// Compare the deterministic columns of the built-in scene with benches/MACHINE.md; exit status 1 if they differ.
+    /// Compare the deterministic columns of the built-in scene with benches/results/machine.md; exit status 1 if they
+    /// differ.
     #[arg(long)]
     check: bool,
-    /// Write the tables into benches/MACHINE.md.
-    #[arg(long, conflicts_with = "check")]
+    /// Write benches/results/machine.md; needs all three scenes.
+    #[arg(long, conflicts_with_all = ["check", "only"])]
     write: bool,
 }
 
-const SNAPSHOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/MACHINE.md");
+const NAME: &str = "machine";
 const RINGS: [u32; 5] = [16, 64, 256, 512, 2048];
 const SHARDS: u32 = 16;
-const HEADER: &str = "scene,strategy,ring,scatter,trace,occlude,surface,peak,shard_bytes,bytes_per_path";
+/// Title and columns of what depends on scene and settings alone.
+const LANES: (&str, &str) =
+    ("Lanes and memory", "scene, strategy, ring, scatter, trace, occlude, surface, peak, shard bytes, bytes per path");
+const SPEED: (&str, &str) = ("Speed", "scene, strategy, ring, million rays, Mrays/s, lowest, highest");
 
 /// What a strategy is measured with, so that every row traces about a million rays or more: `fixed:3.3` would give each
 /// camera sample its whole split budget of deep paths.
@@ -88,60 +91,31 @@ impl<'a> Row<'a> {
 
     /// Renders once more.
     fn run(&mut self) -> Result<(), Box<dyn Error>> {
-        let (counters, seconds) = match AnyProfile::smallest(self.blob.effects) {
-            AnyProfile::DiffuseOnly => self.render::<DiffuseOnly>()?,
-            AnyProfile::Full => self.render::<Full>()?,
-        };
+        let (counters, seconds) = serial::render(self.blob, &self.plan, self.load.iterations)?;
         self.counters = counters;
         self.seconds.push(seconds);
         Ok(())
     }
 
-    fn render<P: Profile>(&self) -> Result<(Counters, f64), Box<dyn Error>> {
-        let (plan, scene) = (&self.plan, self.blob);
-        let mut shared = AlignedBytes::zeroed(plan.session().size);
-        let mut blocks: Vec<_> = (0..SHARDS).map(|_| AlignedBytes::zeroed(plan.shard().size)).collect();
-        let mut session = Session::builder(scene).profile::<P>().build(plan, shared.as_mut())?;
-        let shards = blocks.iter_mut().zip(0..).map(|(b, i)| Shard::new(plan, i, b.as_mut()));
-        let mut shards = shards.collect::<Result<Vec<_>, _>>()?;
-        let clock = Clock::start();
-        for &samples in self.load.iterations {
-            session.begin_iteration(samples);
-            for shard in &mut shards {
-                while shard.step(&session, Budget { rays: u64::MAX }) == StepResult::More {}
-            }
-            session.end_iteration(&shards)?;
-        }
-        Ok((*session.counters(), clock.seconds()))
+    /// The cells that tell rows apart.
+    fn key(&self) -> [String; 3] {
+        [self.scene.into(), self.load.strategy.into(), self.plan.settings().ring.to_string()]
     }
 
-    /// Its line of the snapshot.
-    fn snapshot(&self) -> String {
+    fn lanes(&self) -> Vec<String> {
         let c = &self.counters;
-        let [scatter, trace, occlude, surface] = [c.scatter, c.trace, c.occlude, c.surface].map(|u| u.share());
-        format!(
-            "{},{},{},{scatter:.4},{trace:.4},{occlude:.4},{surface:.4},{},{},{BYTES_PER_PATH}",
-            self.scene,
-            self.load.strategy,
-            self.plan.settings().ring,
-            c.ring_peak,
-            self.plan.shard().size,
-        )
+        let shares = [c.scatter, c.trace, c.occlude, c.surface].map(|u| format!("{:.4}", u.share()));
+        let sizes = [c.ring_peak as usize, self.plan.shard().size, BYTES_PER_PATH].map(|n| n.to_string());
+        self.key().into_iter().chain(shares).chain(sizes).collect()
     }
 
-    /// Its line of the table of speeds: median, smallest and largest.
-    fn speed(&self) -> String {
+    /// Median, smallest and largest speed.
+    fn speed(&self) -> Vec<String> {
         let rays = self.counters.rays() as f64 * 1e-6;
         let mut speeds: Vec<f64> = self.seconds.iter().map(|s| rays / s).collect();
         speeds.sort_by(f64::total_cmp);
-        let (low, high) = (speeds[0], speeds[speeds.len() - 1]);
-        format!(
-            "| {} | {} | {} | {rays:.2} | {:.2} | {low:.2} to {high:.2} |",
-            self.scene,
-            self.load.strategy,
-            self.plan.settings().ring,
-            speeds[speeds.len() / 2],
-        )
+        let figures = [rays, speeds[speeds.len() / 2], speeds[0], speeds[speeds.len() - 1]];
+        self.key().into_iter().chain(figures.map(|x| format!("{x:.2}"))).collect()
     }
 }
 
@@ -175,26 +149,16 @@ fn name_fits(args: &Args, name: &str) -> bool {
     name.contains(&args.only)
 }
 
-/// The lines of `text` between ```` ```NAME ```` and the closing fence, and where they are.
-fn block<'a>(text: &'a str, name: &str) -> Option<(std::ops::Range<usize>, &'a str)> {
-    let open = format!("```{name}\n");
-    let start = text.find(&open)? + open.len();
-    let end = start + text[start..].find("```")?;
-    Some((start..end, &text[start..end]))
-}
-
-/// Reports each line of the snapshot that the build does not reproduce; how many there are.
+/// Reports each committed row that the build does not reproduce; how many there are.
 fn check(rows: &[Row<'_>]) -> Result<usize, Box<dyn Error>> {
-    let text = std::fs::read_to_string(SNAPSHOT).map_err(|e| format!("{SNAPSHOT}: {e}"))?;
-    let (_, old) = block(&text, "csv").ok_or_else(|| format!("{SNAPSHOT}: no block of csv"))?;
+    let committed = Results::read(NAME)?;
+    let table = committed.table(LANES.0).ok_or("no table of lanes in the committed results")?;
     let mut differ = 0;
     for row in rows {
-        let new = row.snapshot();
-        let key: Vec<&str> = new.split(',').take(3).collect();
-        let key = key.join(",") + ",";
-        let old = old.lines().find(|l| l.starts_with(&key)).unwrap_or("nothing");
-        if old != new {
-            println!("snapshot: {old}\n     now: {new}");
+        let new = row.lanes();
+        let old = table.row(&row.key().each_ref().map(|k| &**k));
+        if old != Some(&new) {
+            println!("committed: {}\n      now: {}", old.map_or("nothing".into(), |o| o.join(", ")), new.join(", "));
             differ += 1;
         }
     }
@@ -202,11 +166,15 @@ fn check(rows: &[Row<'_>]) -> Result<usize, Box<dyn Error>> {
 }
 
 fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
-    if args.check && !croupier::simd::REPRODUCIBLE {
+    if args.check && !croupier::unstable::simd::REPRODUCIBLE {
         println!("skipped: the snapshot holds for reproducible arithmetic only");
         return Ok(true);
     }
+    let mut results = Results::of_this_run(NAME);
     let scenes = scenes(args)?;
+    if args.write && (scenes.len() < 3 || args.rounds == 0) {
+        return Err("only a run of all three scenes, with speeds, may replace the committed results".into());
+    }
     let mut rows = Vec::new();
     for (name, baked) in &scenes {
         let scene = Scene::from_bytes(&baked.bytes)?;
@@ -225,37 +193,21 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
     }
     if args.check {
         let differ = check(&rows)?;
-        println!("{} rows of benches/MACHINE.md checked, {differ} differ", rows.len());
+        println!("{} rows of benches/results/{NAME}.md checked, {differ} differ", rows.len());
         if differ > 0 {
-            println!("if that is meant: cargo run --release -p croupier-benches --bin machine -- --write");
+            println!("if that is meant: cargo run --release -p croupier-benches --bin {NAME} -- --write");
         }
         return Ok(differ == 0);
     }
-    let mut snapshot = format!("{HEADER}\n");
+    let [mut lanes, mut speed] = [LANES, SPEED].map(|(title, columns)| Table::new(title, columns));
     for row in &rows {
-        writeln!(snapshot, "{}", row.snapshot())?;
+        lanes.add(row.lanes());
+        speed.add(row.speed());
     }
-    let mut speeds =
-        String::from("| scene | strategy | ring | million rays | Mrays/s | runs |\n|---|---|---|---|---|---|\n");
-    for row in &rows {
-        writeln!(speeds, "{}", row.speed())?;
-    }
-    print!("{snapshot}");
-    if rounds > 0 {
-        print!("\n{speeds}");
-    }
+    results.tables = if rounds > 0 { vec![lanes, speed] } else { vec![lanes] };
+    results.tables.iter().for_each(|t| println!("{t}"));
     if args.write {
-        if scenes.len() < 3 {
-            return Err("only a run of all three scenes may replace the snapshot".into());
-        }
-        let mut text = std::fs::read_to_string(SNAPSHOT)?;
-        let (range, _) = block(&text, "csv").ok_or("no block of csv to replace")?;
-        text.replace_range(range, &snapshot);
-        if rounds > 0 {
-            let start = text.find("| scene | strategy | ring | million rays").ok_or("no table of speeds to replace")?;
-            text.replace_range(start.., &speeds);
-        }
-        std::fs::write(SNAPSHOT, text)?;
+        println!("wrote {}", results.write(NAME)?.display());
     }
     Ok(true)
 }

@@ -15,14 +15,15 @@
 //! and the table shows the figures with them in brackets. Biased settings must fail: their rows are as expected if the
 //! test notices.
 //!
-//! The output is `benches/REFERENCES.md`; it depends on nothing but the program and the scenes. Exit status: 0 all rows
-//! as expected, or the scenes are not there; 1 otherwise.
+//! `--write` puts a run of all rows into `benches/results/references.md`; its figures depend on nothing but the program
+//! and the scenes. Exit status: 0 all rows as expected, or the scenes are not there; 1 otherwise.
 
 use clap::Parser;
 use croupier::{Scene, Settings};
+use croupier_benches::results::{Results, Table};
 use croupier_benches::subject::Subject;
 use croupier_benches::variant::Variant;
-use croupier_host::compare::{Bias, BiasOptions, BlockZ, Estimate, Ratio, block_scores, ratio};
+use croupier_host::compare::{Bias, BiasOptions, BlockZ, MeanImage, Ratio, block_scores, ratio};
 use croupier_host::drive::{Options, Unobserved, drive_scene};
 use croupier_host::image::{Picture, Rgb};
 use croupier_host::render::Target;
@@ -31,6 +32,10 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
+
+const NAME: &str = "references";
+const COLUMNS: &str =
+    "scene, strategy, seeds x spp, Mrays, image / reference, beyond 3, mean z, rms z, largest z, verdict";
 
 /// Largest part of the scores beyond 3.
 const MAX_BEYOND3: f64 = 0.02;
@@ -70,6 +75,9 @@ struct Args {
     /// One JSON document instead of the table.
     #[arg(long)]
     json: bool,
+    /// Write benches/results/references.md; needs every row of every scene.
+    #[arg(long, conflicts_with_all = ["only", "strategies", "seeds", "first_seed", "effort", "quick", "json"])]
+    write: bool,
     /// Also write the mean over the seeds of every row, with its standard error, as an EXR file into this folder.
     #[arg(long, value_name = "FOLDER")]
     save: Option<PathBuf>,
@@ -218,33 +226,32 @@ impl Row {
         })
     }
 
-    fn print(&self) {
+    fn cells(&self) -> [String; 10] {
         let Self { ratio, bias, all, .. } = self;
         // a figure without the blocks of the notes, and with them
         let figure = |f: &dyn Fn(&Bias) -> String| {
             let with = all.as_ref().map_or(String::new(), |all| format!(" ({})", f(all)));
             f(bias) + &with
         };
-        println!(
-            "| {} | {} | {} x {} | {:.0} | {:.5} +- {:.5} | {} | {} | {} | {} | {} |",
-            self.scene,
-            self.strategy,
-            self.seeds,
-            self.spp,
-            self.mrays,
-            ratio.value,
-            ratio.stderr.unwrap_or(f64::NAN),
+        [
+            self.scene.clone(),
+            self.strategy.clone(),
+            format!("{} x {}", self.seeds, self.spp),
+            format!("{:.0}", self.mrays),
+            format!("{:.5} +- {:.5}", ratio.value, ratio.stderr.unwrap_or(f64::NAN)),
             figure(&|b| format!("{:.2} %", 100.0 * b.beyond3)),
             figure(&|b| format!("{:+.3}", b.mean)),
             figure(&|b| format!("{:.2}", b.rms)),
             figure(&|b| format!("{:.2}", b.max)),
-            self.verdict()
-        );
-        if !self.biased {
-            for b in bias.beyond6.iter().take(8) {
-                let channel = ["R", "G", "B"].get(b.channel).unwrap_or(&"?");
-                eprintln!("  block ({}, {}) {channel}: z {:.2}, {:.5} for {:.5}", b.x, b.y, b.z, b.image, b.reference);
-            }
+            self.verdict(),
+        ]
+    }
+
+    /// Prints where the picture is far from the reference and should not be.
+    fn complain(&self) {
+        for b in self.bias.beyond6.iter().take(if self.biased { 0 } else { 8 }) {
+            let channel = ["R", "G", "B"].get(b.channel).unwrap_or(&"?");
+            eprintln!("  block ({}, {}) {channel}: z {:.2}, {:.5} for {:.5}", b.x, b.y, b.z, b.image, b.reference);
         }
     }
 }
@@ -275,7 +282,7 @@ fn test(subject: &Subject, spp: u32, args: &Args, plan: &Plan, strategy: &str) -
         let [width, height] = rendered.size.map(|s| s as usize);
         images.push(Rgb::new(width, height, rendered.image()).ok_or("a picture without its pixels")?);
     }
-    let image = Estimate::from_seeds(&images)?;
+    let image = MeanImage::from_seeds(&images)?;
     let name = plan.depth.map_or(strategy.into(), |d| format!("{strategy}, depth {d}"));
     if let Some(folder) = &args.save {
         save(&image, &folder.join(format!("{} {name}.exr", subject.name).replace([' ', ':', ','], "_")))?;
@@ -306,7 +313,7 @@ fn test(subject: &Subject, spp: u32, args: &Args, plan: &Plan, strategy: &str) -
     })
 }
 
-fn save(image: &Estimate, path: &Path) -> Result<(), Box<dyn Error>> {
+fn save(image: &MeanImage, path: &Path) -> Result<(), Box<dyn Error>> {
     let layer =
         |pixels: &[[f64; 3]], f: fn(f64) -> f64| -> Vec<_> { pixels.iter().map(|p| p.map(|x| f(x) as f32)).collect() };
     let mut picture = Picture::new(image.width, image.height);
@@ -325,18 +332,14 @@ fn plans(args: &Args, scene: &str) -> Vec<(&'static Plan, String)> {
     PLANS.iter().filter(applies).map(|p| (p, p.strategy.into())).collect()
 }
 
-const HEAD: &str = "\
-# Against references
-
-Made by `cargo run --release -p croupier-benches --bin references > benches/REFERENCES.md`; what the columns mean and
-what a row must fulfil is said in `benches/src/bin/references.rs`. Figures in brackets include the blocks of the notes.
-
-| scene | strategy | seeds x spp | Mrays | image / reference | beyond 3 | mean z | rms z | largest z | verdict |
-|---|---|---|---|---|---|---|---|---|---|";
-
 fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
+    let mut results = Results::of_this_run(NAME);
+    if let Some((name, _)) = SCENES.iter().find(|s| args.write && !args.scenes.join(s.0).is_dir()) {
+        return Err(format!("--write: there is no scene {name}").into());
+    }
+    let mut table = Table::new("", COLUMNS);
     if !args.json {
-        println!("{HEAD}");
+        print!("{}", table.head());
     }
     let start = Instant::now();
     let mut rows = Vec::new();
@@ -349,9 +352,11 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         let subject = Subject::open(&args.scenes, name).map_err(|e| format!("{name}: {e}"))?;
         for (plan, strategy) in plans(args, name) {
             let row = test(&subject, spp, args, plan, &strategy).map_err(|e| format!("{name}, {strategy}: {e}"))?;
+            table.add(row.cells());
             if !args.json {
-                row.print();
+                println!("{}", table.last());
             }
+            row.complain();
             rows.push(row);
         }
         notes.extend(NOTES.iter().filter(|n| n.scene == name));
@@ -364,6 +369,11 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
     } else {
         println!("\n{good} of {} rows as expected.", rows.len());
         notes.iter().for_each(|n| println!("\n**Note, {}.** {}", n.scene, n.why));
+    }
+    if args.write {
+        results.header.push(("rows as expected".into(), format!("{good} of {}", rows.len())));
+        results.tables.push(table);
+        eprintln!("wrote {}", results.write(NAME)?.display());
     }
     eprintln!("{:.0} s", start.elapsed().as_secs_f64());
     Ok(good == rows.len())

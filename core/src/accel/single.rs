@@ -53,7 +53,7 @@ pub(super) struct Hits {
 impl Hits {
     /// Hits of rays that have not hit anything yet: limits up to and including `limit`.
     #[inline(always)]
-    pub fn none(limit: [f32; 8]) -> Self {
+    pub(super) fn none(limit: [f32; 8]) -> Self {
         Self { t: limit, triangle: [NONE; 8], u: [0.0; 8], v: [0.0; 8] }
     }
 

@@ -2,12 +2,13 @@
 //!
 //! | parameter | meaning | range |
 //! |---|---|---|
-//! | `eta` | real refractive index per channel | (0, 1e6] |
-//! | `k` | extinction per channel | [0, 1e6] |
-//! | `reflectance` | scale per channel, may be textured | [0, 1] |
+//! | `eta` | real refractive index per channel | `CONDUCTOR_RANGE`, eta or k from `MIN_CONDUCTOR` |
+//! | `k` | extinction per channel | `CONDUCTOR_RANGE` |
+//! | `reflectance` | scale per channel, may be textured | `REFLECTANCE_RANGE` |
 
-use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, fresnel, mirrored};
+use super::{Bsdf, CacheDirection, Eval8, Inputs8, Lobes, Materials8, Sample8, fresnel, lobes, mirrored};
 use crate::scene::Scene;
+use crate::scene::blob::Material;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
 /// Smooth conductor.
@@ -19,7 +20,8 @@ pub struct Conductor {
 }
 
 impl Bsdf<'_> for Conductor {
-    const DELTA: bool = true;
+    const LOBES: Lobes = Lobes::REFLECTION.with(Lobes::SPECULAR);
+    const CACHE_DIRECTION: CacheDirection = CacheDirection::Mirror;
 
     #[inline(always)]
     fn gather(scene: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
@@ -41,5 +43,9 @@ impl Bsdf<'_> for Conductor {
     #[inline(always)]
     fn albedo(&self, wo: Vec3x8) -> Vec3x8 {
         (fresnel::conductor(wo.z, self.eta, self.k) * self.reflectance).zero_unless(wo.z.gt(F32x8::ZERO))
+    }
+
+    fn shininess(_: &Material) -> f32 {
+        lobes::MIRROR_SHININESS
     }
 }

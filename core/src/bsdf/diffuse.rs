@@ -2,10 +2,11 @@
 //!
 //! | parameter | meaning | range |
 //! |---|---|---|
-//! | `reflectance` | rho per channel, may be textured | [0, 1] |
+//! | `reflectance` | rho per channel, may be textured | `REFLECTANCE_RANGE` |
 
-use super::{Bsdf, Eval8, Inputs8, Sample8, warp};
+use super::{Bsdf, CacheDirection, Eval8, Inputs8, Lobes, Sample8, warp};
 use crate::scene::Scene;
+use crate::scene::blob::Material;
 use core::f32::consts::FRAC_1_PI;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
@@ -16,7 +17,8 @@ pub struct Diffuse {
 }
 
 impl Bsdf<'_> for Diffuse {
-    const DELTA: bool = false;
+    const LOBES: Lobes = Lobes::REFLECTION.with(Lobes::DIFFUSE);
+    const CACHE_DIRECTION: CacheDirection = CacheDirection::Normal;
 
     #[inline(always)]
     fn gather(_: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
@@ -41,5 +43,9 @@ impl Bsdf<'_> for Diffuse {
     #[inline(always)]
     fn albedo(&self, wo: Vec3x8) -> Vec3x8 {
         self.reflectance.zero_unless(wo.z.gt(F32x8::ZERO))
+    }
+
+    fn shininess(_: &Material) -> f32 {
+        0.0
     }
 }

@@ -1,5 +1,6 @@
 //! Fresnel reflectance for unpolarised light, in forms that do not cancel.
 
+use crate::scene::blob::CONDUCTOR_RANGE;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
 /// Relative refractive index of an interface as seen from one side.
@@ -14,7 +15,7 @@ pub struct Index8 {
 }
 
 impl Index8 {
-    /// From the side where it is `eta`.
+    /// Index as seen from the side where it is `eta`.
     #[inline(always)]
     pub fn new(eta: F32x8) -> Self {
         Self { eta, inverse: 1.0 / eta, k: (eta - 1.0) * (eta + 1.0) }
@@ -75,6 +76,9 @@ pub fn transmittance(cos: F32x8, cos_t: F32x8, eta: F32x8) -> F32x8 {
 /// Largest refractive index and extinction of a conductor that [`conductor`] tells apart: beyond it 4th powers
 /// overflow.
 pub const MAX_INDEX: f32 = 1e6;
+
+// No index that a scene may hold is changed.
+const _: () = assert!(CONDUCTOR_RANGE[1] <= MAX_INDEX);
 
 /// Reflectance of a conductor of index `eta + i k` per channel, seen from vacuum at `cos` in [0, 1].
 ///

@@ -11,6 +11,7 @@
 //! | density of a reflection | D / (2 (wo.z + q(wo))): the cosines of the visible-normal density and of the Jacobian cancel |
 //! | f cos / density | F G1(wi): no D |
 
+use crate::scene::blob::ALPHA_RANGE;
 use core::f32::consts::FRAC_1_PI;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
@@ -18,6 +19,10 @@ use croupier_simd::{F32x8, Mask8, Vec3x8};
 pub const MIN_ALPHA: f32 = 1e-4;
 /// Wider lobes are narrowed to this.
 pub const MAX_ALPHA: f32 = 10.0;
+
+// No width that a scene may hold is changed.
+const _: () = assert!(MIN_ALPHA <= ALPHA_RANGE[0] && ALPHA_RANGE[1] <= MAX_ALPHA);
+
 /// Half vectors at a smaller cosine to `wo` scatter nothing; evaluation, density and sampling share it. Far below the
 /// rounding of the directions themselves; it only keeps squares from underflowing.
 pub const MIN_COS: f32 = 1e-12;
@@ -42,13 +47,13 @@ pub struct Reflection8 {
 }
 
 impl Ggx8 {
-    /// Of width `alpha`, clamped to [`MIN_ALPHA`]..[`MAX_ALPHA`].
+    /// Distributions of width `alpha`, clamped to [`MIN_ALPHA`]..[`MAX_ALPHA`].
     #[inline(always)]
     pub fn new(alpha: F32x8) -> Self {
         Self { alpha: alpha.clamp(MIN_ALPHA, MAX_ALPHA) }
     }
 
-    /// Width.
+    /// Width alpha.
     #[inline(always)]
     pub fn alpha(&self) -> F32x8 {
         self.alpha

@@ -2,10 +2,11 @@
 //!
 //! | parameter | meaning | range |
 //! |---|---|---|
-//! | `reflectance` | reflected fraction per channel, may be textured | [0, 1] |
+//! | `reflectance` | reflected fraction per channel, may be textured | `REFLECTANCE_RANGE` |
 
-use super::{Bsdf, Eval8, Inputs8, Sample8, mirrored};
+use super::{Bsdf, CacheDirection, Eval8, Inputs8, Lobes, Sample8, lobes, mirrored};
 use crate::scene::Scene;
+use crate::scene::blob::Material;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
 /// Perfect mirror.
@@ -15,7 +16,8 @@ pub struct Mirror {
 }
 
 impl Bsdf<'_> for Mirror {
-    const DELTA: bool = true;
+    const LOBES: Lobes = Lobes::REFLECTION.with(Lobes::SPECULAR);
+    const CACHE_DIRECTION: CacheDirection = CacheDirection::Mirror;
 
     #[inline(always)]
     fn gather(_: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
@@ -35,5 +37,9 @@ impl Bsdf<'_> for Mirror {
     #[inline(always)]
     fn albedo(&self, wo: Vec3x8) -> Vec3x8 {
         self.reflectance.zero_unless(wo.z.gt(F32x8::ZERO))
+    }
+
+    fn shininess(_: &Material) -> f32 {
+        lobes::MIRROR_SHININESS
     }
 }

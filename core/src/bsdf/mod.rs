@@ -11,6 +11,7 @@ mod dielectric;
 mod diffuse;
 pub mod fresnel;
 pub mod ggx;
+mod lobes;
 mod mirror;
 mod null;
 mod plastic;
@@ -23,12 +24,13 @@ pub mod warp;
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
+pub use lobes::{CacheDirection, Lobes, MIRROR_SHININESS, ModelFacts};
 pub use mirror::Mirror;
 pub use null::Null;
 pub use plastic::Plastic;
 pub use roughconductor::RoughConductor;
 pub use roughdielectric::RoughDielectric;
-pub use roughplastic::{RoughPlastic, TABLE_SIZE};
+pub use roughplastic::RoughPlastic;
 pub use thindielectric::ThinDielectric;
 
 use crate::scene::blob::{Material, MaterialKind, NONE};
@@ -45,7 +47,7 @@ pub struct Eval8 {
 }
 
 impl Eval8 {
-    /// Nothing in any lane: what models of delta lobes only return.
+    /// Zeros in every lane, the result of models that have delta lobes only.
     pub const ZERO: Self = Self { f: Vec3x8::ZERO, pdf: F32x8::ZERO };
 
     /// `self` where `mask`, else 0.
@@ -90,7 +92,7 @@ impl Sample8 {
     }
 }
 
-/// What a model reads per lane.
+/// Inputs of a model per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs8 {
     /// Material index.
@@ -102,8 +104,14 @@ pub struct Inputs8 {
 /// One scattering model over eight lanes, `'s` the scene whose tables it may keep a reference to. Two-sidedness is the
 /// caller's: for two-sided materials the frame already faces `wo`.
 pub trait Bsdf<'s>: Copy + 's {
-    /// Only delta lobes: no light sampling.
-    const DELTA: bool;
+    /// Lobes of the model.
+    const LOBES: Lobes;
+
+    /// Direction that keys the learned statistics.
+    const CACHE_DIRECTION: CacheDirection;
+
+    /// Whether the model has delta lobes only: no light sampling.
+    const DELTA: bool = Self::LOBES.delta_only();
 
     /// Gathers the parameters of the lanes in `active`; other lanes may hold any material index.
     fn gather(scene: &Scene<'s>, inputs: &Inputs8, active: Mask8) -> Self;
@@ -116,11 +124,14 @@ pub trait Bsdf<'s>: Copy + 's {
 
     /// Directional-hemispherical reflectance + transmittance to use in roulette by albedo; an estimate in [0, 1].
     fn albedo(&self, wo: Vec3x8) -> Vec3x8;
+
+    /// Phong exponent of a material of this model, for roulette by shininess: 0 (diffuse) to [`MIRROR_SHININESS`].
+    fn shininess(material: &Material) -> f32;
 }
 
 /// Code to run with the model of a material kind; see [`dispatch`].
 pub trait Visitor<'s> {
-    /// What it returns.
+    /// Result of the visit.
     type Out;
 
     /// Called with the model.
@@ -129,10 +140,21 @@ pub trait Visitor<'s> {
 
 macro_rules! models {
     ($($kind:ident => $model:ty),* $(,)?) => {
-        /// Bits of the kinds that have nothing but delta lobes ([`Bsdf::DELTA`]).
+        /// Facts of the model of `kind`, known without running it.
         #[expect(clippy::extra_unused_lifetimes, reason = "a model names it")]
-        pub(crate) const fn delta_kinds<'s>() -> u32 {
-            0 $(| (<$model as Bsdf<'s>>::DELTA as u32) << MaterialKind::$kind as u32)*
+        pub const fn facts<'s>(kind: MaterialKind) -> ModelFacts {
+            match kind {
+                $(MaterialKind::$kind => ModelFacts {
+                    lobes: <$model as Bsdf<'s>>::LOBES,
+                    cache_direction: <$model as Bsdf<'s>>::CACHE_DIRECTION,
+                }),*
+            }
+        }
+
+        /// [`Bsdf::shininess`] of the model of `kind`.
+        #[expect(clippy::extra_unused_lifetimes, reason = "a model names it")]
+        pub fn shininess<'s>(kind: MaterialKind, material: &Material) -> f32 {
+            match kind { $(MaterialKind::$kind => <$model as Bsdf<'s>>::shininess(material)),* }
         }
 
         /// Calls `v` with the model of `kind`: the one table of the models.
@@ -167,7 +189,65 @@ models! {
     Null => Null,
 }
 
-/// What lanes without a material read: parameters with which every model stays finite.
+/// A set of material kinds, a bit each, from a table of one entry per kind.
+macro_rules! kinds_where {
+    (|$kind:ident| $holds:expr) => {{
+        let (mut bits, mut i) = (0, 0);
+        while i < MaterialKind::ALL.len() {
+            let $kind = MaterialKind::ALL[i];
+            bits |= ($holds as u32) << $kind as u32;
+            i += 1;
+        }
+        bits
+    }};
+}
+
+/// Bits of the kinds that have nothing but delta lobes ([`Bsdf::DELTA`]).
+pub(crate) const fn delta_kinds() -> u32 {
+    const KINDS: u32 = kinds_where!(|kind| facts(kind).lobes.delta_only());
+    KINDS
+}
+
+/// Bits of the kinds that scatter from behind as well.
+pub(crate) const fn transmissive_kinds() -> u32 {
+    const KINDS: u32 = kinds_where!(|kind| facts(kind).lobes.contains(Lobes::TRANSMISSION));
+    KINDS
+}
+
+/// Bits of the kinds whose learned statistics are keyed by the shading normal.
+pub(crate) const fn kinds_keyed_by_normal() -> u32 {
+    const KINDS: u32 = kinds_where!(|kind| matches!(facts(kind).cache_direction, CacheDirection::Normal));
+    KINDS
+}
+
+/// Bits of the kinds whose learned statistics are keyed by the viewing direction.
+pub(crate) const fn kinds_keyed_by_view() -> u32 {
+    const KINDS: u32 = kinds_where!(|kind| matches!(facts(kind).cache_direction, CacheDirection::View));
+    KINDS
+}
+
+/// Lanes whose `kind` is in the set `kinds`: a comparison for each kind of a constant set.
+#[inline(always)]
+pub(crate) fn lanes_of(kinds: u32, kind: &[u32; 8]) -> Mask8 {
+    let kind = U32x8::new(*kind);
+    let mut lanes = Mask8::NONE;
+    for k in MaterialKind::ALL {
+        if kinds >> *k as u32 & 1 == 1 {
+            lanes |= kind.eq(U32x8::splat(*k as u32));
+        }
+    }
+    lanes
+}
+
+// The two tables say the same of what both know.
+const _: () = {
+    let transmissive = kinds_where!(|kind| kind.facts().transmissive);
+    let delta = kinds_where!(|kind| kind.facts().delta);
+    assert!(transmissive == transmissive_kinds(), "`transmissive` of a row against `Lobes::TRANSMISSION`");
+    assert!(delta == delta_kinds(), "`delta` of a row against `Lobes::DIFFUSE` and `Lobes::GLOSSY`");
+};
+
+/// Material of lanes without one: parameters with which every model stays finite.
 const IDLE: &Material = &Material {
     kind: 0,
     flags: 0,
@@ -179,8 +259,6 @@ const IDLE: &Material = &Material {
     fdr: 0.5,
     k: [0.0; 3],
     reserved: 0.0,
-    emission: [0.0; 3],
-    reserved2: 0.0,
 };
 
 /// The materials of eight lanes.

@@ -1,7 +1,8 @@
 //! Index-matched boundary: light passes unchanged. No parameters.
 
-use super::{Bsdf, Eval8, Inputs8, Sample8};
+use super::{Bsdf, CacheDirection, Eval8, Inputs8, Lobes, Sample8, lobes};
 use crate::scene::Scene;
+use crate::scene::blob::Material;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
 /// Index-matched boundary.
@@ -9,7 +10,8 @@ use croupier_simd::{F32x8, Mask8, Vec3x8};
 pub struct Null;
 
 impl Bsdf<'_> for Null {
-    const DELTA: bool = true;
+    const LOBES: Lobes = Lobes::TRANSMISSION.with(Lobes::SPECULAR);
+    const CACHE_DIRECTION: CacheDirection = CacheDirection::View;
 
     #[inline(always)]
     fn gather(_: &Scene<'_>, _: &Inputs8, _: Mask8) -> Self {
@@ -30,5 +32,9 @@ impl Bsdf<'_> for Null {
     #[inline(always)]
     fn albedo(&self, _: Vec3x8) -> Vec3x8 {
         Vec3x8::ONE
+    }
+
+    fn shininess(_: &Material) -> f32 {
+        lobes::MIRROR_SHININESS
     }
 }

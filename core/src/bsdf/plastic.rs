@@ -3,17 +3,18 @@
 //!
 //! | parameter | meaning | range |
 //! |---|---|---|
-//! | `reflectance` | rho per channel, may be textured | [0, 1] |
-//! | `eta[0]` | int_ior / ext_ior | > 0 |
-//! | `fdr` | Fdr, reflectance of the coat from inside for diffuse light | [0, 1) |
+//! | `reflectance` | rho per channel, may be textured | `REFLECTANCE_RANGE` |
+//! | `eta[0]` | int_ior / ext_ior | `ETA_RANGE` |
+//! | `fdr` | Fdr, reflectance of the coat from inside for diffuse light | `FDR_RANGE` |
 //!
 //! With r = rho / (1 - rho Fdr), the base reflects `(1 - F(wo)) r (1 - Fdr)`, because reciprocity makes the mean of 1 -
 //! F from outside eta^2 (1 - Fdr). Let d be the mean of that over the channels: the coat is chosen with probability F /
 //! (F + d), and the albedo is known exactly.
 
 use super::fresnel::{self, Index8};
-use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, mirrored, warp};
+use super::{Bsdf, CacheDirection, Eval8, Inputs8, Lobes, Materials8, Sample8, mirrored, warp};
 use crate::scene::Scene;
+use crate::scene::blob::Material;
 use core::f32::consts::FRAC_1_PI;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
@@ -37,7 +38,7 @@ pub(super) struct Base8 {
 
 impl Base8 {
     #[inline(always)]
-    pub fn gather(m: &Materials8<'_>, inputs: &Inputs8, active: Mask8) -> Self {
+    pub(super) fn gather(m: &Materials8<'_>, inputs: &Inputs8, active: Mask8) -> Self {
         let fdr = m.get(|m| m.fdr);
         let rho = inputs.reflectance.zero_unless(active);
         // the floor only keeps unphysical parameters finite
@@ -47,7 +48,7 @@ impl Base8 {
 
     /// Albedo of light that a fraction `entered` of came through the coat.
     #[inline(always)]
-    pub fn albedo(&self, entered: F32x8) -> Vec3x8 {
+    pub(super) fn albedo(&self, entered: F32x8) -> Vec3x8 {
         self.r * (entered * self.escape)
     }
 }
@@ -60,7 +61,8 @@ impl Plastic {
 }
 
 impl Bsdf<'_> for Plastic {
-    const DELTA: bool = false;
+    const LOBES: Lobes = Lobes::REFLECTION.with(Lobes::DIFFUSE).with(Lobes::SPECULAR);
+    const CACHE_DIRECTION: CacheDirection = CacheDirection::Mirror;
 
     #[inline(always)]
     fn gather(scene: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
@@ -102,5 +104,9 @@ impl Bsdf<'_> for Plastic {
         let fo = self.fresnel(wo.z);
         let a = self.base.albedo(1.0 - fo) + Vec3x8::grey(fo);
         a.map(|c| c.clamp(0.0, 1.0)).zero_unless(wo.z.gt(F32x8::ZERO))
+    }
+
+    fn shininess(_: &Material) -> f32 {
+        0.0
     }
 }

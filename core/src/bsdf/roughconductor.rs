@@ -3,14 +3,15 @@
 //!
 //! | parameter | meaning | range |
 //! |---|---|---|
-//! | `eta` | real refractive index per channel | (0, 1e6] |
-//! | `k` | extinction per channel | [0, 1e6] |
-//! | `reflectance` | scale per channel, may be textured | [0, 1] |
-//! | `alpha` | GGX width, clamped to [1e-4, 10] | (0, 1] |
+//! | `eta` | real refractive index per channel | `CONDUCTOR_RANGE`, eta or k from `MIN_CONDUCTOR` |
+//! | `k` | extinction per channel | `CONDUCTOR_RANGE` |
+//! | `reflectance` | scale per channel, may be textured | `REFLECTANCE_RANGE` |
+//! | `alpha` | GGX width | `ALPHA_RANGE` |
 
 use super::ggx::{Ggx8, mirrored_at};
-use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, fresnel};
+use super::{Bsdf, CacheDirection, Eval8, Inputs8, Lobes, Materials8, Sample8, fresnel, lobes};
 use crate::scene::Scene;
+use crate::scene::blob::Material;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
 /// GGX conductor.
@@ -30,7 +31,8 @@ impl RoughConductor {
 }
 
 impl Bsdf<'_> for RoughConductor {
-    const DELTA: bool = false;
+    const LOBES: Lobes = Lobes::REFLECTION.with(Lobes::GLOSSY);
+    const CACHE_DIRECTION: CacheDirection = CacheDirection::Mirror;
 
     #[inline(always)]
     fn gather(scene: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
@@ -58,9 +60,13 @@ impl Bsdf<'_> for RoughConductor {
         Sample8 { wi, weight: self.fresnel(r.cos) * r.g1, pdf: r.pdf, delta: Mask8::NONE, valid: r.valid }.masked()
     }
 
-    /// That of the smooth conductor: an upper estimate for most angles.
+    /// Albedo of the smooth conductor: an upper estimate for most angles.
     #[inline(always)]
     fn albedo(&self, wo: Vec3x8) -> Vec3x8 {
         self.fresnel(wo.z).zero_unless(wo.z.gt(F32x8::ZERO))
+    }
+
+    fn shininess(material: &Material) -> f32 {
+        lobes::phong_exponent(material.alpha)
     }
 }

@@ -3,8 +3,8 @@
 //!
 //! | parameter | meaning | range |
 //! |---|---|---|
-//! | `eta[0]` | int_ior / ext_ior; +z is the exterior | > 0 |
-//! | `alpha` | GGX width, clamped to [1e-4, 10] | (0, 1] |
+//! | `eta[0]` | int_ior / ext_ior; +z is the exterior | `ETA_RANGE` |
+//! | `alpha` | GGX width | `ALPHA_RANGE` |
 //!
 //! A microfacet m visible from `wo` is sampled, then reflection with probability F(wo.m). Everything is computed on the
 //! side of `wo` (z negated below), with eta = index behind / index before, k = eta^2 - 1, c = wo.m and e = eta cos_t.
@@ -20,8 +20,9 @@
 
 use super::fresnel::{self, Index8};
 use super::ggx::{Ggx8, MIN_COS, mirrored_at};
-use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, flip};
+use super::{Bsdf, CacheDirection, Eval8, Inputs8, Lobes, Materials8, Sample8, flip, lobes};
 use crate::scene::Scene;
+use crate::scene::blob::Material;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
 /// |eta - 1| below which transmission is a delta lobe.
@@ -49,7 +50,8 @@ impl RoughDielectric {
 }
 
 impl Bsdf<'_> for RoughDielectric {
-    const DELTA: bool = false;
+    const LOBES: Lobes = Lobes::REFLECTION.with(Lobes::TRANSMISSION).with(Lobes::GLOSSY).with(Lobes::SPECULAR);
+    const CACHE_DIRECTION: CacheDirection = CacheDirection::View;
 
     #[inline(always)]
     fn gather(scene: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
@@ -122,5 +124,9 @@ impl Bsdf<'_> for RoughDielectric {
     #[inline(always)]
     fn albedo(&self, _: Vec3x8) -> Vec3x8 {
         Vec3x8::ONE
+    }
+
+    fn shininess(material: &Material) -> f32 {
+        lobes::phong_exponent(material.alpha)
     }
 }

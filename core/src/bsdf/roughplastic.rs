@@ -3,29 +3,27 @@
 //!
 //! | parameter | meaning | range |
 //! |---|---|---|
-//! | `reflectance` | rho per channel, may be textured | [0, 1] |
-//! | `eta[0]` | int_ior / ext_ior | > 0 |
-//! | `alpha` | GGX width, clamped to [1e-4, 10] | (0, 1] |
-//! | `fdr` | R, reflectance of the coat from inside for diffuse light | [0, 1) |
-//! | `table` | T, energy the coat transmits from outside, at 64 equally spaced cosines, both ends included | [0, 1] |
+//! | `reflectance` | rho per channel, may be textured | `REFLECTANCE_RANGE` |
+//! | `eta[0]` | int_ior / ext_ior | `ETA_RANGE` |
+//! | `alpha` | GGX width | `ALPHA_RANGE` |
+//! | `fdr` | R, reflectance of the coat from inside for diffuse light | `FDR_RANGE` |
+//! | `table` | T, energy the coat transmits from outside, `TRANSMITTANCE_ENTRIES` numbers | `REFLECTANCE_RANGE` |
 //!
 //! T is interpolated linearly. Samples come from the coat's visible normals with probability s / (s + d) and from the
-//! cosine with d / (s + d): s = 1 - T(wo), not below 2^-10 lest an odd table starve a narrow highlight, and d the mean
-//! over the channels of `T(wo) (1 - R) rho / (1 - rho R)`. Value and density are those of the mixture.
+//! cosine with d / (s + d): s = 1 - T(wo), not below 2^-10 so that no odd table starves a narrow highlight, and d the
+//! mean over the channels of `T(wo) (1 - R) rho / (1 - rho R)`. Value and density are those of the mixture.
 
 use super::fresnel::{self, Index8};
 use super::ggx::{Ggx8, Reflection8, mirrored_at};
 use super::plastic::Base8;
-use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, warp};
+use super::{Bsdf, CacheDirection, Eval8, Inputs8, Lobes, Materials8, Sample8, warp};
 use crate::scene::Scene;
+use crate::scene::blob::{Material, TRANSMITTANCE_ENTRIES};
 use core::f32::consts::FRAC_1_PI;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
-/// Entries of a transmittance table.
-pub const TABLE_SIZE: usize = 64;
-
-/// What lanes without a table read.
-const IDLE_TABLE: &[f32; TABLE_SIZE] = &[0.5; TABLE_SIZE];
+/// Table of lanes without one.
+const IDLE_TABLE: &[f32; TRANSMITTANCE_ENTRIES] = &[0.5; TRANSMITTANCE_ENTRIES];
 
 /// GGX coat over a diffuse base.
 #[derive(Clone, Copy, Debug)]
@@ -33,14 +31,14 @@ pub struct RoughPlastic<'s> {
     index: Index8,
     base: Base8,
     ggx: Ggx8,
-    table: [&'s [f32; TABLE_SIZE]; 8],
+    table: [&'s [f32; TRANSMITTANCE_ENTRIES]; 8],
 }
 
 impl RoughPlastic<'_> {
     /// T at `mu`.
     #[inline(always)]
     fn transmittance(&self, mu: F32x8) -> F32x8 {
-        let last = TABLE_SIZE - 1;
+        let last = TRANSMITTANCE_ENTRIES - 1;
         let x = mu.clamp(0.0, 1.0) * last as f32;
         let cell = x.floor().min(F32x8::splat((last - 1) as f32));
         let i = cell.to_i32().to_array();
@@ -70,7 +68,8 @@ impl RoughPlastic<'_> {
 }
 
 impl<'s> Bsdf<'s> for RoughPlastic<'s> {
-    const DELTA: bool = false;
+    const LOBES: Lobes = Lobes::REFLECTION.with(Lobes::DIFFUSE).with(Lobes::GLOSSY);
+    const CACHE_DIRECTION: CacheDirection = CacheDirection::Mirror;
 
     #[inline(always)]
     fn gather(scene: &Scene<'s>, inputs: &Inputs8, active: Mask8) -> Self {
@@ -113,5 +112,9 @@ impl<'s> Bsdf<'s> for RoughPlastic<'s> {
         let t = self.transmittance(wo.z);
         let a = self.base.albedo(t) + Vec3x8::grey(1.0 - t);
         a.map(|c| c.clamp(0.0, 1.0)).zero_unless(wo.z.gt(F32x8::ZERO))
+    }
+
+    fn shininess(_: &Material) -> f32 {
+        0.0
     }
 }

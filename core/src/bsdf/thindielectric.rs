@@ -3,11 +3,12 @@
 //!
 //! | parameter | meaning | range |
 //! |---|---|---|
-//! | `eta[0]` | int_ior / ext_ior | > 0 |
+//! | `eta[0]` | int_ior / ext_ior | `ETA_RANGE` |
 
 use super::fresnel::{self, Index8};
-use super::{Bsdf, Eval8, Inputs8, Materials8, Sample8, mirrored};
+use super::{Bsdf, CacheDirection, Eval8, Inputs8, Lobes, Materials8, Sample8, lobes, mirrored};
 use crate::scene::Scene;
+use crate::scene::blob::Material;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
 /// Thin dielectric sheet.
@@ -17,7 +18,8 @@ pub struct ThinDielectric {
 }
 
 impl Bsdf<'_> for ThinDielectric {
-    const DELTA: bool = true;
+    const LOBES: Lobes = Lobes::REFLECTION.with(Lobes::TRANSMISSION).with(Lobes::SPECULAR);
+    const CACHE_DIRECTION: CacheDirection = CacheDirection::View;
 
     #[inline(always)]
     fn gather(scene: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
@@ -41,5 +43,9 @@ impl Bsdf<'_> for ThinDielectric {
     #[inline(always)]
     fn albedo(&self, _: Vec3x8) -> Vec3x8 {
         Vec3x8::ONE
+    }
+
+    fn shininess(_: &Material) -> f32 {
+        lobes::MIRROR_SHININESS
     }
 }

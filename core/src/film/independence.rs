@@ -22,7 +22,7 @@ pub(super) struct Differences {
 
 impl Differences {
     /// Adds a pixel: its samples so far, and those of the iteration, each with weight `w`.
-    pub fn add(&mut self, p: &PixelStats, o: &PixelSums, w: f64) {
+    pub(super) fn add(&mut self, p: &PixelStats, o: &PixelSums, w: f64) {
         if p.samples < 2 || o.samples < 2 {
             return;
         }
@@ -55,10 +55,10 @@ pub(super) struct Independence {
 
 impl Independence {
     /// Ratio before two iterations: samples are assumed to be independent.
-    pub const UNKNOWN: Self = Self { ratio: 1.0, noise: 0.0 };
+    pub(super) const UNKNOWN: Self = Self { ratio: 1.0, noise: 0.0 };
 
     /// Ratio after an iteration: the picture before had variance r S, and the iteration has the rest of what was found.
-    pub fn after(self, d: &Differences) -> Self {
+    pub(super) fn after(self, d: &Differences) -> Self {
         let [s, t] = d.stated;
         if s + t <= 0.0 {
             return self;

@@ -17,6 +17,7 @@ pub(crate) struct Trimmed {
 
 /// Sums of the non-negative values that `visit` shows, without the `k` largest in `f32`. Of equal values at the limit,
 /// as many are left out as make `k`.
+#[inline(always)]
 pub(crate) fn trimmed(k: usize, mut visit: impl FnMut(&mut dyn FnMut(f64))) -> Trimmed {
     let mut t = Trimmed { limit: f32::INFINITY, ..Trimmed::default() };
     let mut out = k;
@@ -41,6 +42,7 @@ pub(crate) fn trimmed(k: usize, mut visit: impl FnMut(&mut dyn FnMut(f64))) -> T
 
 /// Finds the `k`-th largest (k >= 1) of the non-negative values that `visit` shows, by radix selection on the float's
 /// bits: four visits, no memory. 0 if there are fewer.
+#[inline(always)]
 fn kth_largest(k: usize, mut visit: impl FnMut(&mut dyn FnMut(f32))) -> f32 {
     let (mut prefix, mut left) = (0u32, k);
     for shift in [24u32, 16, 8, 0] {

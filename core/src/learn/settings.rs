@@ -6,7 +6,7 @@ use crate::setting::{SettingRange, SettingValue, Unreadable, Value, named_values
 use core::fmt;
 use croupier_simd::Vec3x8;
 
-/// Error of the picture that learning makes small.
+/// Error of the picture that learning minimises.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Objective {
@@ -31,11 +31,11 @@ impl fmt::Display for Objective {
     }
 }
 
-/// How the estimate of the pixels is made.
+/// Method of the pixel estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PixelEstimator {
-    /// By the built-in denoiser, which looks at albedo and normals if [`crate::Settings::aovs`] has them gathered;
-    /// takes about 140 bytes a pixel, scratch included.
+    /// Built-in denoiser, which uses albedo and normals if [`crate::Settings::aovs`] is on; takes about 140 bytes per
+    /// pixel, scratch included.
     #[default]
     Denoised,
     /// Means over squares of 8x8 pixels: 12 bytes for 64 pixels.
@@ -46,28 +46,28 @@ names!(PixelEstimator: Denoised = "denoised", Blocks = "blocks");
 
 named_values!(Objective, PixelEstimator);
 
-/// The known value that stands in for what roulette skips (Szecsi et al. 2003).
+/// Control variate of roulette: the radiance assumed for skipped samples (Szécsi et al. 2003).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum ControlVariate {
-    /// 0: plain roulette.
+    /// Radiance 0: plain roulette.
     #[default]
     Off,
-    /// The cached mean of reflected radiance, shrunk towards 0 where few samples stand behind it. Needs a strategy that
+    /// Cached mean of reflected radiance, reduced towards 0 where it comes from few samples. Needs a strategy that
     /// learns from the scene.
     Cached,
-    /// This radiance in all channels.
+    /// Radiance of this value in all channels.
     Number(f32),
 }
 
-/// Samples at which the cached mean counts half.
-const CONSTANT_TRUST: f32 = 64.0;
+/// Samples at which the cached mean has weight 1/2.
+const MEAN_TRUST: f32 = 64.0;
 
 impl ControlVariate {
     /// The value per lane; `None` if it is 0 everywhere.
     pub(crate) fn of(self, learned: &Learned8) -> Option<Vec3x8> {
         match self {
             Self::Off => None,
-            Self::Cached => Some(learned.local.mean * learned.local.trust(CONSTANT_TRUST)),
+            Self::Cached => Some(learned.local.mean * learned.local.trust(MEAN_TRUST)),
             Self::Number(x) => Some(Vec3x8::splat(x, x, x)),
         }
     }
@@ -111,17 +111,17 @@ settings! {
             "subdivide-count", "Samples in a leaf of the octree at which it is subdivided",
             SettingRange::Positive;
         decay: f32 = 0.75 =>
-            "decay", "Part of the statistics that an iteration hands on to the next",
+            "decay", "Weight that the statistics keep from one iteration to the next",
             SettingRange::Numbers { min: 0.0, max: 1.0 };
-        estimate: PixelEstimator = PixelEstimator::Denoised =>
-            "estimate",
-            "What errors are judged by: the denoised picture (140 bytes a pixel) or means over 8x8 pixels (12 bytes for each)";
+        pixel_estimator: PixelEstimator = PixelEstimator::Denoised =>
+            "pixel-estimator",
+            "Pixel estimate for relative errors: the denoised picture (140 bytes a pixel) or means of 8x8 pixels (12 bytes)";
         objective: Objective = Objective::Relative =>
-            "objective", "Error of the picture that is to be small: relative to the pixel, or absolute";
+            "objective", "Error of the picture to minimise: relative to the pixel (relMSE), or absolute (MSE)";
         norm: Norm = Norm::Mean =>
-            "norm", "How the errors of the channels become one";
+            "norm", "Norm of the errors of the three channels";
         factors: [f32; 2] = [MIN_FACTOR, MAX_FACTOR] =>
-            "factors", "Smallest and largest learned factor",
+            "factors", "Smallest and largest factor of roulette and splitting that is learned",
             SettingRange::Pair { first: [MIN_FACTOR, 1.0], second: [1.0, MAX_FACTOR] };
     }
 }

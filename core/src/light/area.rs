@@ -9,10 +9,11 @@
 //! Points are uniform on the triangle; seen from distance r under the angle cos at the light their solid-angle density
 //! is r^2 / (A cos).
 
-use super::{Chosen, LightSample8, LightSelector, usable};
+use super::{Chosen, LightModel, LightSample8, LightSelector, SceneExtent, luminance, usable};
 use crate::geometry::{self, OFFSET_BOUND, SurfaceHit8};
 use crate::scene::Scene;
 use crate::scene::blob::Light;
+use core::f64::consts::PI;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Smallest cosine at the light. Below it the cosine is mostly rounding; the sampler and the density give up alike, so
@@ -66,27 +67,39 @@ fn barycentric(u: [F32x8; 2]) -> [F32x8; 2] {
     [upper.select(half, u[0] - half), upper.select(u[1] - half, half)]
 }
 
-#[inline(always)]
-pub(super) fn sample(scene: &Scene<'_>, light: &Chosen, p: Vec3x8, u: [F32x8; 2], mask: Mask8) -> LightSample8 {
-    let corners = Corners::gather(scene, light.record.map(|l| l.triangle), mask);
-    let [b, c] = barycentric(u);
-    let a = F32x8::ONE - b - c;
-    let point = corners.a * a + corners.b * b + corners.c * c;
-    let normal = corners.normal();
-    let d = point - p;
-    let r = d.length();
-    let wi = d / r;
-    let pdf = density(r, -normal.dot(wi), F32x8::from_fn(|i| light.record[i].area));
-    let bound = |v: Vec3x8| v.abs().dot(normal.abs());
-    LightSample8 {
-        wi,
-        point,
-        normal,
-        point_error: (bound(corners.a) * a + bound(corners.b) * b + bound(corners.c) * c) * OFFSET_BOUND,
-        radiance: light.emission,
-        pdf,
-        valid: pdf.gt(F32x8::ZERO),
-        ..LightSample8::NONE
+/// Emitting triangle.
+pub(super) struct Area;
+
+impl LightModel for Area {
+    const DELTA: bool = false;
+
+    #[inline(always)]
+    fn sample(scene: &Scene<'_>, light: &Chosen<'_>, p: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8 {
+        let corners = Corners::gather(scene, light.record.map(|l| l.triangle), mask);
+        let [b, c] = barycentric([words[0], words[1]].map(U32x8::to_unit));
+        let a = F32x8::ONE - b - c;
+        let point = corners.a * a + corners.b * b + corners.c * c;
+        let normal = corners.normal();
+        let d = point - p;
+        let r = d.length();
+        let wi = d / r;
+        let pdf = density(r, -normal.dot(wi), F32x8::from_fn(|i| light.record[i].area));
+        let bound = |v: Vec3x8| v.abs().dot(normal.abs());
+        LightSample8 {
+            wi,
+            point,
+            normal,
+            point_error: (bound(corners.a) * a + bound(corners.b) * b + bound(corners.c) * c) * OFFSET_BOUND,
+            radiance: light.emission,
+            pdf,
+            valid: pdf.gt(F32x8::ZERO),
+            ..LightSample8::NONE
+        }
+    }
+
+    /// Power of a Lambertian emitter.
+    fn power(light: &Light, _: &SceneExtent) -> f64 {
+        PI * f64::from(light.area) * luminance(light.emission)
     }
 }
 

@@ -1,12 +1,13 @@
-//! Emission and its sampling.
+//! Emission and its sampling. One kind per file, which implements `LightModel`; `models!` is the table of them, its
+//! other half the table of `scene/blob/lights.rs`.
 //!
-//! | kind | file | technique | density |
-//! |---|---|---|---|
-//! | area | `area.rs` | uniform on the triangle | r^2 / (A cos) |
-//! | environment map | `environment.rs` | alias tables over cells, bilinear luminance inside | exact |
-//! | constant environment | `environment.rs` | uniform sphere | 1 / (4 pi) |
-//! | point | `point.rs` | the point | delta |
-//! | directional | `directional.rs` | the direction | delta |
+//! | kind | file | technique | density | power |
+//! |---|---|---|---|---|
+//! | area | `area.rs` | uniform on the triangle | r^2 / (A cos) | pi A L |
+//! | environment map | `environment.rs` | alias tables over cells, bilinear luminance inside | exact | pi R^2 x integral |
+//! | constant environment | `environment.rs` | uniform sphere | 1 / (4 pi) | pi R^2 x integral |
+//! | point | `point.rs` | the point | delta | 4 pi I |
+//! | directional | `directional.rs` | the direction | delta | pi R^2 E |
 //!
 //! A light is chosen by a [`LightSelector`] (power-weighted: `power.rs`); every density stated here contains the
 //! selection probability. What [`sample`] states for a direction is what [`area_pdf`] and [`environment_pdf`] give for
@@ -24,9 +25,9 @@ mod power;
 pub use area::{area_pdf, area_radiance};
 pub use environment::{environment_pdf, environment_radiance};
 pub use mis::power_heuristic;
-pub use power::PowerSelector;
+pub use power::{PowerSelector, SceneExtent, luminance};
 
-use crate::scene::blob::{Light, LightKind};
+use crate::scene::blob::{Light, LightKind, NONE};
 use crate::scene::{Effects, Scene};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
@@ -86,16 +87,17 @@ impl LightSample8 {
     }
 }
 
-/// How a light is chosen for a reference point. [`PowerSelector`] is built in; hosts may bring their own, such as a
+/// Choice of a light for a reference point. [`PowerSelector`] is built in; hosts may bring their own, such as a
 /// light tree.
 ///
 /// Pictures are right if both functions tell the same probabilities and every light that could be seen from a point has
 /// one above 0: point and directional lights are found in no other way. How good the choice is shows in the noise only.
 ///
 /// ```
-/// use croupier::light::LightSelector;
-/// use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
-/// use croupier::{Plan, Scene, Session, SessionError, accel::WideBvh, profile::Full};
+/// use croupier::unstable::light::LightSelector;
+/// use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
+/// use croupier::{Plan, Scene, Session, SessionError};
+/// use croupier::unstable::{accel::WideBvh, profile::Full};
 ///
 /// /// All lights alike.
 /// struct Uniform(u32);
@@ -130,22 +132,31 @@ pub trait LightSelector {
     fn probability(&self, point: Vec3x8, normal: Vec3x8, light: U32x8, mask: Mask8) -> F32x8;
 }
 
-/// The chosen lights of eight lanes; lanes outside `mask` hold a black light of no kind.
-struct Chosen {
-    record: [Light; 8],
+/// Light of lanes without one: black, of no kind.
+const IDLE: &Light = &Light {
+    kind: NONE,
+    triangle: NONE,
+    area: 0.0,
+    reserved: 0,
+    vector: [0.0; 3],
+    emission: [0.0; 3],
+    params: [0.0; 6],
+};
+
+/// The chosen lights of eight lanes; lanes outside the mask they were gathered with hold [`IDLE`].
+struct Chosen<'s> {
+    record: [&'s Light; 8],
     emission: Vec3x8,
     vector: Vec3x8,
 }
 
-impl Chosen {
+impl<'s> Chosen<'s> {
     #[inline(always)]
-    fn gather(scene: &Scene<'_>, light: U32x8, mask: Mask8) -> Self {
+    fn gather(scene: &Scene<'s>, light: U32x8, mask: Mask8) -> Self {
         let index = light.to_array();
-        let mut record: [Light; 8] = bytemuck::Zeroable::zeroed();
+        let mut record = [IDLE; 8];
         for i in mask.lanes() {
-            if let Some(l) = scene.lights.get(index[i] as usize) {
-                record[i] = *l;
-            }
+            record[i] = scene.lights.get(index[i] as usize).unwrap_or(IDLE);
         }
         Self {
             emission: Vec3x8::from_fn(|i| record[i].emission),
@@ -161,11 +172,79 @@ impl Chosen {
     }
 }
 
+/// Contract of a light kind: what its file provides.
+trait LightModel {
+    /// Whether no scattered ray can find the light.
+    const DELTA: bool;
+
+    /// A direction to the light in the lanes of `mask`, seen from `p`, from three random words; the result's `pdf`
+    /// is without the selection probability, other lanes may hold anything.
+    fn sample(scene: &Scene<'_>, light: &Chosen<'_>, p: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8;
+
+    /// Emitted power in luminance units: the weight of its selection.
+    fn power(light: &Light, scene: &SceneExtent) -> f64;
+}
+
+macro_rules! models {
+    ($($kind:ident => $model:ty),* $(,)?) => {
+        /// Samples in the lanes of `mask`, without the selection probability. Kinds that need an effect outside the
+        /// constant `profile` are not compiled in.
+        #[inline(always)]
+        fn sample_chosen(
+            profile: Effects,
+            scene: &Scene<'_>,
+            light: &Chosen<'_>,
+            p: Vec3x8,
+            words: [U32x8; 3],
+            mask: Mask8,
+        ) -> LightSample8 {
+            let mut out = LightSample8::NONE;
+            $(if profile.intersects(Effects::of_light(LightKind::$kind)) {
+                let mask = light.of_kind(LightKind::$kind, mask);
+                if mask.any() {
+                    out.merge(mask, &<$model>::sample(scene, light, p, words, mask));
+                }
+            })*
+            out
+        }
+
+        /// Power of one light in luminance units, the weight with which it is selected; 0 for a kind that does not
+        /// exist. The formulas are in the table of this module.
+        pub fn power(light: &Light, scene: &SceneExtent) -> f64 {
+            match LightKind::from_u32(light.kind) {
+                $(Some(LightKind::$kind) => <$model>::power(light, scene),)*
+                None => 0.0,
+            }
+        }
+
+        const fn is_delta(kind: LightKind) -> bool {
+            match kind { $(LightKind::$kind => <$model>::DELTA),* }
+        }
+    };
+}
+
+models! {
+    Area => area::Area,
+    Environment => environment::Surroundings,
+    Point => point::Point,
+    Directional => directional::Directional,
+}
+
+// The two tables say the same of what both know.
+const _: () = {
+    let mut i = 0;
+    while i < LightKind::ALL.len() {
+        let kind = LightKind::ALL[i];
+        assert!(Effects::of_light(kind).intersects(Effects::DELTA_LIGHTS) == is_delta(kind), "`DELTA` against effects");
+        i += 1;
+    }
+};
+
 /// Chooses a light and a direction to it for every active lane.
 ///
 /// `p` are the reference points, `n` their unit normals (a hint for the selector only; nothing below the horizon is
 /// dropped, since surfaces may transmit). `words` are four independent 32-bit random numbers: the first chooses the
-/// light, the others the place on it. Lanes that come out not `valid` scatter no direct light in this sample: black,
+/// light, the others the position on it. Lanes that come out not `valid` scatter no direct light in this sample: black,
 /// edge-on, behind the light, touching it, or at a distance whose square overflows.
 #[inline(always)]
 pub fn sample<S: LightSelector>(
@@ -194,29 +273,7 @@ pub fn sample_of<S: LightSelector>(
     let (light, probability) = selector.select(p, n, words[0]);
     let chosen = Chosen::gather(scene, light, active);
     let possible = active & probability.gt(F32x8::ZERO);
-    let mut out = LightSample8::NONE;
-    if profile.contains(Effects::AREA_LIGHTS) {
-        let mask = chosen.of_kind(LightKind::Area, possible);
-        if mask.any() {
-            out.merge(mask, &area::sample(scene, &chosen, p, [words[1], words[2]].map(U32x8::to_unit), mask));
-        }
-    }
-    if profile.intersects(Effects::ENVIRONMENT.with(Effects::CONSTANT)) {
-        let mask = chosen.of_kind(LightKind::Environment, possible);
-        if mask.any() {
-            out.merge(mask, &environment::sample(scene, [words[1], words[2], words[3]], mask));
-        }
-    }
-    if profile.contains(Effects::DELTA_LIGHTS) {
-        let mask = chosen.of_kind(LightKind::Point, possible);
-        if mask.any() {
-            out.merge(mask, &point::sample(&chosen, p));
-        }
-        let mask = chosen.of_kind(LightKind::Directional, possible);
-        if mask.any() {
-            out.merge(mask, &directional::sample(&chosen));
-        }
-    }
+    let mut out = sample_chosen(profile, scene, &chosen, p, [words[1], words[2], words[3]], possible);
     out.pdf *= probability;
     out.valid &= usable(out.pdf) & out.wi.is_finite() & out.radiance.is_finite() & out.radiance.any_positive();
     out.pdf = out.valid.zero_unless(out.pdf);

@@ -3,7 +3,22 @@
 use super::LightSelector;
 use crate::scene::Scene;
 use crate::scene::blob::{Alias, NONE};
-use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier_simd::{F32x8, LUMINANCE, Mask8, U32x8, Vec3x8};
+
+/// Rec. 709 luminance of linear RGB; negative channels and NaN count as 0.
+pub fn luminance(rgb: [f32; 3]) -> f64 {
+    let [r, g, b] = rgb.map(|x| f64::from(x.max(0.0)));
+    LUMINANCE[0] * r + LUMINANCE[1] * g + LUMINANCE[2] * b
+}
+
+/// Facts about the scene on which the powers of its lights depend.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneExtent {
+    /// Radius of a sphere around the scene, world units.
+    pub radius: f64,
+    /// Integral of the environment's luminance over all directions, luminance x sr; 0 without an environment.
+    pub environment: f64,
+}
 
 /// Power-weighted selection through the scene's alias table, the same for every reference point.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +40,7 @@ impl LightSelector for PowerSelector<'_> {
 }
 
 /// The items that the random numbers `r` pick from tables of `len` entries that start at `start` of `tables`, a table
-/// per lane; [`NONE`] where there is no such entry. No branch hangs on what is loaded: entries of large tables come
+/// per lane; [`NONE`] where there is no such entry. No branch depends on what is loaded: entries of large tables come
 /// from memory, and eight loads that wait for each other take much longer than eight at a time.
 #[inline(always)]
 pub(super) fn pick(tables: &[Alias], start: U32x8, len: u32, r: U32x8) -> U32x8 {
@@ -47,4 +62,19 @@ pub(super) fn pick(tables: &[Alias], start: U32x8, len: u32, r: U32x8) -> U32x8 
 #[inline(always)]
 pub(super) fn probability(table: &[Alias], item: u32) -> f32 {
     table.get(item as usize).map_or(0.0, |a| a.probability)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Killed by: a weight that one of the two has and the other has not.
+    #[test]
+    fn luminance_has_the_weights_of_the_kernels() {
+        for rgb in [[1.0f32, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
+            let kernel = Vec3x8::splat(rgb[0], rgb[1], rgb[2]).luminance().lane(0);
+            assert_eq!(luminance(rgb) as f32, kernel);
+        }
+        assert_eq!(luminance([-1.0, f32::NAN, 0.0]), 0.0);
+    }
 }

@@ -17,7 +17,7 @@ impl Albedo {
         match options {
             "" => Some(Self { product: false }),
             "product" => Some(Self { product: true }),
-            _ => Option::None,
+            _ => None,
         }
     }
 }

@@ -30,7 +30,7 @@ impl Classic {
         let (start, relative) = match options.split_once(':') {
             Some((start, "relative")) => (start, true),
             Some(_) => return None,
-            Option::None => (options, false),
+            None => (options, false),
         };
         super::number(start, 5).filter(|&s: &u32| s >= 1).map(|start| Self { start, relative })
     }

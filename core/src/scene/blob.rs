@@ -1,4 +1,6 @@
-//! The layout of a scene blob, version 1. Little-endian, position-independent, every record Pod.
+//! The layout of a scene blob, version 2. Little-endian, position-independent, every record Pod.
+//!
+//! Materials and lights, with the tables of their kinds, are in `blob/`.
 //!
 //! A blob is a [`Header`], a table of [`Section`]s, then the sections, each at an offset that is a multiple of
 //! [`ALIGN`]. Indices are `u32`; [`NONE`] is absence. Bytes become a [`super::Scene`] through
@@ -9,7 +11,7 @@ use bytemuck::{Pod, Zeroable};
 /// First bytes of every blob.
 pub const MAGIC: [u8; 8] = *b"CROUPIER";
 /// Version of this layout.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 /// Sections start at multiples of this many bytes; a blob aligned to it traverses fastest (4 is enough).
 pub const ALIGN: usize = 64;
 /// "No such index".
@@ -24,18 +26,8 @@ pub const MAX_TREE_DEPTH: u32 = 34;
 /// Largest magnitude of a coordinate: cross products of two edges then have a squared length that `f32` can hold
 /// (edges up to 2e9, products up to 8e18, squares of three components up to 1.92e38).
 pub const MAX_COORDINATE: f32 = 1e9;
-/// Largest emission (radiance, intensity or irradiance, any channel): its square still fits `f32`.
-pub const MAX_EMISSION: f32 = 1e18;
 /// Most columns or rows of a texture, an environment map or an image: an `f32` position in it keeps 8 bits of fraction.
 pub const MAX_SIDE: u32 = 1 << 16;
-/// GGX widths of rough materials.
-pub const ALPHA_RANGE: [f32; 2] = [1e-4, 1.0];
-/// Relative refractive indices of dielectrics and plastics.
-pub const ETA_RANGE: [f32; 2] = [0.01, 100.0];
-/// Largest refractive index and extinction of a conductor.
-pub const MAX_CONDUCTOR: f32 = 1e4;
-/// Entries of a rough plastic's transmittance table.
-pub const ROUGH_PLASTIC_ENTRIES: u32 = 64;
 
 macro_rules! kinds {
     ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $v:ident = $n:expr, $text:literal;)* }) => {
@@ -44,24 +36,35 @@ macro_rules! kinds {
         #[repr(u32)]
         pub enum $name { $($(#[$vdoc])* $v = $n),* }
         impl $name {
-            /// Every kind, in the order of its numbers.
+            /// Every kind, in the order of the numbers.
             pub const ALL: &'static [Self] = &[$(Self::$v),*];
 
-            /// From the number in the blob.
+            /// Kind of a number in the blob.
             pub const fn from_u32(x: u32) -> Option<Self> {
                 match x { $($n => Some(Self::$v),)* _ => None }
             }
 
-            /// The name in scene files.
+            /// Name in scene files.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$v => $text),* }
+            }
+
+            /// Kind of a name in scene files.
+            pub fn from_name(name: &str) -> Option<Self> {
+                match name { $($text => Some(Self::$v),)* _ => None }
             }
         }
     };
 }
 
+mod lights;
+mod materials;
+
+pub use lights::*;
+pub use materials::*;
+
 kinds! {
-    /// What a section holds.
+    /// Kinds of sections.
     SectionKind {
         /// [`SceneInfo`], exactly one.
         Info = 0, "info";
@@ -83,7 +86,7 @@ kinds! {
         Tables = 8, "tables";
         /// [`Light`]s.
         Lights = 9, "lights";
-        /// [`Alias`] table over the lights, as many entries as lights; empty if no light has a probability above 0.
+        /// [`Alias`] table over the lights, as many entries as lights; may be empty if no light emits.
         LightAlias = 10, "light alias table";
         /// [`Environment`], none or one.
         Environment = 11, "environment";
@@ -99,57 +102,7 @@ kinds! {
     }
 }
 
-kinds! {
-    /// Scattering models.
-    MaterialKind {
-        /// Lambertian.
-        Diffuse = 0, "diffuse";
-        /// Perfect mirror without Fresnel.
-        Mirror = 1, "mirror";
-        /// Smooth conductor.
-        Conductor = 2, "conductor";
-        /// GGX conductor.
-        RoughConductor = 3, "roughconductor";
-        /// Smooth dielectric.
-        Dielectric = 4, "dielectric";
-        /// GGX dielectric.
-        RoughDielectric = 5, "roughdielectric";
-        /// Thin dielectric sheet.
-        ThinDielectric = 6, "thindielectric";
-        /// Smooth coat over a diffuse base.
-        Plastic = 7, "plastic";
-        /// GGX coat over a diffuse base.
-        RoughPlastic = 8, "roughplastic";
-        /// Index-matched boundary.
-        Null = 9, "null";
-    }
-}
-
-kinds! {
-    /// Light kinds.
-    LightKind {
-        /// An emitting triangle (its front side).
-        Area = 0, "area";
-        /// The environment, map or constant.
-        Environment = 1, "environment";
-        /// Isotropic point.
-        Point = 2, "point";
-        /// Parallel light.
-        Directional = 3, "directional";
-    }
-}
-
-kinds! {
-    /// Environment kinds.
-    EnvironmentKind {
-        /// The same radiance from everywhere.
-        Constant = 0, "constant";
-        /// Lat-long map.
-        Map = 1, "envmap";
-    }
-}
-
-/// Start of a blob.
+/// Header of a blob.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Header {
@@ -251,105 +204,6 @@ pub struct Vertex {
     pub uv: [f32; 2],
 }
 
-/// One material; fields a kind does not use are 0. See `bsdf/` for each model's parameters.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
-pub struct Material {
-    /// [`MaterialKind`].
-    pub kind: u32,
-    /// [`MATERIAL_TWO_SIDED`].
-    pub flags: u32,
-    /// Texture index that replaces `reflectance`, or [`NONE`].
-    pub texture: u32,
-    /// First entry of this material's table in the tables section, or [`NONE`].
-    pub table: u32,
-    /// Linear Rec. 709; diffuse albedo or scale of the specular reflection.
-    pub reflectance: [f32; 3],
-    /// GGX width.
-    pub alpha: f32,
-    /// Conductors: real refractive index per channel. Dielectrics and plastics: `eta[0]` = int_ior / ext_ior.
-    pub eta: [f32; 3],
-    /// Plastics: reflectance of the interface from inside for diffuse light (`Fdr`, or `R` of the rough plastic).
-    pub fdr: f32,
-    /// Conductors: extinction per channel.
-    pub k: [f32; 3],
-    /// Zero.
-    pub reserved: f32,
-    /// Radiance emitted from the front side by triangles with a light index.
-    pub emission: [f32; 3],
-    /// Zero.
-    pub reserved2: f32,
-}
-
-/// Both sides behave like the front.
-pub const MATERIAL_TWO_SIDED: u32 = 1;
-
-/// One texture: `width * height` texels from `first` in the texels section; row 0 is the top (v = 1).
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
-pub struct Texture {
-    /// First texel.
-    pub first: u32,
-    /// Columns, >= 1.
-    pub width: u32,
-    /// Rows, >= 1.
-    pub height: u32,
-    /// Zero.
-    pub reserved: u32,
-}
-
-/// One light.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
-pub struct Light {
-    /// [`LightKind`].
-    pub kind: u32,
-    /// Area: the triangle.
-    pub triangle: u32,
-    /// Probability that the alias table picks it, exactly the table's integer width / 2^32.
-    pub probability: f32,
-    /// Area: the triangle's area.
-    pub area: f32,
-    /// Point: position. Directional: unit direction towards the light.
-    pub vector: [f32; 3],
-    /// Area: radiance. Point: intensity. Directional: irradiance on a facing surface.
-    pub emission: [f32; 3],
-    /// Zero.
-    pub reserved: [u32; 2],
-}
-
-/// Entry of an alias table over n items (Vose 1991) with integer thresholds: a 32-bit number r picks slot
-/// `i = (r * n) >> 32` and keeps it if the low word `(r * n) as u32 < threshold`, else takes `alias`. A threshold of
-/// `u32::MAX` means "always keep" and has `alias == i`.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
-pub struct Alias {
-    /// Keep slot i below this.
-    pub threshold: u32,
-    /// The other item.
-    pub alias: u32,
-    /// Probability of item i over all slots.
-    pub probability: f32,
-}
-
-/// The environment.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
-pub struct Environment {
-    /// [`EnvironmentKind`].
-    pub kind: u32,
-    /// Its light index.
-    pub light: u32,
-    /// Map: columns, >= 1.
-    pub width: u32,
-    /// Map: rows, >= 2.
-    pub height: u32,
-    /// Map: rows of the rotation world -> map space.
-    pub to_local: [[f32; 3]; 3],
-    /// Constant: radiance. Map: scale.
-    pub radiance: [f32; 3],
-}
-
 /// Pinhole or thin-lens camera. A pixel sample at (x, y) in [0, width) x [0, height), y down, looks along
 /// `forward + right * ((2 x / width) - 1) + down * ((2 y / height) - 1)`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -359,9 +213,9 @@ pub struct Camera {
     pub origin: [f32; 3],
     /// Unit viewing axis.
     pub forward: [f32; 3],
-    /// From the image centre to its right edge, at distance 1.
+    /// Vector from the image centre to its right edge, at distance 1.
     pub right: [f32; 3],
-    /// From the image centre to its lower edge, at distance 1.
+    /// Vector from the image centre to its lower edge, at distance 1.
     pub down: [f32; 3],
     /// Lens radius; 0 is a pinhole.
     pub lens_radius: f32,

@@ -1,42 +1,38 @@
-//! Which effects a scene calls for.
+//! Effects that a scene calls for. Those of materials, lights and environments follow from their tables in
+//! [`super::blob`].
 
-use super::blob::MaterialKind;
+use super::blob::{EnvironmentKind, LightKind, MaterialKind, environment_table, light_table, material_table};
 
 /// A set of effects, one bit each; bits 0..16 are material kinds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Effects(pub u32);
 
+/// Bits for material kinds.
+const MATERIAL_BITS: usize = 16;
+
+macro_rules! materials {
+    ($($(#[$doc:meta])* $kind:ident = $number:literal, $name:literal, $effect:ident,
+        transmissive: $transmissive:literal, delta: $delta:literal, [$($parameter:ident),*];)*) => {
+        impl Effects {
+            $($(#[$doc])* pub const $effect: Self = Self(1 << $number);)*
+        }
+
+        const MATERIALS: &[(Effects, &str)] = &[$((Effects::$effect, $name)),*];
+    };
+}
+material_table!(materials);
+
 macro_rules! effects {
     ($($(#[$doc:meta])* $name:ident = $bit:expr, $text:literal;)*) => {
         impl Effects {
             $($(#[$doc])* pub const $name: Self = Self(1 << $bit);)*
-            /// Every effect with its name.
-            pub const NAMES: &'static [(Self, &'static str)] = &[$((Self::$name, $text)),*];
         }
+
+        const OTHERS: &[(Effects, &str)] = &[$((Effects::$name, $text)),*];
     };
 }
 
 effects! {
-    /// Diffuse reflection.
-    DIFFUSE = 0, "diffuse";
-    /// Perfect mirror.
-    MIRROR = 1, "mirror";
-    /// Smooth conductor.
-    CONDUCTOR = 2, "conductor";
-    /// GGX conductor.
-    ROUGH_CONDUCTOR = 3, "roughconductor";
-    /// Smooth dielectric interface.
-    DIELECTRIC = 4, "dielectric";
-    /// GGX dielectric interface.
-    ROUGH_DIELECTRIC = 5, "roughdielectric";
-    /// Thin dielectric sheet.
-    THIN_DIELECTRIC = 6, "thindielectric";
-    /// Smooth plastic.
-    PLASTIC = 7, "plastic";
-    /// GGX plastic.
-    ROUGH_PLASTIC = 8, "roughplastic";
-    /// Index-matched boundary.
-    NULL = 9, "null";
     /// Textures.
     TEXTURES = 16, "textures";
     /// Emitting triangles.
@@ -53,18 +49,72 @@ effects! {
     SMOOTH_NORMALS = 22, "shading normals";
 }
 
+macro_rules! lights {
+    ($($(#[$doc:meta])* $kind:ident = $number:literal, $name:literal, [$($effect:ident),*], [$($field:ident),*];)*) => {
+        impl Effects {
+            /// Effects of which a kernel needs at least one to sample lights of a kind.
+            pub const fn of_light(kind: LightKind) -> Self {
+                match kind { $(LightKind::$kind => Self(0)$(.with(Self::$effect))*),* }
+            }
+        }
+    };
+}
+light_table!(lights);
+
+macro_rules! environments {
+    ($($(#[$doc:meta])* $kind:ident = $number:literal, $name:literal, $effect:ident;)*) => {
+        impl Effects {
+            /// The effect of an environment kind.
+            pub const fn of_environment(kind: EnvironmentKind) -> Self {
+                match kind { $(EnvironmentKind::$kind => Self::$effect),* }
+            }
+        }
+    };
+}
+environment_table!(environments);
+
+const COUNT: usize = MATERIALS.len() + OTHERS.len();
+
+/// Both lists, one after the other.
+#[expect(clippy::indexing_slicing, reason = "evaluated when it is compiled")]
+const NAMES: [(Effects, &str); COUNT] = {
+    let mut all = [(Effects(0), ""); COUNT];
+    let mut i = 0;
+    while i < COUNT {
+        all[i] = if i < MATERIALS.len() { MATERIALS[i] } else { OTHERS[i - MATERIALS.len()] };
+        i += 1;
+    }
+    all
+};
+
+// Materials keep to their bits, and no two effects share one.
+#[expect(clippy::indexing_slicing, reason = "evaluated when it is compiled")]
+const _: () = {
+    let (mut i, mut seen) = (0, 0);
+    while i < COUNT {
+        let bit = NAMES[i].0.0;
+        assert!(bit.count_ones() == 1 && seen & bit == 0);
+        assert!((bit < 1 << MATERIAL_BITS) == (i < MATERIALS.len()));
+        seen |= bit;
+        i += 1;
+    }
+};
+
 impl Effects {
+    /// Every effect with its name.
+    pub const NAMES: &'static [(Self, &'static str)] = &NAMES;
+
     /// Union.
     pub const fn with(self, o: Self) -> Self {
         Self(self.0 | o.0)
     }
 
-    /// Is every effect of `o` in `self`?
+    /// Whether every effect of `o` is in `self`.
     pub const fn contains(self, o: Self) -> bool {
         self.0 & o.0 == o.0
     }
 
-    /// Is any effect of `o` in `self`?
+    /// Whether any effect of `o` is in `self`.
     pub const fn intersects(self, o: Self) -> bool {
         self.0 & o.0 != 0
     }

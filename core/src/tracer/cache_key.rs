@@ -2,9 +2,9 @@
 
 use super::book::Bookkeeping;
 use super::shading::Arrival8;
+use crate::bsdf;
 use crate::learn::cache::VertexKind8;
 use crate::rrs::Space;
-use crate::scene::blob::MaterialKind;
 use crate::world::World;
 use croupier_simd::{F32x8, U32x8, Vec3x8};
 
@@ -27,20 +27,21 @@ fn inverse(x: Vec3x8, floor: f32) -> Vec3x8 {
     Vec3x8::new(one(x.x), one(x.y), one(x.z))
 }
 
-/// The bins of arrived vertices. What diffuse surfaces reflect depends on where they face; what glossy ones reflect, on
-/// the mirrored direction; what others let through, on the viewing direction. Samples are logged over the albedo, so
-/// that a texture, or a black and a white thing in one cell, does not count as noise.
+/// The bins of arrived vertices, keyed by the direction that decides what their model reflects
+/// ([`bsdf::CacheDirection`]). Samples are logged over the albedo, so that a texture, or a black and a white thing in one
+/// cell, does not count as noise.
 pub(super) fn cache_lookup<W: World>(world: &W, book: &Bookkeeping<'_>, a: &Arrival8, space: Space) -> CacheKey8 {
     let (v, active) = (&a.vertex, a.active);
     let learned = world.learned();
     match space {
         Space::Scene => {
             let mirrored = v.ns * (v.ns.dot(v.wo) * F32x8::splat(2.0)) - v.wo;
-            let diffuse = U32x8::new(a.kind).eq(U32x8::splat(MaterialKind::Diffuse as u32));
-            let dir = Vec3x8::select(a.transmissive, v.wo, Vec3x8::select(diffuse, v.ns, mirrored));
+            let by_normal = bsdf::lanes_of(bsdf::kinds_keyed_by_normal(), &a.kind);
+            let by_view = bsdf::lanes_of(bsdf::kinds_keyed_by_view(), &a.kind);
+            let dir = Vec3x8::select(by_view, v.wo, Vec3x8::select(by_normal, v.ns, mirrored));
             let seen = v.path.depth.eq(U32x8::splat(1));
             let known = if learned.weighs_pixels() { active } else { active.and_not(seen) };
-            let bin = learned.scene_bins(VertexKind8::of(diffuse, seen), v.p, dir, v.key.cache_jitter(), known);
+            let bin = learned.scene_bins(VertexKind8::of(by_normal, seen), v.p, dir, v.key.cache_jitter(), known);
             let mut unscale = a.albedo;
             if (seen & active).any() {
                 // in one cell bright pixels see bright samples: only their ratio is alike, whatever a pixel's samples

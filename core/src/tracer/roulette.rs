@@ -2,9 +2,10 @@
 //! with n samples) are the packet's roulette masks; one comb rounds the whole packet, another decides which samples draw
 //! light samples.
 
-use super::book::{Bookkeeping, Contribution8};
+use super::book::Bookkeeping;
 use super::cache_key::cache_lookup;
 use super::ledger::NO_BIN;
+use super::packets::Contribution8;
 use super::ring::RESERVE;
 use super::shading::Arrival8;
 use super::vertex::pack_samples;
@@ -17,9 +18,6 @@ use crate::world::World;
 use croupier_simd::{F32x8, Mask8, U32x8};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
-
-/// Phong exponent of a perfect mirror.
-const MIRROR_SHININESS: f32 = 1e4;
 
 /// Numbers of the combs of one shard in one iteration: one for each packet, so they depend on the order of packets,
 /// which is a function of scene and settings.
@@ -47,18 +45,12 @@ pub(crate) struct Decision8 {
     pub with_nee: [u32; 8],
 }
 
-/// Phong exponents that correspond to the materials' GGX widths: 2 / alpha^2 - 2.
+/// Phong exponents of the materials; 0 where there is none.
 fn shininess(scene: &Scene<'_>, a: &Arrival8) -> F32x8 {
     let material = a.vertex.material.to_array();
     F32x8::from_fn(|i| {
-        let m = scene.materials.get(material[i] as usize);
-        match MaterialKind::from_u32(a.kind[i]) {
-            Some(MaterialKind::Diffuse | MaterialKind::Plastic | MaterialKind::RoughPlastic) | None => 0.0,
-            Some(MaterialKind::RoughConductor | MaterialKind::RoughDielectric) => {
-                m.map_or(0.0, |m| (2.0 / (m.alpha * m.alpha) - 2.0).clamp(0.0, MIRROR_SHININESS))
-            }
-            Some(_) => MIRROR_SHININESS,
-        }
+        let kind = MaterialKind::from_u32(a.kind[i]);
+        kind.zip(scene.materials.get(material[i] as usize)).map_or(0.0, |(kind, m)| bsdf::shininess(kind, m))
     })
 }
 

@@ -1,7 +1,7 @@
 //! Stage `surface`: the vertices that hits become, with material, shading normal and texture.
 
 use super::ledger::NO_BIN;
-use super::ray_state::RayState8;
+use super::packets::RayState8;
 use super::vertex::PathVertex8;
 use crate::bsdf::{self, Bsdf, Inputs8, Visitor};
 use crate::geometry::{SurfaceHit8, SurfacePoint8};
@@ -10,12 +10,6 @@ use crate::scene::{Effects, Scene};
 use crate::texture;
 use crate::world::World;
 use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
-
-/// Kinds that scatter from behind as well.
-const TRANSMISSIVE: u32 = 1 << MaterialKind::Dielectric as u32
-    | 1 << MaterialKind::RoughDielectric as u32
-    | 1 << MaterialKind::ThinDielectric as u32
-    | 1 << MaterialKind::Null as u32;
 
 /// Eight vertices at which paths have arrived.
 #[derive(Clone, Copy, Debug)]
@@ -26,8 +20,6 @@ pub(crate) struct Arrival8 {
     pub active: Mask8,
     /// [`MaterialKind`] per lane.
     pub kind: [u32; 8],
-    /// Lanes whose material lets light through.
-    pub transmissive: Mask8,
     /// Weight of the bounce that led here.
     pub weight: Vec3x8,
     /// Albedos seen from `wo`; 0 unless the strategy needs them.
@@ -59,7 +51,6 @@ pub(crate) fn shade<W: World>(world: &W, rays: &RayState8, hit: &SurfaceHit8, po
         },
         active: m.scatters,
         kind: m.kind,
-        transmissive: m.transmissive,
         weight: rays.weight,
         albedo: Vec3x8::ZERO,
     }
@@ -68,7 +59,6 @@ pub(crate) fn shade<W: World>(world: &W, rays: &RayState8, hit: &SurfaceHit8, po
 /// What materials make of eight hits.
 struct Materials8 {
     kind: [u32; 8],
-    transmissive: Mask8,
     reflectance: Vec3x8,
     /// Shading normals, turned towards `wo` on two-sided materials.
     ns: Vec3x8,
@@ -89,7 +79,7 @@ impl Materials8 {
             reflectance[i] = m.reflectance;
             textures[i] = m.texture;
             two_sided |= u32::from(m.flags & MATERIAL_TWO_SIDED != 0) << i;
-            through |= (TRANSMISSIVE >> m.kind & 1) << i;
+            through |= (bsdf::transmissive_kinds() >> m.kind & 1) << i;
             textured |= u32::from(m.texture != NONE) << i;
         }
         let mut reflectance = Vec3x8::from_fn(|i| reflectance[i]);
@@ -116,7 +106,7 @@ impl Materials8 {
         let turn = behind & Mask8::from_bits(two_sided).and_not(transmissive);
         let ns = Vec3x8::select(turn, -ns, ns);
         let scatters = (cos.gt(F32x8::ZERO) | turn | (transmissive & behind)) & hit.mask;
-        Self { kind, transmissive, reflectance, ns, scatters }
+        Self { kind, reflectance, ns, scatters }
     }
 }
 

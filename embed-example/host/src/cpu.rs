@@ -1,4 +1,4 @@
-//! Does the processor have the instructions that this program was built of?
+//! Check that the processor has the instructions that this program is compiled to.
 
 /// The first instruction set that the program uses and the processor lacks.
 ///
@@ -6,9 +6,8 @@
 /// allowed to use, which is exactly what is in doubt here.
 #[cfg(all(target_arch = "x86_64", target_feature = "avx2"))]
 #[inline(never)]
-pub fn missing() -> Option<&'static str> {
+pub(crate) fn missing() -> Option<&'static str> {
     use std::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
-    #[allow(unused_unsafe, reason = "`__cpuid` is an unsafe function before Rust 1.91 and a safe one since")]
     // SAFETY: every x86-64 processor has `cpuid`; leaves 0 and 1 always exist, the others are asked for only if leaf 0
     // and 0x8000_0000 say that they do. `xgetbv` runs only if the OSXSAVE bit says that the system has enabled it.
     unsafe {
@@ -23,7 +22,7 @@ pub fn missing() -> Option<&'static str> {
 
 /// Programs built for the baseline of their architecture run everywhere.
 #[cfg(not(all(target_arch = "x86_64", target_feature = "avx2")))]
-pub fn missing() -> Option<&'static str> {
+pub(crate) fn missing() -> Option<&'static str> {
     None
 }
 
@@ -52,8 +51,8 @@ fn first_missing(one: u32, seven: u32, extended: u32, state: u64) -> Option<&'st
 mod tests {
     use super::*;
 
-    /// A processor of 2013 (Haswell), one of 2012 (Ivy Bridge), and a system that does not save AVX registers. Dies
-    /// with a wrong bit number.
+    /// A processor of 2013 (Haswell), one of 2012 (Ivy Bridge), and a system that does not save AVX registers. Killed
+    /// by: a wrong bit number.
     #[test]
     fn names_what_is_missing() {
         let (one, seven, extended) = (0x7ffa_fbff, 0x0000_27ab, 0x0000_0021);
@@ -65,7 +64,7 @@ mod tests {
         assert_eq!(first_missing(one, seven, 0, 7), Some("LZCNT"));
     }
 
-    /// The tests are running, so nothing is.
+    /// The tests run, so no instruction is missing. Killed by: a missing set where there is none.
     #[test]
     fn nothing_is_missing_here() {
         assert_eq!(missing(), None);

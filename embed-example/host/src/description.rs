@@ -21,6 +21,8 @@
 //! # Ok::<(), croupier_host::bake::BakeError>(())
 //! ```
 
+use croupier::unstable::scene::blob::MaterialKind;
+
 /// A whole scene. Indices are positions in the `Vec`s here.
 #[derive(Clone, Debug)]
 pub struct SceneDescription {
@@ -36,7 +38,7 @@ pub struct SceneDescription {
     pub textures: Vec<Texture>,
     /// Lights, except the one at infinity all around.
     pub emitters: Vec<Emitter>,
-    /// What surrounds the scene; `None` is black.
+    /// Environment of the scene; `None` is black.
     pub environment: Option<Environment>,
     /// Camera.
     pub camera: Camera,
@@ -78,55 +80,118 @@ pub struct Object {
 /// A named material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
-    /// Name; messages and scene files know it by this.
+    /// Name in messages and scene files.
     pub name: String,
     /// Both sides behave like the front; else the back of an opaque surface is black. Ignored by dielectrics and
     /// `Null`.
     pub two_sided: bool,
-    /// How it scatters.
+    /// Scattering model.
     pub model: Model,
 }
 
 /// Diffuse albedo, or scale of a specular reflection; 0 to 1 per channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reflectance {
-    /// The same everywhere.
+    /// Constant colour.
     Constant([f32; 3]),
     /// Index of a texture.
     Texture(u32),
 }
 
-/// Scattering models; `alpha` is the GGX width, 1e-4 to 1, `int_ior` the refractive index behind the front side,
-/// `ext_ior` the one before it. See the core's `bsdf` for the formulas.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[expect(missing_docs, reason = "the fields are described above, their formulas in the core")]
-pub enum Model {
+/// Parameters that a model has, by their keys in scene files; see the core's `bsdf` for the formulas and
+/// [`Parameter`](croupier::unstable::scene::blob::Parameter) for the ranges.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ModelParameters {
+    /// Diffuse albedo, or scale of a specular reflection.
+    pub reflectance: Option<Reflectance>,
+    /// Real refractive index of a conductor per channel.
+    pub eta: Option<[f32; 3]>,
+    /// Extinction of a conductor per channel.
+    pub k: Option<[f32; 3]>,
+    /// Refractive index behind the front side.
+    pub int_ior: Option<f32>,
+    /// Refractive index before the front side.
+    pub ext_ior: Option<f32>,
+    /// GGX width.
+    pub alpha: Option<f32>,
+}
+
+/// Source of a model's parameters, such as an object of a scene file.
+pub trait ParameterSource {
+    /// Error of a parameter that is missing or of another type.
+    type Error;
+    /// `reflectance`.
+    fn reflectance(&mut self) -> Result<Reflectance, Self::Error>;
+    /// `eta`.
+    fn eta(&mut self) -> Result<[f32; 3], Self::Error>;
+    /// `k`.
+    fn k(&mut self) -> Result<[f32; 3], Self::Error>;
+    /// `int_ior`.
+    fn int_ior(&mut self) -> Result<f32, Self::Error>;
+    /// `ext_ior`.
+    fn ext_ior(&mut self) -> Result<f32, Self::Error>;
+    /// `alpha`.
+    fn alpha(&mut self) -> Result<f32, Self::Error>;
+}
+
+macro_rules! models {
+    ($($(#[$doc:meta])* $kind:ident $({ $($parameter:ident: $type:ty),* })?;)*) => {
+        /// Scattering models; their parameters are those of [`ModelParameters`], present.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[expect(missing_docs, reason = "the fields are described at `ModelParameters`, their formulas in the core")]
+        pub enum Model { $($(#[$doc])* $kind $({ $($parameter: $type),* })?),* }
+
+        impl Model {
+            /// Kind of material in the blob.
+            pub const fn kind(&self) -> MaterialKind {
+                match self { $(Self::$kind { .. } => MaterialKind::$kind),* }
+            }
+
+            /// Parameters of the model.
+            pub fn parameters(&self) -> ModelParameters {
+                match *self {
+                    $(Self::$kind $({ $($parameter),* })? =>
+                        ModelParameters { $($($parameter: Some($parameter),)*)? ..ModelParameters::default() }),*
+                }
+            }
+
+            /// The model of a kind with the parameters that `source` gives.
+            pub fn from_source<S: ParameterSource>(kind: MaterialKind, source: &mut S) -> Result<Self, S::Error> {
+                match kind {
+                    $(MaterialKind::$kind => Ok(Self::$kind $({ $($parameter: source.$parameter()?),* })?)),*
+                }
+            }
+        }
+    };
+}
+
+models! {
     /// Lambertian.
-    Diffuse { reflectance: Reflectance },
+    Diffuse { reflectance: Reflectance };
     /// Perfect mirror without Fresnel.
-    Mirror { reflectance: Reflectance },
-    /// Smooth conductor; `eta` and `k` are the complex refractive index per channel.
-    Conductor { eta: [f32; 3], k: [f32; 3], reflectance: Reflectance },
+    Mirror { reflectance: Reflectance };
+    /// Smooth conductor.
+    Conductor { eta: [f32; 3], k: [f32; 3], reflectance: Reflectance };
     /// GGX conductor.
-    RoughConductor { eta: [f32; 3], k: [f32; 3], reflectance: Reflectance, alpha: f32 },
+    RoughConductor { eta: [f32; 3], k: [f32; 3], reflectance: Reflectance, alpha: f32 };
     /// Smooth interface.
-    Dielectric { int_ior: f32, ext_ior: f32 },
+    Dielectric { int_ior: f32, ext_ior: f32 };
     /// GGX interface.
-    RoughDielectric { int_ior: f32, ext_ior: f32, alpha: f32 },
+    RoughDielectric { int_ior: f32, ext_ior: f32, alpha: f32 };
     /// Thin sheet.
-    ThinDielectric { int_ior: f32, ext_ior: f32 },
+    ThinDielectric { int_ior: f32, ext_ior: f32 };
     /// Smooth coat over a diffuse base.
-    Plastic { reflectance: Reflectance, int_ior: f32, ext_ior: f32 },
+    Plastic { reflectance: Reflectance, int_ior: f32, ext_ior: f32 };
     /// GGX coat over a diffuse base.
-    RoughPlastic { reflectance: Reflectance, int_ior: f32, ext_ior: f32, alpha: f32 },
+    RoughPlastic { reflectance: Reflectance, int_ior: f32, ext_ior: f32, alpha: f32 };
     /// Index-matched boundary: light passes unchanged.
-    Null,
+    Null;
 }
 
 /// An 8-bit image, sRGB-encoded; bilinear, repeated.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Texture {
-    /// Where it came from, for messages.
+    /// Name or path, for messages.
     pub name: String,
     /// Columns.
     pub width: u32,
@@ -165,7 +230,7 @@ pub enum Emitter {
 /// Light from infinity, all around.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Environment {
-    /// The same radiance from all directions.
+    /// Constant radiance from all directions.
     Constant {
         /// Radiance.
         radiance: [f32; 3],
@@ -227,30 +292,14 @@ impl Default for Camera {
 }
 
 impl Model {
-    /// Its reflectance, if it has one.
-    pub fn reflectance(&self) -> Option<Reflectance> {
-        match *self {
-            Self::Diffuse { reflectance }
-            | Self::Mirror { reflectance }
-            | Self::Conductor { reflectance, .. }
-            | Self::RoughConductor { reflectance, .. }
-            | Self::Plastic { reflectance, .. }
-            | Self::RoughPlastic { reflectance, .. } => Some(reflectance),
-            Self::Dielectric { .. } | Self::RoughDielectric { .. } | Self::ThinDielectric { .. } | Self::Null => None,
-        }
-    }
-
-    /// Does light pass it?
-    pub fn is_transmissive(&self) -> bool {
-        matches!(
-            self,
-            Self::Dielectric { .. } | Self::RoughDielectric { .. } | Self::ThinDielectric { .. } | Self::Null
-        )
+    /// Whether light passes the surface.
+    pub const fn is_transmissive(&self) -> bool {
+        self.kind().facts().transmissive
     }
 }
 
 impl Default for SceneDescription {
-    /// Nothing, in black, seen by the default camera; at most 40 path segments.
+    /// Empty black scene, seen by the default camera; at most 40 path segments.
     fn default() -> Self {
         Self {
             vertices: Vec::new(),

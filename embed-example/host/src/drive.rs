@@ -1,216 +1,58 @@
-//! Drives the core: memory, threads, iterations and when to stop. The core has no clock; time lives here.
+//! Memory, threads, iterations and stop conditions around the core. The core has no clock: time is measured here.
 //! [`crate::render`] is the same with pictures and names.
 
 mod calibrate;
+mod error;
+mod observe;
+mod result;
 pub mod schedule;
 
 pub use calibrate::Calibration;
+pub use error::DriveError;
+pub use observe::{Observer, Progress, Target, Unobserved};
+pub use result::{CacheRecord, IterationRecord, Rendered};
 
 use crate::blob::AlignedBytes;
-use crate::render::{Observer, Progress, Target};
-use croupier::accel::Intersector;
-use croupier::film::{PixelAov, PixelStats};
-use croupier::learn::PictureStatistics;
-use croupier::learn::cache::{Cache, CacheError};
-use croupier::profile::{AnyProfile, DiffuseOnly, Full, Profile};
-use croupier::rrs::Space;
-use croupier::{
-    Budget, Counters, ErrorEstimate, Phase, Plan, Scene, SceneError, Session, SessionError, Settings, SettingsError,
-    Shard, ShardError, StepResult,
-};
+use croupier::unstable::Phase;
+use croupier::unstable::accel::Intersector;
+use croupier::unstable::learn::cache::{Cache, CacheError};
+use croupier::unstable::profile::{AnyProfile, DiffuseOnly, Full, Profile};
+use croupier::unstable::rrs::Space;
+use croupier::{Budget, Counters, ErrorEstimate, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
 use rayon::prelude::*;
 use schedule::Work;
-use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 /// Rays of a shard between two calls of [`Observer::progress`] and [`Observer::stop`].
 const STEP_RAYS: u64 = 1 << 16;
 
-/// How to render.
+/// Options of the driver.
 #[derive(Clone, Copy, Debug)]
 pub struct Options<'a> {
-    /// The core's settings.
+    /// Settings of the core.
     pub settings: Settings,
-    /// When to stop.
+    /// Stop condition.
     pub target: Target,
-    /// Threads; 0 takes one per core. The picture does not depend on it.
+    /// Threads; 0 is one per processor. The image does not depend on them.
     pub threads: usize,
-    /// Pixels that strategies which learn take for the true ones, instead of the denoised picture: efficiency, not the
-    /// expectation, hangs on them.
-    pub estimate: Option<&'a [[f32; 3]]>,
-    /// A saved cache to begin with. Needs a strategy that learns from the scene.
+    /// Pixel estimate that strategies which learn use instead of the denoised picture, rgb, row by row: efficiency
+    /// depends on it, the expectation does not.
+    pub pixel_estimate: Option<&'a [[f32; 3]]>,
+    /// Saved cache to begin with. Needs a strategy that learns from the scene.
     pub cache: Option<&'a [u8]>,
-    /// Return the cache of the scene's statistics as bytes. Needs such a strategy too.
+    /// Return of the cache in the end. Needs a strategy that learns from the scene.
     pub save_cache: bool,
-    /// Measure in the end what looking up statistics and entering samples take.
+    /// Measurement, in the end, of look-ups and of recording samples.
     pub calibrate: bool,
 }
 
 impl Options<'_> {
-    /// One thread per core, the built-in estimate, an empty cache that is not saved.
+    /// Defaults: one thread per processor, the built-in pixel estimate, an empty cache that is not saved.
     pub fn new(settings: Settings, target: Target) -> Self {
-        Self { settings, target, threads: 0, estimate: None, cache: None, save_cache: false, calibrate: false }
+        Self { settings, target, threads: 0, pixel_estimate: None, cache: None, save_cache: false, calibrate: false }
     }
 }
-
-/// Watches nothing.
-#[derive(Clone, Copy, Debug)]
-pub struct Unobserved;
-
-impl Observer for Unobserved {
-    fn progress(&self, _: &Progress) {}
-
-    fn stop(&self) -> bool {
-        false
-    }
-}
-
-/// One finished iteration.
-#[derive(Clone, Copy, Debug)]
-pub struct IterationRecord {
-    /// Camera samples per pixel, rays, and seconds with all phases.
-    pub work: Work,
-    /// What happened in it.
-    pub counters: Counters,
-    /// Seconds of tracing.
-    pub tracing: f64,
-    /// Seconds of merging the shards' pixels and measuring the picture's variance.
-    pub merging: f64,
-    /// Seconds of estimating the pixels (denoising).
-    pub estimating: f64,
-    /// Seconds of merging the scene's statistics and rebuilding their tree.
-    pub learning: f64,
-    /// Error and cost of a camera sample; `None` unless something learns from the picture.
-    pub picture: Option<PictureStatistics>,
-    /// Leaves of the cache after it, and splits for which there was no room until then.
-    pub cache: Option<CacheRecord>,
-    /// Estimated error of the picture after it.
-    pub error: ErrorEstimate,
-}
-
-/// The cache's size after an iteration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CacheRecord {
-    /// Leaves in use.
-    pub leaves: u32,
-    /// Splits for which there was no room, in all iterations so far. A leaf that remains too large counts again in
-    /// each.
-    pub subdivisions_refused: u64,
-}
-
-/// A finished render.
-#[derive(Clone, Debug)]
-pub struct Rendered {
-    /// Columns and rows.
-    pub size: [u32; 2],
-    /// Sums per pixel, row by row.
-    pub pixels: Vec<PixelStats>,
-    /// Auxiliary sums; empty if not asked for.
-    pub aovs: Vec<PixelAov>,
-    /// What happened.
-    pub counters: Counters,
-    /// Estimated error.
-    pub error: ErrorEstimate,
-    /// Camera samples per pixel of the finished iterations.
-    pub spp: u32,
-    /// Wall time of rendering alone.
-    pub seconds: f64,
-    /// Name of the kernel profile.
-    pub profile: &'static str,
-    /// Bytes of the shared block and of all shards.
-    pub memory: [usize; 2],
-    /// The observer asked to stop before the target.
-    pub stopped_early: bool,
-    /// Threads that traced.
-    pub threads: usize,
-    /// Every iteration, the one that was stopped too.
-    pub iterations: Vec<IterationRecord>,
-    /// The saved cache, if asked for.
-    pub cache: Option<Vec<u8>>,
-    /// What look-ups take, if asked for and anything is looked up.
-    pub calibration: Option<Calibration>,
-}
-
-impl Rendered {
-    /// Mean radiance, row by row, rgb.
-    pub fn image(&self) -> Vec<[f32; 3]> {
-        self.pixels.iter().map(|p| p.mean().map(|x| x as f32)).collect()
-    }
-
-    /// Standard error of the mean.
-    pub fn stderr(&self) -> Vec<[f32; 3]> {
-        self.pixels.iter().map(|p| p.variance_of_mean().map(|v| v.sqrt() as f32)).collect()
-    }
-
-    /// Rays per second, in millions.
-    pub fn mrays_per_s(&self) -> f64 {
-        self.counters.rays() as f64 / self.seconds.max(1e-9) * 1e-6
-    }
-
-    /// Order-sensitive hash of the picture's bits: equal for any number of threads and any instruction set.
-    pub fn hash(&self) -> u64 {
-        let image = self.image();
-        croupier::scene::blob::content_hash(bytemuck::cast_slice(&image))
-    }
-}
-
-/// Why nothing could be rendered.
-#[derive(Debug)]
-#[non_exhaustive]
-pub enum DriveError {
-    /// The bytes are not a scene.
-    Scene(SceneError),
-    /// A setting cannot be used.
-    Settings(SettingsError),
-    /// The session cannot start.
-    Session(SessionError),
-    /// A shard cannot be made.
-    Shard(ShardError),
-    /// The saved cache cannot be loaded, or the cache not be saved.
-    Cache(CacheError),
-    /// A cache is to be loaded or saved with this strategy, which learns nothing of the scene.
-    NoCache(&'static str),
-    /// A block of so many bytes is not to be had.
-    Memory(usize),
-    /// The thread pool cannot start.
-    Threads(rayon::ThreadPoolBuildError),
-}
-
-impl fmt::Display for DriveError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Scene(e) => e.fmt(f),
-            Self::Settings(e) => e.fmt(f),
-            Self::Session(e) => e.fmt(f),
-            Self::Shard(e) => e.fmt(f),
-            Self::Cache(e @ CacheError::Bounds { .. }) => write!(f, "statistics of another scene: {e}"),
-            Self::Cache(e) => e.fmt(f),
-            Self::NoCache(strategy) => {
-                write!(
-                    f,
-                    "roulette strategy `{strategy}` learns nothing of the scene: there is no cache to load or save"
-                )
-            }
-            Self::Memory(bytes) => write!(f, "no memory for a block of {bytes} bytes"),
-            Self::Threads(e) => write!(f, "cannot start threads: {e}"),
-        }
-    }
-}
-
-impl std::error::Error for DriveError {}
-
-macro_rules! from {
-    ($($t:ty => $v:ident),*) => {$(
-        impl From<$t> for DriveError {
-            fn from(e: $t) -> Self {
-                Self::$v(e)
-            }
-        }
-    )*};
-}
-from!(SceneError => Scene, SettingsError => Settings, SessionError => Session, ShardError => Shard, CacheError => Cache,
-      rayon::ThreadPoolBuildError => Threads);
 
 /// Renders a scene blob.
 pub fn drive(scene: &[u8], options: &Options<'_>, observer: &dyn Observer) -> Result<Rendered, DriveError> {
@@ -232,9 +74,8 @@ pub fn drive_with<P: Profile + Send + Sync>(
     observer: &dyn Observer,
 ) -> Result<Rendered, DriveError> {
     let settings = &options.settings;
-    let space = settings.strategy.space();
-    if (options.cache.is_some() || options.save_cache) && space != Some(Space::Scene) {
-        return Err(DriveError::NoCache(settings.strategy.name()));
+    if options.cache.is_some() || options.save_cache {
+        needs_cache(settings)?;
     }
     let plan = Plan::new(settings)?;
     let block = |size: usize| AlignedBytes::try_zeroed(size).ok_or(DriveError::Memory(size));
@@ -245,7 +86,7 @@ pub fn drive_with<P: Profile + Send + Sync>(
     for (i, b) in blocks.iter_mut().enumerate() {
         shards.push(Shard::new(&plan, i as u32, b.as_mut())?);
     }
-    if let Some(rgb) = options.estimate {
+    if let Some(rgb) = options.pixel_estimate {
         session.give_estimate(rgb)?;
     }
     if let Some((bytes, cache)) = options.cache.zip(session.cache_mut()) {
@@ -265,7 +106,7 @@ pub fn drive_with<P: Profile + Send + Sync>(
         if samples == 0 {
             break;
         }
-        // the shards of a small picture finish in a single step, and do not ask
+        // shards of a small picture finish in a single step and never ask the observer
         if all.samples > 0 && observer.stop() {
             stopped_early = true;
             break;
@@ -309,6 +150,12 @@ pub fn drive_with<P: Profile + Send + Sync>(
         cache: used.filter(|_| options.save_cache).map(save).transpose()?,
         calibration: used.filter(|_| options.calibrate).and_then(|c| calibrate::calibrate(c, &scene)),
     })
+}
+
+/// Fails unless the settings keep statistics of the scene, which a cache holds.
+pub(crate) fn needs_cache(settings: &Settings) -> Result<(), DriveError> {
+    let strategy = settings.strategy;
+    if strategy.space() == Some(Space::Scene) { Ok(()) } else { Err(DriveError::NoCache(strategy.name())) }
 }
 
 /// Does anything learn between iterations, so that the cost of a camera sample changes?

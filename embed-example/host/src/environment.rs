@@ -1,15 +1,9 @@
-//! Sampling tables and powers of lights: what baking adds to the scene's description of emission.
+//! Sampling tables and selection weights of lights: what baking adds to the scene's description of emission.
 
 use crate::alias;
-use croupier::scene::blob::{Alias, Environment, EnvironmentKind, Light, LightKind};
-use croupier::simd::LUMINANCE;
+use croupier::unstable::light::{SceneExtent, luminance, power};
+use croupier::unstable::scene::blob::{Alias, Environment, EnvironmentKind, Light};
 use std::f64::consts::{PI, TAU};
-
-/// Luminance of a linear Rec. 709 colour; negative channels and NaN count as 0.
-fn luminance(c: [f32; 3]) -> f64 {
-    let [r, g, b] = c.map(|x| f64::from(x.max(0.0)));
-    LUMINANCE[0] * r + LUMINANCE[1] * g + LUMINANCE[2] * b
-}
 
 /// Integral of bilinear luminance over each cell of a lat-long map, in luminance x sr, row by row.
 ///
@@ -70,45 +64,18 @@ pub fn luminance_integral(environment: &Environment, texels: &[[f32; 3]]) -> f64
     }
 }
 
-/// Power that the environment sends through a disk of the scene's radius, in luminance: `pi R^2` times
-/// [`luminance_integral`].
-pub fn power(environment: &Environment, texels: &[[f32; 3]], scene_radius: f64) -> f64 {
-    PI * scene_radius * scene_radius * luminance_integral(environment, texels)
-}
-
-/// Power of one light in luminance units, the weight with which it is chosen. `scene_radius` is the radius of a sphere
-/// around the scene, world units.
-///
-/// | kind | power |
-/// |---|---|
-/// | area | pi A L |
-/// | environment | [`power`] |
-/// | point | 4 pi I |
-/// | directional | pi R^2 E |
-pub fn light_power(
-    light: &Light,
-    environment: Option<&Environment>,
-    env_texels: &[[f32; 3]],
-    scene_radius: f64,
-) -> f64 {
-    let y = luminance(light.emission);
-    match LightKind::from_u32(light.kind) {
-        Some(LightKind::Area) => PI * f64::from(light.area) * y,
-        Some(LightKind::Environment) => environment.map_or(0.0, |e| power(e, env_texels, scene_radius)),
-        Some(LightKind::Point) => 2.0 * TAU * y,
-        Some(LightKind::Directional) => PI * scene_radius * scene_radius * y,
-        None => 0.0,
-    }
-}
-
-/// [`light_power`] of every light: the weights of the light alias table. A scene without extent counts as one of
-/// radius 1, so that its infinite lights can still be chosen.
+/// [`power`] of every light: the weights of the light alias table. `scene_radius` is the radius of a sphere around the
+/// scene, world units; a scene without extent counts as one of radius 1, so that its infinite lights can still be
+/// chosen.
 pub fn light_weights(
     lights: &[Light],
     environment: Option<&Environment>,
     env_texels: &[[f32; 3]],
     scene_radius: f64,
 ) -> Vec<f64> {
-    let radius = if scene_radius > 0.0 && scene_radius.is_finite() { scene_radius } else { 1.0 };
-    lights.iter().map(|l| light_power(l, environment, env_texels, radius)).collect()
+    let extent = SceneExtent {
+        radius: if scene_radius > 0.0 && scene_radius.is_finite() { scene_radius } else { 1.0 },
+        environment: environment.map_or(0.0, |e| luminance_integral(e, env_texels)),
+    };
+    lights.iter().map(|l| power(l, &extent)).collect()
 }

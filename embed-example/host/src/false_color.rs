@@ -1,4 +1,4 @@
-//! Numbers as colours, with a legend: roulette factors, costs and path counts as pictures to look at.
+//! False-colour pictures with a legend, of roulette factors, costs and path counts.
 //!
 //! The legend is a strip below the picture: a bar of all colours with a tick for every label. Values outside the scale
 //! have the colour of its end; pixels without a value are grey.
@@ -60,11 +60,10 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Of roulette factors, 1/20 to 20: red ends paths, white leaves them, blue splits them.
+    /// Scale of roulette factors, 1/20 to 20: red ends paths, white leaves them, blue splits them.
     pub const FACTORS: Self = Self { low: 0.05, high: 20.0, diverging: true };
 
-    /// Of numbers above 0, from the smallest of them to what all but a thousandth stay below, widened to 1, 2 or 5
-    /// times a power of ten.
+    /// Scale of numbers above 0, from the smallest to the 99.9th percentile, widened to 1, 2 or 5 times a power of ten.
     pub fn sequential(values: &[f32]) -> Self {
         // the clamp keeps the ends, and what is computed from them, finite
         let positive = values.iter().filter(|x| **x > 0.0 && x.is_finite());
@@ -135,7 +134,7 @@ pub struct Drawing {
     pub width: usize,
     /// Rows: those of the values and [`LEGEND`].
     pub height: usize,
-    /// Row by row.
+    /// Pixels, row by row.
     pub pixels: Vec<[u8; 3]>,
 }
 

@@ -11,7 +11,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-/// Where the observer sits.
+/// Viewing conditions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewing {
     /// Pixels per degree of visual angle, > 0.
@@ -68,7 +68,7 @@ pub fn flip(width: usize, height: usize, reference: &[[f32; 3]], test: &[[f32; 3
     (0..width * height).map(pixel).collect()
 }
 
-/// What the eye makes of one image.
+/// Features of one image as an observer perceives them.
 struct Seen {
     /// Hunt-adjusted L*a*b* of the blurred image.
     color: Vec<[f64; 3]>,

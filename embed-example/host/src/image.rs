@@ -55,7 +55,7 @@ pub struct Rgb {
     pub pixels: Vec<[f32; 3]>,
 }
 
-/// What went wrong with an image file; every text names the file.
+/// Error of an image file; every text names the file.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum ImageError {
@@ -173,7 +173,7 @@ impl Picture {
         Self::decode_exr(BufReader::new(file)).map_err(|e| ImageError::Decode(path.into(), e))
     }
 
-    /// [`Self::read_exr`] from anywhere; errors are texts, for the caller knows the file.
+    /// [`Self::read_exr`] from any reader; errors are texts without the file, which the caller knows.
     pub(crate) fn decode_exr(from: impl Read + Seek + Send) -> Result<Self, String> {
         let image = openexr::read()
             .no_deep_data()

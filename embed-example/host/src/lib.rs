@@ -8,8 +8,8 @@
 //! | [`bake`] | description -> scene blob, with [`bvh`], [`alias`], [`environment`], [`microfacet`] | files |
 //! | [`blob`] | the blob's layout on disk and in memory | what sections mean |
 //! | [`drive`] | memory, threads, iterations around the core | files |
-//! | [`render`] | names in, pictures out | how light is transported |
-//! | [`statistics`] | what a render did, as tables | files |
+//! | [`render`] | options in, pictures with layers out | how light is transported |
+//! | [`statistics`] | figures of a render as tables | files |
 //! | [`image`], [`tonemap`], [`false_color`] | EXR and PNG | scenes |
 //! | [`compare`], [`flip`] | how far two pictures differ | scenes |
 

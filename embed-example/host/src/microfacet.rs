@@ -1,16 +1,14 @@
 //! Tables that plastics need at bake time, by quadrature in f64.
 
+use croupier::unstable::scene::blob::TRANSMITTANCE_ENTRIES;
 use std::f64::consts::PI;
 
-/// Entries of a transmittance table, as many as the core interpolates.
-pub const TABLE_SIZE: usize = croupier::bsdf::TABLE_SIZE;
-
-/// What a rough coat does to light that scatters below it.
+/// Transmittance and internal reflectance of a rough coat.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoughPlasticTable {
     /// T: energy transmitted from outside at cosines 0, 1/63, ... 1: the mean over visible normals of (1 - F)
     /// G1(refracted).
-    pub transmittance: [f32; TABLE_SIZE],
+    pub transmittance: [f32; TRANSMITTANCE_ENTRIES],
     /// R: energy reflected from inside for diffuse light: twice the mean over the same 64 cosines of cosine times the
     /// mean over visible normals of F G1(reflected). The plain mean, not the integral, because Mitsuba's `roughplastic`
     /// uses it and its pictures are the references.
@@ -26,12 +24,15 @@ const GRAZING: f64 = 1e-6;
 
 /// Table of a GGX coat of width `alpha` in (0, 10] and relative index `eta` = int_ior / ext_ior > 0.
 pub fn rough_plastic(alpha: f64, eta: f64) -> RoughPlasticTable {
-    let alpha = alpha.clamp(f64::from(croupier::bsdf::ggx::MIN_ALPHA), f64::from(croupier::bsdf::ggx::MAX_ALPHA));
+    let alpha = alpha.clamp(
+        f64::from(croupier::unstable::bsdf::ggx::MIN_ALPHA),
+        f64::from(croupier::unstable::bsdf::ggx::MAX_ALPHA),
+    );
     let rule = gauss_legendre(POINTS);
-    let mu = |i: usize| (i as f64 / (TABLE_SIZE - 1) as f64).max(GRAZING);
+    let mu = |i: usize| (i as f64 / (TRANSMITTANCE_ENTRIES - 1) as f64).max(GRAZING);
     let transmittance = std::array::from_fn(|i| energy(&rule, alpha, eta, mu(i), false) as f32);
     let inside = |i| mu(i) * energy(&rule, alpha, 1.0 / eta, mu(i), true);
-    let r = 2.0 * (0..TABLE_SIZE).map(inside).sum::<f64>() / TABLE_SIZE as f64;
+    let r = 2.0 * (0..TRANSMITTANCE_ENTRIES).map(inside).sum::<f64>() / TRANSMITTANCE_ENTRIES as f64;
     RoughPlasticTable { transmittance, r: r as f32 }
 }
 

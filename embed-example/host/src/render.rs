@@ -1,64 +1,38 @@
-//! Rendering a scene blob to a picture: what the program asks for and gets.
+//! From a scene blob to a picture with named layers and figures.
 
-use crate::drive::{Options, Rendered, drive_scene};
+pub use crate::drive::{DriveError as RenderError, Observer, Progress, Target};
+
+use crate::drive::{self, Options, Rendered, drive_scene};
 use crate::image::Picture;
 use crate::statistics::Statistics;
-use croupier::denoise::{Planes, scratch_len};
-use croupier::film::{PixelAov, PixelStats};
-use croupier::learn::ControlVariate;
-use croupier::profile::AnyProfile;
-use croupier::rrs::Ears;
-use croupier::{Film, Plan, Scene, Settings, SettingsError, Strategy, rrs};
+use croupier::unstable::denoise::{Planes, scratch_len};
+use croupier::unstable::film::{PixelAov, PixelStats};
+use croupier::unstable::learn::ControlVariate;
+use croupier::unstable::learn::cache::CacheSize;
+use croupier::unstable::profile::AnyProfile;
+use croupier::unstable::rrs;
+use croupier::unstable::rrs::Ears;
+use croupier::{Plan, Scene, Settings, SettingsError, Strategy};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
-
-/// When a render is done.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Target {
-    /// Samples per pixel, >= 1.
-    Spp(u32),
-    /// Seconds of rendering, > 0, on the wall or by [`Observer::seconds`]. No iteration begins that would pass them at
-    /// the speed so far; one that has begun is finished, and the first one, a sample per pixel, is rendered in any
-    /// case. The image then depends on the machine.
-    Seconds(f64),
-    /// Rays of all kinds, >= 1. The same: passed by at most one iteration.
-    Rays(u64),
-    /// Estimated relMSE of the whole image, > 0, looked at after iterations; not believed below 4 samples per pixel.
-    Error(f64),
-}
-
-impl Target {
-    /// Seconds left, from what has been done so far: work goes on at the same speed, and the squared error falls as 1 /
-    /// work. `None` while nothing is known.
-    pub fn seconds_left(&self, p: &Progress) -> Option<f64> {
-        let by_part = |part: f64| p.seconds * (1.0 / part - 1.0);
-        let left = match *self {
-            Self::Spp(n) => by_part(p.spp / f64::from(n)),
-            Self::Seconds(s) => s - p.seconds,
-            Self::Rays(n) => by_part(p.rays as f64 / n as f64),
-            Self::Error(e) => by_part(e / p.relmse_estimate?),
-        };
-        left.is_finite().then(|| left.max(0.0))
-    }
-}
 
 /// Options of a render, besides the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
     /// Settings of the core. What they leave open is the scene's own ([`Settings::with_scene`]).
     pub settings: Settings,
-    /// When to stop.
+    /// Stop condition.
     pub target: Target,
-    /// Threads; 0 is one per processor. Does not change the image.
+    /// Threads; 0 is one per processor. The image does not depend on them.
     pub threads: usize,
-    /// A saved cache to begin with. Needs a strategy that learns from the scene.
+    /// Saved cache to begin with. Needs a strategy that learns from the scene.
     pub cache: Option<Vec<u8>>,
-    /// Return the cache in the end. Needs such a strategy too.
+    /// Return of the cache in the end. Needs a strategy that learns from the scene.
     pub save_cache: bool,
-    /// Add the layer `denoised`.
+    /// Layer `denoised` besides the others.
     pub denoise: bool,
-    /// Measure what looking up and entering samples take, for [`Statistics::time`].
+    /// Measurement of look-ups and of recording samples, for [`Statistics::time`].
     pub calibrate: bool,
 }
 
@@ -83,6 +57,15 @@ impl RenderOptions {
             calibrate: false,
         }
     }
+
+    /// Takes as many shards as their statistics have room for, at most as many as there are. If there is no room for
+    /// one, [`check`] says what one needs.
+    pub fn fit_shards(&mut self) {
+        let s = &mut self.settings;
+        let learns = s.strategy.space().is_some();
+        let fits = |shards: &u32| !learns || CacheSize::within(s.learning.cache_bytes, *shards).is_some();
+        s.shards = (1..=s.shards).rev().find(fits).unwrap_or(1);
+    }
 }
 
 /// With efficiency-aware roulette and splitting.
@@ -92,44 +75,7 @@ impl Default for RenderOptions {
     }
 }
 
-/// State of a render on its way.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Progress {
-    /// Mean samples per pixel so far.
-    pub spp: f64,
-    /// Rays so far.
-    pub rays: u64,
-    /// Wall-clock seconds so far.
-    pub seconds: f64,
-    /// Estimated relMSE of the picture after the last finished iteration ([`croupier::ErrorEstimate::rel_mse`]): the
-    /// samples of the iteration under way are not in it. `None` while the first is under way. Where a pixel has a
-    /// single sample, its square stands in for its squared error, so that after an iteration of one sample the estimate
-    /// is far too large.
-    pub relmse_estimate: Option<f64>,
-}
-
-/// Watches a render, and may end it. Called from the thread that called [`render_scene`] and from its workers.
-pub trait Observer: Sync {
-    /// Called by each worker after each step: when a shard has traced some 65 000 rays or has finished its part of the
-    /// iteration. Workers do not wait for each other, so that several may call at a time; each waits for its own call.
-    fn progress(&self, progress: &Progress);
-    /// True ends the render soon, and must stay true; what was rendered is still returned. Asked before each iteration
-    /// but the first, and by each worker after each step that leaves its shard something to do: such a shard begins no
-    /// further camera samples and finishes those under way. So a first iteration whose shards take a single step each
-    /// is finished. Nothing else ends an iteration early, no [`Target`] either.
-    fn stop(&self) -> bool;
-    /// An iteration is finished: the picture so far and the wall-clock seconds it took. Called from the thread that
-    /// called [`render`]; the time spent in here does not count as rendering.
-    fn iteration(&self, _film: &Film<'_>, _seconds: f64) {}
-    /// Seconds of rendering so far, for [`Target::Seconds`]; `None` is time on the wall without that in
-    /// [`Self::iteration`]. On a machine with other work a host may count CPU time instead. Asked between iterations,
-    /// by the thread that called [`render_scene`].
-    fn seconds(&self) -> Option<f64> {
-        None
-    }
-}
-
-/// Figures of a finished render.
+/// Figures of a finished render: work, speed, error.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RenderStats {
     /// Mean samples per pixel.
@@ -138,17 +84,20 @@ pub struct RenderStats {
     pub rays: u64,
     /// Wall-clock seconds of rendering.
     pub seconds: f64,
-    /// 1e-6 rays / second.
+    /// Rays of all kinds per second, in millions.
     pub mrays_per_s: f64,
     /// Estimated relMSE of the whole image; `None` below two samples per pixel.
     pub relmse_estimate: Option<f64>,
-    /// Its 95 % interval. See [`croupier::ErrorEstimate`] for what both mean with roulette and splitting.
+    /// 95 % confidence interval of the estimated relMSE. [`croupier::ErrorEstimate`] says what both mean with roulette
+    /// and splitting.
     pub relmse_interval: Option<[f64; 2]>,
-    /// Part of the eight lanes that did work, by stage.
+    /// Share of the eight lanes that did work, 0 to 1, by stage.
     pub lane_utilisation: BTreeMap<&'static str, f64>,
-    /// Events that cost quality or were mended (full rings, bad samples, ...), by name.
+    /// Counts of work and of limits that were met (full rings, contributions that are not finite, ...), by their names
+    /// in [`croupier::Counters`].
     pub counters: BTreeMap<&'static str, u64>,
-    /// Column and row of the pixel in which the first contribution was not finite, if one was. They were left out.
+    /// Column and row of the pixel with the first contribution that was not finite, if there was one. Such contributions
+    /// are left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_non_finite: Option<[u32; 2]>,
 }
@@ -156,21 +105,21 @@ pub struct RenderStats {
 /// A rendered picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderResult {
-    /// All layers.
+    /// Picture with all layers.
     pub picture: Picture,
-    /// Figures.
+    /// Figures of work, speed and error.
     pub stats: RenderStats,
-    /// More of them: paths, iterations, time.
+    /// Figures of paths, iterations and time.
     pub statistics: Statistics,
-    /// The memory it took.
+    /// Memory of the render.
     pub plan: PlanSummary,
-    /// The saved cache, if asked for.
+    /// Saved cache, if asked for.
     pub cache: Option<Vec<u8>>,
-    /// The observer ended it before its target.
+    /// Whether the observer ended the render before its target.
     pub stopped_early: bool,
 }
 
-/// What a render of a scene takes.
+/// Memory that a render of a scene takes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlanSummary {
     /// Name of the kernel profile that holds the scene's effects.
@@ -181,7 +130,7 @@ pub struct PlanSummary {
     pub shard_bytes: u64,
     /// Number of shards.
     pub shards: u32,
-    /// Those of all these bytes that would not be needed if nothing were learned.
+    /// Bytes among all these that learning needs.
     pub learning_bytes: u64,
 }
 
@@ -189,7 +138,7 @@ impl PlanSummary {
     fn new(scene: &Scene<'_>, settings: &Settings) -> Result<Self, SettingsError> {
         let plan = Plan::new(settings)?;
         let bytes = |p: &Plan| p.session().size as u64 + p.shard().size as u64 * u64::from(settings.shards);
-        let taught_nothing = Settings {
+        let without_learning = Settings {
             strategy: Strategy::None(rrs::None),
             adaptive: false,
             shadow_roulette: false,
@@ -201,25 +150,26 @@ impl PlanSummary {
             shared_bytes: plan.session().size as u64,
             shard_bytes: plan.shard().size as u64,
             shards: settings.shards,
-            learning_bytes: bytes(&plan).saturating_sub(bytes(&Plan::new(&taught_nothing)?)),
+            learning_bytes: bytes(&plan).saturating_sub(bytes(&Plan::new(&without_learning)?)),
         })
     }
 }
 
-/// The memory, for people.
+/// The memory in words.
 impl fmt::Display for PlanSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { shared_bytes, shards, shard_bytes, learning_bytes, .. } = self;
         write!(
             f,
-            "{shared_bytes} bytes shared + {shards} shards of {shard_bytes} bytes, {learning_bytes} bytes of it to learn"
+            "{shared_bytes} bytes shared + {shards} shards of {shard_bytes} bytes, of which {learning_bytes} bytes for learning"
         )
     }
 }
 
-pub use crate::drive::DriveError as RenderError;
-
-/// Fails if the options make no sense whatever the scene: known before one is loaded.
+/// Checks what can be checked before a scene is loaded.
+///
+/// # Errors
+/// Options that no scene can be rendered with.
 pub fn check(options: &RenderOptions) -> Result<(), RenderError> {
     let mut settings = options.settings;
     // the least that a scene could choose
@@ -230,7 +180,7 @@ pub fn check(options: &RenderOptions) -> Result<(), RenderError> {
         settings.max_depth = 1;
     }
     Plan::new(&settings)?;
-    Ok(())
+    if options.cache.is_some() || options.save_cache { drive::needs_cache(&settings) } else { Ok(()) }
 }
 
 /// Renders a scene blob.
@@ -268,14 +218,14 @@ pub fn render_scene(
     })
 }
 
-/// What [`render_scene`] would take, without rendering.
+/// Memory that [`render_scene`] would take.
 pub fn plan(scene: &Scene<'_>, options: &RenderOptions) -> Result<PlanSummary, RenderError> {
     Ok(PlanSummary::new(scene, &options.settings.with_scene(scene))?)
 }
 
 const RGB: [&str; 3] = ["R", "G", "B"];
 
-/// The built-in denoiser's guess at the picture, by the final film and what the first hits look like.
+/// Picture denoised by the built-in denoiser, with albedo and normals of the first hits.
 fn denoised(r: &Rendered) -> Vec<[f32; 3]> {
     let features = !r.aovs.is_empty();
     let mut memory = vec![0.0; Planes::len(r.size, features)];
@@ -289,7 +239,7 @@ fn denoised(r: &Rendered) -> Vec<[f32; 3]> {
     done.expect("memory of the sizes asked for")
 }
 
-/// All layers that the film holds.
+/// Picture with all layers that the film holds.
 fn picture(r: &Rendered) -> Picture {
     let mut picture = Picture::new(r.size[0] as usize, r.size[1] as usize);
     picture.add3("", RGB, &r.image());
@@ -369,14 +319,14 @@ mod tests {
         assert_eq!(found, [None, Some([0, 0]), Some([4, 0]), Some([0, 1]), Some([4, 2])]);
     }
 
-    /// Killed by: a pixel that the core found and nobody is told of.
+    /// Killed by: a pixel that the core finds and the figures leave out.
     #[test]
-    fn the_first_pixel_that_is_not_finite_is_told() {
+    fn the_first_pixel_that_is_not_finite_is_reported() {
         let scene = crate::bake::bake(&crate::builtin::cornell_box(), &Default::default(), |_, _| ()).unwrap();
         let scene = Scene::from_bytes(&scene.bytes).unwrap();
         let settings = Settings { size: [5, 3], ..Settings::for_scene(&scene) };
         let o = Options::new(settings, Target::Spp(1));
-        let mut r = drive_scene(scene, &o, &crate::drive::Unobserved).unwrap();
+        let mut r = drive_scene(scene, &o, &super::Unobserved).unwrap();
         assert_eq!(stats(&r).first_non_finite, None);
         r.counters.first_non_finite = 8;
         assert_eq!(stats(&r).first_non_finite, Some([2, 1]));

@@ -1,22 +1,22 @@
-//! What a render did and what learning took: figures to compare roulette strategies with (EARS, SIGGRAPH 2022, Table 1,
-//! Fig. 9 and section 6.2).
+//! Figures of paths, iterations and time, to compare roulette strategies with (EARS, SIGGRAPH 2022, Table 1, Fig. 9 and
+//! section 6.2).
 
 use crate::drive::{IterationRecord, Rendered};
 use serde::Serialize;
 use std::fmt;
 
-/// All of it.
+/// Figures of a render to compare roulette strategies with.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Statistics {
-    /// Paths of the whole render.
+    /// Figures of the paths of the whole render.
     pub paths: Paths,
-    /// Every iteration.
-    pub iterations: Vec<Iteration>,
-    /// Where the time went.
+    /// Figures of every iteration.
+    pub iterations: Vec<IterationFigures>,
+    /// Time by part of the work.
     pub time: Vec<Part>,
 }
 
-/// A row of Table 1.
+/// Figures of the paths of a render (a row of Table 1).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Paths {
     /// Camera samples per pixel.
@@ -29,56 +29,57 @@ pub struct Paths {
     pub first_factor: Option<f64>,
 }
 
-/// A point of Fig. 9. Costs are counted, so that they do not depend on the machine.
+/// Figures of an iteration (a point of Fig. 9). Costs are counted and do not depend on the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Iteration {
+pub struct IterationFigures {
     /// Camera samples per pixel that were asked for.
     pub samples: u32,
     /// Error of the picture made of one sample per pixel, by the objective; absent unless something is learned.
     pub variance: Option<f64>,
-    /// Part of it in the worst pixels, which `variance` leaves out.
+    /// Error in the worst pixels, which `variance` leaves out.
     pub outliers: Option<f64>,
     /// Mean counted cost of a camera sample ([`croupier::Counters::cost`]).
     pub cost: f64,
-    /// 1 / (variance x cost).
+    /// Efficiency, 1 / (variance x cost).
     pub efficiency: Option<f64>,
-    /// Leaves of the cache afterwards.
+    /// Leaves of the cache after the iteration.
     pub leaves: Option<u32>,
-    /// Splits for which there was no room so far. A leaf that remains too large counts again in each iteration.
+    /// Subdivisions of leaves for which there was no room so far. A leaf that remains too large counts again in each
+    /// iteration.
     pub subdivisions_refused: Option<u64>,
-    /// Estimated relMSE of the picture afterwards; absent after a single sample.
+    /// Estimated relMSE of the picture after the iteration; absent after a single sample.
     pub relmse_estimate: Option<f64>,
-    /// Seconds, on the wall or by [`Observer::seconds`](crate::render::Observer::seconds).
+    /// Seconds, on the wall or by [`Observer::seconds`](crate::drive::Observer::seconds).
     pub seconds: f64,
 }
 
-/// What a part of the work took.
+/// Time of a part of the work.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Part {
-    /// Which.
+    /// Name of the part.
     pub name: &'static str,
-    /// Wall-clock seconds; those of work that all threads share, over their number.
+    /// Wall-clock seconds; of work that all threads share, CPU seconds over the number of threads.
     pub seconds: f64,
-    /// Of the whole render, 0 to 1.
+    /// Share of the whole render, 0 to 1.
     pub share: f64,
-    /// Contained in `tracing`: counted, times what one takes in a loop of nothing else. `entering samples` is adding
-    /// finished samples to the statistics alone, without the ledger in which they are gathered.
+    /// Whether the time is contained in that of `tracing`. Such times are counts times the seconds of one operation in a
+    /// loop of nothing else. `recording samples` is adding finished samples to the statistics, without the ledger.
     pub within_tracing: bool,
 }
 
 impl Statistics {
-    /// Of a finished render. Parts of tracing are there if it was calibrated.
+    /// Statistics of a finished render, with parts of tracing if it was calibrated.
     pub fn of(r: &Rendered) -> Self {
         let c = &r.counters;
         let over = |a: u64, b: u64| a as f64 / b.max(1) as f64;
-        let first = |f: fn(&croupier::film::PixelAov) -> f64| r.aovs.iter().map(f).sum::<f64>();
+        let first = |f: fn(&croupier::unstable::film::PixelAov) -> f64| r.aovs.iter().map(f).sum::<f64>();
         let hits = first(|a| a.vertices[0]);
         let pixels = u64::from(r.size[0]) * u64::from(r.size[1]);
-        // an iteration before which one sample per pixel was all there is
+        // the error is unknown until a pixel has two samples
         let mut samples = 0;
         let iterations = r.iterations.iter().map(|i| {
             samples += i.work.samples;
-            Iteration::of(i, samples > 1)
+            IterationFigures::of(i, samples > 1)
         });
         Self {
             paths: Paths {
@@ -93,7 +94,7 @@ impl Statistics {
     }
 }
 
-impl Iteration {
+impl IterationFigures {
     fn of(i: &IterationRecord, judged: bool) -> Self {
         // an iteration that was stopped may have measured nothing
         let picture = i.picture.filter(|p| p.cost > 0.0);
@@ -124,7 +125,7 @@ fn time(r: &Rendered) -> Vec<Part> {
         let threads = r.threads.max(1) as f64;
         let (packets, samples) = (r.counters.look_ups.packets as f64, r.counters.samples_logged as f64);
         parts.push(part("looking up", packets * one.look_up / threads, true));
-        parts.push(part("entering samples", samples * one.log / threads, true));
+        parts.push(part("recording samples", samples * one.log / threads, true));
     }
     parts.push(part("merging pixels", sum(|i| i.merging), false));
     parts.push(part("estimating pixels", sum(|i| i.estimating), false));
@@ -132,7 +133,7 @@ fn time(r: &Rendered) -> Vec<Part> {
     parts
 }
 
-/// Tables for people.
+/// Tables of text.
 impl fmt::Display for Statistics {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let p = &self.paths;
@@ -159,19 +160,19 @@ impl fmt::Display for Statistics {
         }
         write_table(f, &table)?;
         if let Some(n) = self.iterations.last().and_then(|i| i.subdivisions_refused).filter(|n| *n > 0) {
-            writeln!(f, "{n} splits refused so far for lack of room")?;
+            writeln!(f, "{n} subdivisions refused so far for lack of memory")?;
         }
         writeln!(f)?;
         let mut table = vec![["part", "s", "share"].map(String::from).to_vec()];
         for p in &self.time {
-            let name = if p.within_tracing { format!("of it {} (about)", p.name) } else { p.name.into() };
+            let name = if p.within_tracing { format!("of it {} (approximate)", p.name) } else { p.name.into() };
             table.push(vec![name, digits(p.seconds), format!("{:.2} %", 100.0 * p.share)]);
         }
         write_table(f, &table)
     }
 }
 
-/// Columns as wide as their widest cell, all to the right.
+/// Table with columns as wide as their widest cell, aligned to the right.
 fn write_table(f: &mut fmt::Formatter<'_>, rows: &[Vec<String>]) -> fmt::Result {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|x| x.chars().count()).max().unwrap_or(0);
@@ -187,7 +188,7 @@ fn optional(x: Option<f64>) -> String {
     x.map_or("-".into(), digits)
 }
 
-/// Three digits.
+/// Number with three significant digits.
 fn digits(x: f64) -> String {
     let size = x.abs();
     if size == 0.0 || !x.is_finite() {

@@ -1,14 +1,14 @@
-//! From linear radiance to what a display shows.
+//! Tone mapping: from linear radiance to 8-bit sRGB.
 
 use crate::image::Rgb;
 
-/// How values above the display's range are brought into it, per channel.
+/// Curve that brings values above the display's range into it, per channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Curve {
-    /// Clamp to [0, 1]: exact up to white. What the comparisons use.
+    /// Clamp to [0, 1]: exact up to white. Used by comparisons.
     Clamp,
     /// Exact up to [`SHOULDER`], then an exponential that reaches white at infinity, with a continuous slope: midtones
-    /// are as with [`Curve::Clamp`], highlights keep some drawing. What `croupier render` writes.
+    /// are as with [`Curve::Clamp`], highlights keep some contrast. Used by `croupier render`.
     #[default]
     Shoulder,
 }

@@ -1,7 +1,7 @@
 //! The program from outside: exit status, one clear line of error, JSON.
 
 use bytemuck::{Zeroable, bytes_of};
-use croupier::scene::blob::{self, ALIGN, Camera, Header, SceneInfo, Section, SectionKind};
+use croupier::unstable::scene::blob::{self, ALIGN, Camera, Header, SceneInfo, Section, SectionKind};
 use croupier_host::image::Picture;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -62,7 +62,7 @@ fn empty_scene(max_depth: u32) -> Vec<u8> {
     [bytes_of(&header), &rest].concat()
 }
 
-/// Dies if an argument goes unchecked: all of these are usage errors, status 2, before anything is read or written.
+/// Killed by: an argument that goes unchecked. All of these are usage errors, status 2, before anything is read or written.
 #[test]
 fn usage_errors_are_status_2() {
     let dir = tempfile::tempdir().unwrap();
@@ -103,7 +103,7 @@ fn usage_errors_are_status_2() {
     }
 }
 
-/// Dies if an error leaves out the file, or takes more than a line.
+/// Killed by: an error without its file, or of more than a line.
 #[test]
 fn runtime_errors_are_one_line_and_status_1() {
     let dir = tempfile::tempdir().unwrap();
@@ -132,7 +132,7 @@ fn runtime_errors_are_one_line_and_status_1() {
     assert!(!dir.join("new.crp").exists() && !dir.join("croupier.exr").exists());
 }
 
-/// Dies if a fact is wrong, or the blob changes on its way through the program.
+/// Killed by: a wrong fact, a blob that changes on its way through the program.
 #[test]
 fn info_and_bake_of_a_baked_scene() {
     let dir = tempfile::tempdir().unwrap();
@@ -157,9 +157,9 @@ fn info_and_bake_of_a_baked_scene() {
     assert_eq!(std::fs::read(dir.path().join("good.crp")).unwrap(), good);
 }
 
-/// Killed by: a limit of path segments that is kept a secret, or told to somebody who asked for fewer.
+/// Killed by: a limit of path segments without a note, or a note to somebody who asked for fewer.
 #[test]
-fn paths_shorter_than_asked_for_are_said() {
+fn paths_shorter_than_asked_for_are_noted() {
     let dir = tempfile::tempdir().unwrap();
     for (max_depth, limited) in [(200, false), (1000, true)] {
         std::fs::write(dir.path().join("deep.crp"), empty_scene(max_depth)).unwrap();
@@ -176,7 +176,7 @@ fn paths_shorter_than_asked_for_are_said() {
     }
 }
 
-/// A quad, a line, a triangle without area on a lamp and a smooth one with a normal of length 0, without a camera.
+/// A quad, a line, a triangle without area on an emitter and a smooth one with a normal of length 0, without a camera.
 const DOUBTFUL: &str = "mtllib doubtful.mtl
 v 0 0 0
 v 1 0 0
@@ -187,7 +187,7 @@ usemtl foggy
 f 1 2 3 4
 f 1//1 2//1 4//1
 l 1 2
-usemtl lamp
+usemtl emitter
 f 1 2 2
 ";
 
@@ -197,7 +197,7 @@ f 1 2 2
 fn notes_about_a_scene_are_printed() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let materials = "newmtl foggy\nKd 2 0 0\nd 0.75\nnewmtl lamp\nKe 1 1 1\n";
+    let materials = "newmtl foggy\nKd 2 0 0\nd 0.75\nnewmtl emitter\nKe 1 1 1\n";
     std::fs::write(dir.join("doubtful.obj"), DOUBTFUL).unwrap();
     std::fs::write(dir.join("doubtful.mtl"), materials).unwrap();
     let said = [
@@ -244,8 +244,8 @@ fn picture(level: f32, stderr: Option<f32>) -> Picture {
     picture
 }
 
-/// Standard errors come from where they lie: a layer of the image, a file beside the reference, an argument, seeds.
-/// Dies if one of these ways is not taken.
+/// Standard errors come from a layer of the image, a file beside the reference, an argument, or the spread of seeds.
+/// Killed by: one of these sources ignored.
 #[test]
 fn compare_finds_the_standard_errors() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,6 +1,7 @@
 //! The program's flags about learning, denoising, false colours and statistics, from outside.
 
-use croupier::{Scene, SettingRange, Settings};
+use croupier::unstable::SettingRange;
+use croupier::{Scene, Settings};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::builtin;
 use croupier_host::image::Picture;
@@ -48,7 +49,7 @@ fn without_a_command_the_built_in_scene_is_rendered_here() {
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
 }
 
-/// Killed by: a list of strategies in words, of which one is forgotten.
+/// Killed by: a strategy that the help leaves out.
 #[test]
 fn help_lists_every_strategy() {
     let dir = tempfile::tempdir().unwrap();
@@ -133,7 +134,7 @@ fn usage_errors_are_status_2() {
         (["--factors", "0.05:21"], "from 0.05 to 1 and from 1 to 20"),
         (["--factors", "1.1:2"], "from 0.05 to 1 and from 1 to 20"),
         (["--factors", "nan:2"], "from 0.05 to 1 and from 1 to 20"),
-        (["--estimate", "guessed"], "denoised or blocks"),
+        (["--pixel-estimator", "guessed"], "denoised or blocks"),
     ] {
         for command in ["render", "info"] {
             let out = croupier(dir.path(), &[&[command], &arguments[..]].concat());
@@ -145,7 +146,7 @@ fn usage_errors_are_status_2() {
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
 }
 
-/// What no flag tells alone is refused by the core, before there is a scene. Killed by: a check that waits for the
+/// Flags that do not fit together are refused before the scene is loaded. Killed by: a check that waits for the
 /// scene, or that takes other choices than the render does.
 #[test]
 fn flags_that_do_not_fit_together_are_status_1() {
@@ -268,14 +269,14 @@ fn everything_at_once() {
     assert_eq!(rgb("noisy.exr"), rgb("clean.exr"));
 
     let words = text(&render(dir, &["--rrs", "ears", "--spp", "4", "--stats", "-o", "w.exr"]).stdout);
-    let learned = ["looking up (about)", "entering samples (about)", "building the tree"];
+    let learned = ["looking up (approximate)", "recording samples (approximate)", "building the tree"];
     for part in ["paths per sample", "factor at first hit", "efficiency"].iter().chain(&learned) {
         assert!(words.contains(part), "{words}");
     }
     let crowded =
         ["--rrs", "ears", "--spp", "200", "--learn-samples", "64", "--stats", "--cache-bytes", "17KiB", "-o", "w.exr"];
     let words = text(&render(dir, &crowded).stdout);
-    assert!(words.contains(" splits refused so far for lack of room"), "{words}");
+    assert!(words.contains(" subdivisions refused so far for lack of memory"), "{words}");
 }
 
 /// Killed by: a flag that is read and forgotten, or taken for another.
@@ -300,12 +301,12 @@ fn every_flag_changes_the_picture() {
         &["--subdivide-count", "1000"],
         &["--decay", "0"],
         &["--factors", "1:1"],
-        &["--estimate", "blocks"],
+        &["--pixel-estimator", "blocks"],
     ];
     let mut found = Vec::new();
     let pictures = flags.map(|flags| {
         let more = ["--rrs", "ears", "--spp", "200", "-o", "f.exr", "--stats", "--json"];
-        // so few pixels teach too little otherwise
+        // with so few pixels there are too few samples to learn from otherwise
         let samples: &[&str] = if flags.contains(&"--learn-samples") { &[] } else { &["--learn-samples", "16"] };
         found.push(json(&render(dir.path(), &[&more, samples, flags].concat())));
         Picture::read_exr(&dir.path().join("f.exr")).unwrap().rgb("").unwrap()
@@ -333,7 +334,7 @@ fn every_flag_changes_the_picture() {
     let samples = of("--learn-samples");
     assert!(counter(samples, "samples_logged") < counter(base, "samples_logged") / 2, "{samples}");
     assert!(leaves(of("--subdivide-count")) > 2 * leaves(base));
-    // what the last iteration alone has given is not enough to divide as much
+    // the samples of the last iteration alone are too few to subdivide as much
     assert!(2 * leaves(of("--decay")) < leaves(base));
     let idle = of("--factors");
     assert!(
@@ -341,7 +342,7 @@ fn every_flag_changes_the_picture() {
         "{idle}"
     );
     // 140 bytes a pixel, or 12 for 64
-    let blocks = of("--estimate");
+    let blocks = of("--pixel-estimator");
     assert!((100..200).contains(&((learning(base) - learning(blocks)) / (24 * 20))), "{blocks}");
     let cache = of("--cache-bytes");
     assert!(learning(base) - learning(cache) > 23 << 20, "{cache}");
@@ -357,7 +358,7 @@ fn every_flag_changes_the_picture() {
 fn all_that_is_learned_fits_in_256_kib() {
     let dir = tempfile::tempdir().unwrap();
     let small =
-        ["--shards", "1", "--ring", "128", "--cache-bytes", "152KiB", "--ledger", "256", "--estimate", "blocks"];
+        ["--shards", "1", "--ring", "128", "--cache-bytes", "152KiB", "--ledger", "256", "--pixel-estimator", "blocks"];
     let size = ["--size", "96x80", "--rrs", "ears"];
     let run = |command: &str, more: &[&str]| croupier(dir.path(), &[&[command], &small[..], &size, more].concat());
     let found = json(&run("render", &["--spp", "32", "--threads", "1", "--json"]));
@@ -371,10 +372,10 @@ fn all_that_is_learned_fits_in_256_kib() {
     let mean = |i: usize| picture.pixels.iter().map(|p| f64::from(p[i])).sum::<f64>() / (96.0 * 80.0);
     assert!((0..3).all(|i| (0.01..10.0).contains(&mean(i))));
 
-    // told beforehand, and in words
+    // known before rendering, and as text
     assert_eq!(json(&run("info", &["--json"]))["plan"], *plan);
     let said = format!(
-        "{} bytes shared + 1 shards of {} bytes, {} bytes of it to learn",
+        "{} bytes shared + 1 shards of {} bytes, of which {} bytes for learning",
         bytes("shared_bytes"),
         bytes("shard_bytes"),
         bytes("learning_bytes")
@@ -382,7 +383,7 @@ fn all_that_is_learned_fits_in_256_kib() {
     for out in [run("info", &[]), run("render", &["--spp", "1"])] {
         assert!(text(&out.stdout).contains(&said), "{said}: {}", text(&out.stdout));
     }
-    // nothing to learn, nothing to pay
+    // nothing is learned
     let plain = json(&croupier(dir.path(), &["info", "--rrs", "classic", "--json"]));
     assert_eq!(plain["plan"]["learning_bytes"], 0);
 }

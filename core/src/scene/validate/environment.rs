@@ -5,8 +5,15 @@ use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError, SectionFault};
 use crate::scene::{Effects, Records};
 
+/// Effects of a sound environment, and whether it emits.
+#[derive(Default)]
+pub(super) struct Found {
+    pub effects: Effects,
+    pub emits: bool,
+}
+
 /// The environment, if any, and that its sections have the sizes it calls for.
-pub(super) fn environment(scene: &Records<'_>) -> Result<Effects, SceneError> {
+pub(super) fn environment(scene: &Records<'_>) -> Result<Found, SceneError> {
     let count = |kind, n: usize| SceneError::Section { kind, fault: SectionFault::Count(n as u64) };
     let (texels, tables) = (scene.env_texels.len(), scene.env_alias.len());
     let map = scene.environment.filter(|e| e.kind == EnvironmentKind::Map as u32);
@@ -16,17 +23,17 @@ pub(super) fn environment(scene: &Records<'_>) -> Result<Effects, SceneError> {
     if map.is_none() && tables != 0 {
         return Err(count(SectionKind::EnvAlias, tables));
     }
-    let Some(e) = scene.environment else { return Ok(Effects::default()) };
+    let Some(e) = scene.environment else { return Ok(Found::default()) };
     let at = Record { of: SectionKind::Environment, index: 0 };
-    if EnvironmentKind::from_u32(e.kind).is_none() {
-        return Err(SceneError::Kind { of: at.of, index: 0, found: e.kind });
-    }
+    let kind = EnvironmentKind::from_u32(e.kind);
+    let kind = kind.ok_or(SceneError::Kind { of: at.of, index: 0, found: e.kind })?;
+    let effects = Effects::of_environment(kind);
     if at.follow(SectionKind::Lights, e.light, scene.lights)?.kind != LightKind::Environment as u32 {
         return Err(at.wrong_reference(SectionKind::Lights, e.light, scene.lights.len()));
     }
     at.all_within(Field::Emission, &e.radiance, 0.0, MAX_EMISSION)?;
     if map.is_none() {
-        return Ok(Effects::CONSTANT);
+        return Ok(Found { effects, emits: e.radiance != [0.0; 3] });
     }
     rotation(at, e)?;
     at.side(Field::Width, e.width, 1)?;
@@ -36,7 +43,8 @@ pub(super) fn environment(scene: &Records<'_>) -> Result<Effects, SceneError> {
     if texels as u64 != width.saturating_mul(height) {
         return Err(count(SectionKind::EnvTexels, texels));
     }
-    let black = radiance(scene, e)?;
+    let brightest = radiance(scene, e)?;
+    let black = brightest == [0.0; 3];
     let full = rows.saturating_mul(width.saturating_add(1));
     if tables as u64 != full && !(black && tables == 0) {
         return Err(count(SectionKind::EnvAlias, tables));
@@ -44,7 +52,7 @@ pub(super) fn environment(scene: &Records<'_>) -> Result<Effects, SceneError> {
     if tables != 0 {
         self::tables(scene.env_alias, e)?;
     }
-    Ok(Effects::ENVIRONMENT)
+    Ok(Found { effects, emits: brightest.iter().zip(&e.radiance).any(|(texel, scale)| texel * scale > 0.0) })
 }
 
 /// Rows are unit and at right angles, within 2e-3.
@@ -57,17 +65,17 @@ fn rotation(at: Record, e: &Environment) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// Texels, and the brightest under the largest scale, are legal radiances. Are all of them 0?
-fn radiance(scene: &Records<'_>, e: &Environment) -> Result<bool, SceneError> {
-    let mut brightest = 0.0f32;
+/// Texels, and the brightest under the largest scale, are legal radiances. Returns the brightest of each channel.
+fn radiance(scene: &Records<'_>, e: &Environment) -> Result<[f32; 3], SceneError> {
+    let mut brightest = [0.0f32; 3];
     for (at, texel) in super::records(SectionKind::EnvTexels, scene.env_texels) {
         at.all_within(Field::Emission, texel, 0.0, MAX_EMISSION)?;
-        brightest = texel.iter().fold(brightest, |a, b| a.max(*b));
+        brightest.iter_mut().zip(texel).for_each(|(b, x)| *b = b.max(*x));
     }
-    let scale = e.radiance.iter().fold(0.0f32, |a, b| a.max(*b));
+    let largest = |rgb: &[f32; 3]| rgb.iter().fold(0.0f32, |a, b| a.max(*b));
     let at = Record { of: SectionKind::Environment, index: 0 };
-    at.within(Field::Emission, brightest * scale, 0.0, MAX_EMISSION)?;
-    Ok(brightest == 0.0)
+    at.within(Field::Emission, largest(&brightest) * largest(&e.radiance), 0.0, MAX_EMISSION)?;
+    Ok(brightest)
 }
 
 /// One table over the rows of cells, then one per row; rows that are never picked need only be well-formed.

@@ -5,61 +5,58 @@ use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError, SectionFault};
 use crate::scene::{Effects, Records};
 
-/// Every light, then the alias table. Triangles have been checked.
+/// Every light. Triangles have been checked.
 pub(super) fn lights(scene: &Records<'_>) -> Result<Effects, SceneError> {
     let mut effects = Effects::default();
-    let mut any = false;
     for (at, l) in records(SectionKind::Lights, scene.lights) {
         let kind = LightKind::from_u32(l.kind);
         let kind = kind.ok_or(SceneError::Kind { of: at.of, index: at.index(), found: l.kind })?;
-        at.zero(l.reserved == [0; 2])?;
-        at.within(Field::Probability, l.probability, 0.0, 1.0)?;
-        any |= l.probability > 0.0;
-        at.all_within(Field::Emission, &l.emission, 0.0, MAX_EMISSION)?;
+        at.zero(l.reserved == 0 && l.params.map(f32::to_bits) == [0; 6])?;
         at.finite(Field::Area, &[l.area])?;
         at.finite(Field::Direction, &l.vector)?;
-        match kind {
-            LightKind::Area => {
-                area(scene, at, l)?;
-                effects = effects.with(Effects::AREA_LIGHTS);
-            }
-            LightKind::Environment => {
-                // The one environment refers to it, so there is at most one such light.
-                if scene.environment.is_none_or(|e| e.light as usize != at.index) {
-                    return Err(at.wrong_reference(
-                        SectionKind::Environment,
-                        0,
-                        usize::from(scene.environment.is_some()),
-                    ));
-                }
-            }
-            LightKind::Point => {
-                at.position(&l.vector)?;
-                effects = effects.with(Effects::DELTA_LIGHTS);
-            }
-            LightKind::Directional => {
-                at.unit(l.vector)?;
-                effects = effects.with(Effects::DELTA_LIGHTS);
-            }
-        }
-    }
-    // Without a light to pick there is no table: picking from it would divide by a probability of 0.
-    if scene.light_alias.len() != if any { scene.lights.len() } else { 0 } {
-        let fault = SectionFault::Count(scene.light_alias.len() as u64);
-        return Err(SceneError::Section { kind: SectionKind::LightAlias, fault });
-    }
-    if any {
-        alias::well_formed(SectionKind::LightAlias, 0, scene.light_alias)?;
-        alias::consistent(SectionKind::LightAlias, 0, scene.light_alias)?;
-        // The same number twice: selection reads one, MIS the other.
-        for ((at, l), a) in records(SectionKind::Lights, scene.lights).zip(scene.light_alias) {
-            at.within(Field::Probability, l.probability, a.probability, a.probability)?;
+        field(scene, at, l, LightField::Emission)?;
+        kind.fields().iter().try_for_each(|f| field(scene, at, l, *f))?;
+        // The environment's own kind says what it calls for.
+        if !kind.fields().contains(&LightField::Environment) {
+            effects = effects.with(Effects::of_light(kind));
         }
     }
     Ok(effects)
 }
 
-/// An emitting triangle: both name each other, and area and emission are what a ray that hits it finds.
+/// One field of a light that uses it.
+fn field(scene: &Records<'_>, at: Record, l: &Light, field: LightField) -> Result<(), SceneError> {
+    match field {
+        LightField::Triangle => area(scene, at, l),
+        LightField::Environment => {
+            // The one environment refers to it, so there is at most one such light.
+            if scene.environment.is_some_and(|e| e.light as usize == at.index) {
+                return Ok(());
+            }
+            let there_are = usize::from(scene.environment.is_some());
+            Err(at.wrong_reference(SectionKind::Environment, 0, there_are))
+        }
+        LightField::Position => at.position(&l.vector),
+        LightField::Direction => at.unit(l.vector),
+        LightField::Emission => at.all_within(Field::Emission, &l.emission, 0.0, MAX_EMISSION),
+    }
+}
+
+/// The table that chooses among the lights; only where none emits may it be missing.
+pub(super) fn table(scene: &Records<'_>, environment_emits: bool) -> Result<(), SceneError> {
+    let (of, table) = (SectionKind::LightAlias, scene.light_alias);
+    let emits = environment_emits || scene.lights.iter().any(|l| l.emission != [0.0; 3]);
+    if table.is_empty() && !emits {
+        return Ok(());
+    }
+    if table.len() != scene.lights.len() {
+        return Err(SceneError::Section { kind: of, fault: SectionFault::Count(table.len() as u64) });
+    }
+    alias::well_formed(of, 0, table)?;
+    alias::consistent(of, 0, table)
+}
+
+/// An emitting triangle: both name each other, and the area is that of the triangle.
 fn area(scene: &Records<'_>, at: Record, l: &Light) -> Result<(), SceneError> {
     let t = at.follow(SectionKind::Triangles, l.triangle, scene.triangles)?;
     if t.light as usize != at.index {
@@ -75,9 +72,5 @@ fn area(scene: &Records<'_>, at: Record, l: &Light) -> Result<(), SceneError> {
     // (2 area)^2, so that no square root is needed: a relative 2e-3 here is 1e-3 of the area.
     let (stated, actual) = (4.0 * f64::from(l.area) * f64::from(l.area), dot64(normal, normal));
     at.within(Field::Area, l.area, f32::MIN_POSITIVE, f32::MAX)?;
-    if (stated - actual).abs() > 2e-3 * actual {
-        return Err(at.bad(Field::Area, l.area));
-    }
-    let m = at.follow(SectionKind::Materials, t.material, scene.materials)?;
-    m.emission.iter().zip(&l.emission).try_for_each(|(m, l)| at.within(Field::Emission, *l, *m, *m))
+    if (stated - actual).abs() <= 2e-3 * actual { Ok(()) } else { Err(at.bad(Field::Area, l.area)) }
 }

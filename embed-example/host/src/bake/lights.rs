@@ -5,8 +5,8 @@ use super::geometry::{Geometry, area};
 use crate::description::{Emitter, Environment, SceneDescription};
 use crate::{alias, environment};
 use bytemuck::Zeroable;
-use croupier::scene::blob::{self, Alias, EnvironmentKind, Light, LightKind};
-use croupier::scene::blob::{MAX_COORDINATE, MAX_EMISSION, MAX_SIDE};
+use croupier::unstable::scene::blob::{self, Alias, EnvironmentKind, Light, LightKind};
+use croupier::unstable::scene::blob::{MAX_COORDINATE, MAX_EMISSION, MAX_SIDE};
 use glam::Vec3;
 
 /// Sections of the blob.
@@ -65,9 +65,6 @@ pub(super) fn bake(
     }
     let weights = environment::light_weights(&out.lights, out.environment.first(), &out.env_texels, geometry.radius());
     out.alias = alias::build(&weights);
-    for (light, entry) in out.lights.iter_mut().zip(&out.alias) {
-        light.probability = entry.probability;
-    }
     Ok(out)
 }
 

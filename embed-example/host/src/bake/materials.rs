@@ -1,11 +1,10 @@
 //! Materials, the tables they share, textures.
 
 use super::BakeError;
-use crate::description::{Model, Reflectance, SceneDescription};
+use crate::description::{ModelParameters, Reflectance, SceneDescription};
 use crate::microfacet;
 use bytemuck::Zeroable;
-use croupier::scene::blob::{self, MATERIAL_TWO_SIDED, MaterialKind, NONE};
-use croupier::scene::blob::{ALPHA_RANGE, ETA_RANGE, MAX_CONDUCTOR, MAX_SIDE};
+use croupier::unstable::scene::blob::{self, MATERIAL_TWO_SIDED, MAX_SIDE, MIN_CONDUCTOR, NONE, Parameter};
 use std::collections::HashMap;
 
 /// Sections of the blob.
@@ -18,11 +17,13 @@ pub(super) struct Materials {
     pub names: Vec<u8>,
 }
 
-/// A material in the making; collects parameters, checks their ranges.
+/// A material in the making.
 struct Draft<'a> {
     name: &'a str,
     textures: usize,
     out: blob::Material,
+    /// int_ior / ext_ior in full precision, 0 without them.
+    eta: f64,
 }
 
 impl Draft<'_> {
@@ -33,10 +34,28 @@ impl Draft<'_> {
         Err(BakeError::Material { material: self.name.into(), what, found, range })
     }
 
-    fn reflectance(&mut self, r: Reflectance) -> Result<(), BakeError> {
+    /// Takes over a parameter that is not derived, within its range.
+    fn take(&mut self, parameter: Parameter, from: &ModelParameters) -> Result<(), BakeError> {
+        // a parameter that is missing is out of every range
+        let number = |x: Option<f32>| x.unwrap_or(f32::NAN);
+        let range = parameter.range();
+        match parameter {
+            Parameter::Reflectance => {
+                self.reflectance(from.reflectance.unwrap_or(Reflectance::Constant([f32::NAN; 3])), range)
+            }
+            Parameter::Alpha => self.within("alpha", number(from.alpha), range).map(|x| self.out.alpha = x),
+            Parameter::RelativeEta => self.relative_eta(number(from.int_ior), number(from.ext_ior), range),
+            Parameter::ComplexEta => {
+                self.complex_eta(from.eta.unwrap_or([f32::NAN; 3]), from.k.unwrap_or([f32::NAN; 3]), range)
+            }
+            Parameter::InternalReflectance | Parameter::TransmittanceTable => Ok(()),
+        }
+    }
+
+    fn reflectance(&mut self, r: Reflectance, range: [f32; 2]) -> Result<(), BakeError> {
         match r {
             Reflectance::Constant(rgb) => {
-                rgb.iter().try_for_each(|x| self.within("reflectance", *x, [0.0, 1.0]).map(|_| ()))?;
+                rgb.iter().try_for_each(|x| self.within("reflectance", *x, range).map(|_| ()))?;
                 self.out.reflectance = rgb;
             }
             Reflectance::Texture(found) if found as usize >= self.textures => {
@@ -51,101 +70,77 @@ impl Draft<'_> {
         Ok(())
     }
 
-    fn alpha(&mut self, alpha: f32) -> Result<(), BakeError> {
-        self.out.alpha = self.within("alpha", alpha, ALPHA_RANGE)?;
+    fn relative_eta(&mut self, int_ior: f32, ext_ior: f32, range: [f32; 2]) -> Result<(), BakeError> {
+        self.within("int_ior", int_ior, [f32::MIN_POSITIVE, f32::MAX])?;
+        self.within("ext_ior", ext_ior, [f32::MIN_POSITIVE, f32::MAX])?;
+        self.eta = f64::from(int_ior) / f64::from(ext_ior);
+        self.out.eta[0] = self.within("int_ior / ext_ior", self.eta as f32, range)?;
         Ok(())
     }
 
-    /// Returns int_ior / ext_ior in full precision.
-    fn eta(&mut self, int_ior: f32, ext_ior: f32) -> Result<f64, BakeError> {
-        let [lo, hi] = ETA_RANGE;
-        self.within("int_ior", int_ior, [f32::MIN_POSITIVE, f32::MAX])?;
-        self.within("ext_ior", ext_ior, [f32::MIN_POSITIVE, f32::MAX])?;
-        let eta = f64::from(int_ior) / f64::from(ext_ior);
-        self.out.eta[0] = self.within("int_ior / ext_ior", eta as f32, [lo, hi])?;
-        Ok(eta)
-    }
-
-    fn conductor(&mut self, eta: [f32; 3], k: [f32; 3]) -> Result<(), BakeError> {
+    fn complex_eta(&mut self, eta: [f32; 3], k: [f32; 3], range: [f32; 2]) -> Result<(), BakeError> {
         for (eta, k) in eta.into_iter().zip(k) {
-            self.within("eta", eta, [0.0, MAX_CONDUCTOR])?;
-            self.within("k", k, [0.0, MAX_CONDUCTOR])?;
-            // Both 0 has no Fresnel reflectance.
-            self.within("larger of eta and k", eta.max(k), [1e-4, MAX_CONDUCTOR])?;
+            self.within("eta", eta, range)?;
+            self.within("k", k, range)?;
+            self.within("larger of eta and k", eta.max(k), [MIN_CONDUCTOR, range[1]])?;
         }
         (self.out.eta, self.out.k) = (eta, k);
         Ok(())
     }
 }
 
-/// `emission` holds the radiance per material.
-pub(super) fn bake(scene: &SceneDescription, emission: &[[f32; 3]]) -> Result<Materials, BakeError> {
-    let mut out = Materials::default();
-    // Quadrature takes long; many materials of a scene have the same coat.
-    let mut rough_coats: HashMap<(u32, u64), (u32, f32)> = HashMap::new();
-    for (m, emission) in scene.materials.iter().zip(emission) {
-        let blank = blob::Material { texture: NONE, table: NONE, emission: *emission, ..Zeroable::zeroed() };
-        let mut d = Draft { name: &m.name, textures: scene.textures.len(), out: blank };
-        if let Some(r) = m.model.reflectance() {
-            d.reflectance(r)?;
+/// The tables of rough coats; quadrature takes long, and many materials of a scene have the same coat.
+#[derive(Default)]
+struct Coats {
+    tables: Vec<f32>,
+    /// First entry and internal reflectance by width and relative index.
+    known: HashMap<(u32, u64), (u32, f32)>,
+}
+
+impl Coats {
+    /// Derives what follows from the parameters that were taken over.
+    fn derive(&mut self, used: &[Parameter], d: &mut Draft<'_>) {
+        if used.contains(&Parameter::TransmittanceTable) {
+            let (alpha, eta, tables) = (d.out.alpha, d.eta, &mut self.tables);
+            let known = self.known.entry((alpha.to_bits(), eta.to_bits()));
+            (d.out.table, d.out.fdr) = *known.or_insert_with(|| {
+                let table = microfacet::rough_plastic(f64::from(alpha), eta);
+                let first = tables.len() as u32;
+                let [lo, hi] = Parameter::TransmittanceTable.range();
+                tables.extend(table.transmittance.map(|t| t.clamp(lo, hi)));
+                (first, inside(table.r))
+            });
+        } else if used.contains(&Parameter::InternalReflectance) {
+            d.out.fdr = inside(microfacet::diffuse_fresnel_inside(d.eta));
         }
-        let kind = match m.model {
-            Model::Diffuse { .. } => MaterialKind::Diffuse,
-            Model::Mirror { .. } => MaterialKind::Mirror,
-            Model::Conductor { eta, k, .. } => {
-                d.conductor(eta, k)?;
-                MaterialKind::Conductor
-            }
-            Model::RoughConductor { eta, k, alpha, .. } => {
-                d.conductor(eta, k)?;
-                d.alpha(alpha)?;
-                MaterialKind::RoughConductor
-            }
-            Model::Dielectric { int_ior, ext_ior } => {
-                d.eta(int_ior, ext_ior)?;
-                MaterialKind::Dielectric
-            }
-            Model::RoughDielectric { int_ior, ext_ior, alpha } => {
-                d.eta(int_ior, ext_ior)?;
-                d.alpha(alpha)?;
-                MaterialKind::RoughDielectric
-            }
-            Model::ThinDielectric { int_ior, ext_ior } => {
-                d.eta(int_ior, ext_ior)?;
-                MaterialKind::ThinDielectric
-            }
-            Model::Plastic { int_ior, ext_ior, .. } => {
-                let eta = d.eta(int_ior, ext_ior)?;
-                d.out.fdr = inside(microfacet::diffuse_fresnel_inside(eta));
-                MaterialKind::Plastic
-            }
-            Model::RoughPlastic { int_ior, ext_ior, alpha, .. } => {
-                let eta = d.eta(int_ior, ext_ior)?;
-                d.alpha(alpha)?;
-                let (table, fdr) = *rough_coats.entry((alpha.to_bits(), eta.to_bits())).or_insert_with(|| {
-                    let table = microfacet::rough_plastic(f64::from(alpha), eta);
-                    let first = out.tables.len() as u32;
-                    out.tables.extend(table.transmittance.map(|t| t.clamp(0.0, 1.0)));
-                    (first, inside(table.r))
-                });
-                (d.out.table, d.out.fdr) = (table, fdr);
-                MaterialKind::RoughPlastic
-            }
-            Model::Null => MaterialKind::Null,
-        };
-        d.out.kind = kind as u32;
-        d.out.flags = if m.two_sided && !m.model.is_transmissive() { MATERIAL_TWO_SIDED } else { 0 };
-        out.materials.push(d.out);
+    }
+}
+
+/// Materials, tables, textures and names.
+pub(super) fn bake(scene: &SceneDescription) -> Result<Materials, BakeError> {
+    let mut out = Materials::default();
+    let mut coats = Coats::default();
+    for m in &scene.materials {
+        let (kind, parameters) = (m.model.kind(), m.model.parameters());
+        let facts = kind.facts();
+        let flags = if m.two_sided && !facts.transmissive { MATERIAL_TWO_SIDED } else { 0 };
+        let blank = blob::Material { kind: kind as u32, flags, texture: NONE, table: NONE, ..Zeroable::zeroed() };
+        let mut draft = Draft { name: &m.name, textures: scene.textures.len(), out: blank, eta: 0.0 };
+        facts.parameters.iter().try_for_each(|p| draft.take(*p, &parameters))?;
+        coats.derive(facts.parameters, &mut draft);
+        out.materials.push(draft.out);
         out.names.extend(m.name.bytes().map(|b| if b == b'\n' { b' ' } else { b }));
         out.names.push(b'\n');
     }
+    out.tables = coats.tables;
     textures(scene, &mut out)?;
     Ok(out)
 }
 
 /// Internal reflectance stays below 1, so that the series of internal reflections converges.
 fn inside(r: f32) -> f32 {
-    r.clamp(0.0, 1.0 - f32::EPSILON)
+    let [lo, hi] = Parameter::InternalReflectance.range();
+    r.clamp(lo, hi)
 }
 
 fn textures(scene: &SceneDescription, out: &mut Materials) -> Result<(), BakeError> {

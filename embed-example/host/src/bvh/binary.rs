@@ -1,6 +1,5 @@
 //! The binary tree: boxes over single triangles or few of them.
 
-use super::Effort;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -8,19 +7,31 @@ use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
-/// A box.
+/// Effort of building a tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Effort {
+    /// Previews: fewest passes.
+    Fast,
+    /// Close to the best tree in a fraction of its time.
+    #[default]
+    Medium,
+    /// The best tree: for scenes that are baked once and rendered often.
+    Slow,
+}
+
+/// Axis-aligned box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bounds {
-    pub min: [f32; 3],
-    pub max: [f32; 3],
+    pub(super) min: [f32; 3],
+    pub(super) max: [f32; 3],
 }
 
 impl Bounds {
-    /// Holds nothing.
-    pub const EMPTY: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
+    /// Empty box.
+    pub(super) const EMPTY: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
 
     /// The box of a triangle; exact.
-    pub fn of(triangle: &[[f32; 3]; 3]) -> Self {
+    pub(super) fn of(triangle: &[[f32; 3]; 3]) -> Self {
         let mut b = Self::EMPTY;
         for p in triangle {
             b = b.with(&Self { min: *p, max: *p });
@@ -29,7 +40,7 @@ impl Bounds {
     }
 
     /// The box of both; exact.
-    pub fn with(&self, o: &Self) -> Self {
+    pub(super) fn with(&self, o: &Self) -> Self {
         let mut b = *self;
         for k in 0..3 {
             b.min[k] = b.min[k].min(o.min[k]);
@@ -39,7 +50,7 @@ impl Bounds {
     }
 
     /// Half the surface area, finite for finite boxes.
-    pub fn half_area(&self) -> f64 {
+    pub(super) fn half_area(&self) -> f64 {
         let e = [0, 1, 2].map(|k| (f64::from(self.max[k]) - f64::from(self.min[k])).max(0.0));
         e[0] * e[1] + e[1] * e[2] + e[2] * e[0]
     }
@@ -48,11 +59,11 @@ impl Bounds {
 /// A node: two children that follow each other, or one triangle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Binary {
-    pub bounds: Bounds,
+    pub(super) bounds: Bounds,
     /// First child, or the triangle.
-    pub index: u32,
+    pub(super) index: u32,
     /// Is it a triangle?
-    pub leaf: bool,
+    pub(super) leaf: bool,
 }
 
 /// Binary tree over the finite triangles, root first, children after their parents; empty without triangles.

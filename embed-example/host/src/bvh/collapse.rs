@@ -4,10 +4,9 @@
 //! `cost[i][j]` is the least cost of the subtree i as at most j siblings: one wide node or leaf (j = 1), or its
 //! children with k and j - k of them.
 
-use super::Tree;
 use super::binary::{Binary, Bounds};
 use bytemuck::Zeroable;
-use croupier::scene::blob::{LEAF_BIT, Leaf, MAX_TREE_DEPTH, NONE, Node};
+use croupier::unstable::scene::blob::{LEAF_BIT, Leaf, MAX_TREE_DEPTH, NONE, Node};
 
 /// Cost of a visited node per half area; measured, in units of a leaf's eight-triangle test.
 const NODE_COST: f32 = 1.0;
@@ -16,7 +15,19 @@ const LEAF_COST: f32 = 1.0;
 /// Triangles in a leaf, children of a node.
 const WIDTH: usize = 8;
 
-/// What the dynamic programme decided for one binary node.
+/// An 8-wide tree over triangles.
+#[derive(Clone, Debug, Default)]
+pub struct Tree {
+    /// Nodes, the root first; empty if there are no triangles.
+    pub nodes: Vec<Node>,
+    /// Leaves; every triangle is in exactly one.
+    pub leaves: Vec<Leaf>,
+    /// Levels of nodes: 1 if the root has only leaves, 0 without triangles. At most
+    /// [`MAX_TREE_DEPTH`].
+    pub depth: u32,
+}
+
+/// Decision of the dynamic programme for one binary node.
 #[derive(Clone, Copy)]
 struct Plan {
     /// Least cost as at most j + 1 siblings.
@@ -107,7 +118,7 @@ fn wide_children(tree: &[Binary], plans: &[Plan], i: usize, out: &mut Vec<usize>
     }
 }
 
-/// What becomes of a subtree.
+/// Source of a wide node's children.
 enum Source {
     /// As planned.
     Binary(usize),

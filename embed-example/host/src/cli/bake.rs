@@ -1,7 +1,9 @@
 //! `croupier bake`
 
-use super::notes::Notes;
-use super::{Outcome, say, say_json, scene};
+use super::console::{Outcome, say, say_json};
+use super::notes::{Notes, about};
+use super::scene;
+use super::values::crp_path;
 use croupier::Scene;
 use croupier_host::image::{ImageError, write_whole};
 use serde::Serialize;
@@ -9,7 +11,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Folder with scene.json, or .obj file
     scene: PathBuf,
     /// Where the baked scene goes. Programs map this file into memory: replace it by another `bake`, never edit it in
@@ -33,10 +35,10 @@ struct Report<'a> {
 }
 
 /// Runs the command.
-pub fn run(args: &Args) -> Outcome {
+pub(crate) fn run(args: &Args) -> Outcome {
     super::output::writable(&args.output)?;
     let (bytes, notes) = scene::open(Some(&args.scene))?;
-    let scene = Scene::from_bytes(&bytes).map_err(|e| scene::about(Some(&args.scene))(&e))?;
+    let scene = Scene::from_bytes(&bytes).map_err(|e| about(Some(&args.scene))(&e))?;
     write_whole(&args.output, |out| out.write_all(&bytes).map_err(|e| ImageError::Write(args.output.clone(), e)))?;
     let (triangles, dropped_triangles) = (scene.triangles.len(), scene.info.dropped_triangles);
     let hash = format!("{:016x}", scene.hash);
@@ -55,13 +57,4 @@ pub fn run(args: &Args) -> Outcome {
         n => format!(" ({n} degenerate ones dropped)"),
     };
     say(&format!("wrote {}: {triangles} triangles{dropped}, {} bytes", args.output.display(), bytes.len()))
-}
-
-fn crp_path(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")) {
-        Ok(path)
-    } else {
-        Err("the name must end in .crp".into())
-    }
 }

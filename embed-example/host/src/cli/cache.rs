@@ -1,47 +1,34 @@
 //! Flags of saved statistics.
 
-use croupier::learn::cache::CacheError;
-use croupier::rrs::Space;
-use croupier_host::drive::DriveError;
-use croupier_host::render::RenderOptions;
+use croupier_host::render::{RenderError, RenderOptions};
 use std::error::Error;
 use std::path::PathBuf;
 
-/// Flags about saved statistics.
+/// Flags of saved statistics.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Learning")]
-pub struct CacheFlags {
+pub(crate) struct CacheFlags {
     /// Begin with statistics that a render of this scene with the same objective has saved
     #[arg(long, value_name = "FILE")]
     cache_in: Option<PathBuf>,
-    /// Save the statistics of the scene in the end
+    /// Save the statistics of the scene when the render has ended
     #[arg(long, value_name = "FILE")]
-    pub cache_out: Option<PathBuf>,
+    pub(crate) cache_out: Option<PathBuf>,
 }
 
 impl CacheFlags {
-    /// Puts them into `options`, whose strategy is known, and reads the saved statistics.
-    pub fn apply(&self, options: &mut RenderOptions) -> Result<(), Box<dyn Error>> {
-        let strategy = options.settings.strategy;
-        let caches = self.cache_in.is_some() || self.cache_out.is_some();
-        // Said before the scene is loaded.
-        if caches && strategy.space() != Some(Space::Scene) {
-            return Err(DriveError::NoCache(strategy.name()).into());
-        }
+    /// Puts the flags into `options`, and reads the saved statistics.
+    pub(crate) fn apply(&self, options: &mut RenderOptions) -> Result<(), Box<dyn Error>> {
         let read = |p: &PathBuf| std::fs::read(p).map_err(|e| format!("cannot read {}: {e}", p.display()));
         options.cache = self.cache_in.as_ref().map(read).transpose()?;
         options.save_cache = self.cache_out.is_some();
         Ok(())
     }
 
-    /// Is this error about the saved statistics? Then with the name of their file, and what to do.
-    pub fn about(&self, e: &DriveError) -> Option<String> {
-        match (e, &self.cache_in) {
-            (DriveError::Cache(CacheError::Full { .. }), Some(path)) => {
-                Some(format!("{}: {e}; give more --cache-bytes", path.display()))
-            }
-            (DriveError::Cache(_), Some(path)) => Some(format!("{}: {e}", path.display())),
-            _ => None,
-        }
+    /// Text of an error that is about the saved statistics: with the name of their file, and what to do.
+    pub(crate) fn about(&self, e: &RenderError) -> Option<String> {
+        let path = self.cache_in.as_ref().filter(|_| e.is_about_cache())?.display();
+        let hint = if e.calls_for_cache_bytes() { "; give more --cache-bytes" } else { "" };
+        Some(format!("{path}: {e}{hint}"))
     }
 }

@@ -1,17 +1,18 @@
 //! `croupier compare`
 
-use super::{Outcome, say, say_json};
+use super::console::{Outcome, say, say_json};
+use super::values::stops;
 use croupier_host::compare::{Bias, CompareOptions, Comparison, ImageMean, Inputs, compare};
 use croupier_host::image::{ImageError, Picture, Rgb};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// EXR image
     image: PathBuf,
     /// EXR reference of the same size
     reference: PathBuf,
-    /// Another image that differs from IMAGE in its seed only; give several for standard errors from their spread
+    /// Another image that differs from IMAGE in its seed only; may be repeated, standard errors come from their spread
     #[arg(long = "seed-image", value_name = "FILE")]
     seed_images: Vec<PathBuf>,
     /// Standard error of IMAGE per pixel; its own layer `stderr` if absent
@@ -23,19 +24,19 @@ pub struct Args {
     /// Keep the worst 0.01 % of the pixels in relMSE
     #[arg(long)]
     keep_outliers: bool,
-    /// Stops of exposure for FLIP
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = super::stops, allow_negative_numbers = true)]
+    /// Exposure of FLIP in stops, -100 to 100
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = stops, allow_negative_numbers = true)]
     exposure: f32,
     /// Print the figures as one line of JSON
     #[arg(long)]
     json: bool,
 }
 
-/// Blocks with a large score that the text output lists; JSON has them all.
+/// Most blocks beyond 6 that the text output lists; JSON has them all.
 const LISTED: usize = 10;
 
 /// Runs the command.
-pub fn run(args: &Args) -> Outcome {
+pub(crate) fn run(args: &Args) -> Outcome {
     let (image, image_stderr) = read(&args.image, args.stderr_image.as_deref())?;
     let (reference, mut reference_stderr) = read(&args.reference, args.stderr_reference.as_deref())?;
     if reference_stderr.is_none() {
@@ -61,7 +62,7 @@ pub fn run(args: &Args) -> Outcome {
     if args.json { say_json(&found) } else { print(&found, reference_stderr.is_some()) }
 }
 
-/// The picture of a file and its standard error: from `stderr`, else from a layer of that name in the same file.
+/// Picture of a file and its standard error: from `stderr`, else from a layer of that name in the same file.
 fn read(path: &Path, stderr: Option<&Path>) -> Result<(Rgb, Option<Rgb>), ImageError> {
     let picture = Picture::read_exr(path)?;
     let main = picture.main().ok_or_else(|| ImageError::NoRgb(path.into()))?;

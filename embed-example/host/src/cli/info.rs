@@ -1,16 +1,17 @@
 //! `croupier info`
 
-use super::notes::Notes;
+use super::console::{Outcome, say, say_json};
+use super::notes::{Notes, about};
+use super::scene;
 use super::settings::SettingsFlags;
-use super::{Outcome, say, say_json, scene};
-use croupier::scene::Effects;
-use croupier::{MAX_PATH_LENGTH, Scene, SceneError};
+use croupier::unstable::{Effects, MAX_PATH_LENGTH};
+use croupier::{Scene, SceneError};
 use croupier_host::render::{PlanSummary, RenderOptions, check, plan};
 use serde::Serialize;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Folder with scene.json, .obj file, or baked .crp file; the built-in Cornell box if absent
     scene: Option<PathBuf>,
     /// Print the facts as one line of JSON
@@ -36,11 +37,11 @@ struct Facts {
     lights: usize,
     bounds: [[f32; 3]; 2],
     size: [u32; 2],
-    /// The scene's own number, and the most segments that a path gets.
+    /// Path segments that the scene asks for, and the most that a path gets.
     max_depth: u32,
     longest_path: u32,
     effects: Vec<&'static str>,
-    /// Absent in builds that cannot render.
+    /// Memory of a render; absent in builds that cannot render.
     plan: Option<PlanSummary>,
     #[serde(flatten)]
     notes: Notes,
@@ -74,13 +75,13 @@ impl Facts {
 }
 
 /// Runs the command.
-pub fn run(args: &Args) -> Outcome {
+pub(crate) fn run(args: &Args) -> Outcome {
     let path = args.scene.as_deref();
     let options = args.settings.options()?;
     // Said before the scene is loaded.
     check(&options)?;
     let (bytes, notes) = scene::open(path)?;
-    let f = Facts::of(&bytes, &options, notes).map_err(|e| scene::about(path)(&e))?;
+    let f = Facts::of(&bytes, &options, notes).map_err(|e| about(path)(&e))?;
     if args.json {
         return say_json(&f);
     }

@@ -1,27 +1,29 @@
-//! What loading and baking assumed, ignored or left out: printed on stderr, and part of every JSON report about a
-//! scene.
+//! Notes on what loading and baking assumed, ignored or left out: printed on stderr, and part of every JSON report
+//! about a scene.
 
-use super::scene::about;
+use super::console::note;
 use croupier_host::bake::BakeReport;
 use croupier_host::load::LoadReport;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::Path;
 
-/// Notes that are printed; JSON has them all.
+/// Most notes that are printed; JSON has them all.
 const PRINTED: usize = 20;
 
-/// One sentence each, and how many of what. Nothing is known of a baked file: it was said when the file was baked.
+/// Notes of one sentence each, and counts by name. There are none about a baked file: they were printed when it was
+/// baked.
 #[derive(Debug, Default, Serialize)]
-pub struct Notes {
+pub(crate) struct Notes {
     notes: Vec<String>,
-    /// By name; only those that are there.
+    /// Counts above 0, by name.
     scene_counts: BTreeMap<&'static str, u32>,
 }
 
 impl Notes {
-    /// Of a scene that was loaded and baked just now.
-    pub fn of(load: &LoadReport, bake: &BakeReport) -> Self {
+    /// Notes of a scene that was loaded and baked just now.
+    pub(crate) fn of(load: &LoadReport, bake: &BakeReport) -> Self {
         let counts = [
             ("split_polygons", "faces of more than three corners, split into triangles", load.polygons),
             ("skipped_elements", "points and lines, left out", load.skipped_elements),
@@ -37,17 +39,25 @@ impl Notes {
         all
     }
 
-    /// Adds one, and prints it.
-    pub fn add(&mut self, path: Option<&Path>, text: String) {
-        super::note(&about(path)(&text));
+    /// Adds a note, and prints it.
+    pub(crate) fn add(&mut self, path: Option<&Path>, text: String) {
+        note(&about(path)(&text));
         self.notes.push(text);
     }
 
-    /// Prints them, with the scene's name in front.
-    pub fn print(&self, path: Option<&Path>) {
-        self.notes.iter().take(PRINTED).for_each(|text| super::note(&about(path)(text)));
+    /// Prints all notes, with the scene's name in front.
+    pub(crate) fn print(&self, path: Option<&Path>) {
+        self.notes.iter().take(PRINTED).for_each(|text| note(&about(path)(text)));
         if let Some(more @ 1..) = self.notes.len().checked_sub(PRINTED) {
-            super::note(&about(path)(&format!("... and {more} more notes; --json has them all")));
+            note(&about(path)(&format!("... and {more} more notes; --json has them all")));
         }
+    }
+}
+
+/// Puts the scene's name in front of an error or a note about its content.
+pub(crate) fn about<'a>(path: Option<&'a Path>) -> impl Fn(&dyn Display) -> String + 'a {
+    move |e| match path {
+        Some(path) => format!("{}: {e}", path.display()),
+        None => format!("built-in scene: {e}"),
     }
 }

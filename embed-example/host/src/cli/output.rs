@@ -1,5 +1,5 @@
-//! The files of a render: checked before it begins, and every one of them written when it has ended, whatever happens
-//! to the others. An hour of rendering must not be lost to a full disk or a mistyped name.
+//! Files of a render: checked before it begins, and every one of them written when it has ended, whatever happens to
+//! the others. An hour of rendering must not be lost to a full disk or a mistyped name.
 
 use croupier_host::false_color::{Scale, draw};
 use croupier_host::image::{ImageError, Picture, part_name, write_png, write_whole};
@@ -18,26 +18,26 @@ const FALSE_COLOR: [(&str, &str); 6] = [
     ("paths", "paths"),
 ];
 
-/// Where everything goes.
+/// Paths of all files of a render.
 #[derive(Debug)]
-pub struct Outputs<'a> {
-    /// All layers.
-    pub exr: &'a Path,
-    /// The tone-mapped picture, beside the EXR.
-    pub png: PathBuf,
-    /// What was learned, if asked for.
-    pub cache: Option<&'a Path>,
-    /// A picture for each of [`FALSE_COLOR`], or nothing.
-    pub false_color: Vec<PathBuf>,
+pub(crate) struct Outputs<'a> {
+    /// EXR file with all layers.
+    pub(crate) exr: &'a Path,
+    /// Tone-mapped picture, beside the EXR.
+    pub(crate) png: PathBuf,
+    /// Saved cache, if asked for.
+    pub(crate) cache: Option<&'a Path>,
+    /// Pictures of the layers in [`FALSE_COLOR`], if asked for.
+    pub(crate) false_color: Vec<PathBuf>,
 }
 
-/// What became of them.
+/// Files that were written, and the first error.
 #[derive(Debug, Default)]
-pub struct Written {
-    /// Files that are complete, in the order in which they were written.
-    pub files: Vec<PathBuf>,
-    /// Why the first of the others is not.
-    pub error: Option<ImageError>,
+pub(crate) struct Written {
+    /// Complete files, in the order in which they were written.
+    pub(crate) files: Vec<PathBuf>,
+    /// Error of the first file that is not complete.
+    pub(crate) error: Option<ImageError>,
 }
 
 impl Written {
@@ -51,14 +51,14 @@ impl Written {
 
 impl<'a> Outputs<'a> {
     /// Names of all files.
-    pub fn new(exr: &'a Path, cache: Option<&'a Path>, false_color: bool) -> Self {
+    pub(crate) fn new(exr: &'a Path, cache: Option<&'a Path>, false_color: bool) -> Self {
         let drawings = FALSE_COLOR.iter().filter(|_| false_color);
         let false_color = drawings.map(|(layer, _)| exr.with_extension(format!("{layer}.png"))).collect();
         Self { exr, png: exr.with_extension("png"), cache, false_color }
     }
 
-    /// Fails unless all of them can be written, none over another.
-    pub fn check(&self) -> Result<(), String> {
+    /// Checks that all files can be written, none over another.
+    pub(crate) fn check(&self) -> Result<(), String> {
         let pictures = [self.exr, &self.png].into_iter().chain(self.false_color.iter().map(PathBuf::as_path));
         if let Some(cache) = self.cache.filter(|c| pictures.clone().any(|p| p == *c)) {
             return Err(format!("cannot write {}: a picture and the statistics cannot share it", cache.display()));
@@ -67,7 +67,7 @@ impl<'a> Outputs<'a> {
     }
 
     /// Writes everything: the PNG and the false colours are made from `picture`. `image` names the layer of the PNG.
-    pub fn write(&self, picture: &Picture, cache: Option<&[u8]>, image: &str, exposure: f32) -> Written {
+    pub(crate) fn write(&self, picture: &Picture, cache: Option<&[u8]>, image: &str, exposure: f32) -> Written {
         let mut written = Written::default();
         written.add(self.exr, picture.write_exr(self.exr));
         if let Some((path, bytes)) = self.cache.zip(cache) {
@@ -91,8 +91,8 @@ impl<'a> Outputs<'a> {
     }
 }
 
-/// Fails unless a file of this name can be written: makes and removes the temporary one that comes first.
-pub fn writable(path: &Path) -> Result<(), String> {
+/// Checks that a file of this name can be written: makes and removes the temporary file that is written first.
+pub(crate) fn writable(path: &Path) -> Result<(), String> {
     let failed = |why: &dyn std::fmt::Display| format!("cannot write {}: {why}", path.display());
     if path.is_dir() {
         return Err(failed(&"it is a folder"));
@@ -108,7 +108,7 @@ pub fn writable(path: &Path) -> Result<(), String> {
 mod tests {
     use super::*;
 
-    /// Folders that vanish while a render runs take nothing else with them. Killed by: giving up at the first error,
+    /// A folder that vanishes while a render runs costs no other file. Killed by: giving up at the first error,
     /// returning the last one or none, leaving out a file that could be written.
     #[test]
     fn one_error_does_not_stop_the_rest() {

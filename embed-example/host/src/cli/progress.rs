@@ -16,17 +16,16 @@ fn styled(bar: ProgressBar, template: &str) -> ProgressBar {
     bar
 }
 
-/// Shows what baking is at and for how long it has been baking: nobody knows for how long it will. Disappears when
-/// dropped.
-pub struct Baking(ProgressBar);
+/// Stage and elapsed time of baking, whose end cannot be predicted. Disappears when dropped.
+pub(crate) struct Baking(ProgressBar);
 
 impl Baking {
-    pub fn start() -> Self {
+    pub(crate) fn start() -> Self {
         Self(styled(ProgressBar::new_spinner(), "baking {spinner} {elapsed}  {msg}"))
     }
 
-    /// `stage` begins or ends.
-    pub fn show(&self, stage: Stage) {
+    /// Shows that `stage` begins or ends.
+    pub(crate) fn show(&self, stage: Stage) {
         self.0.set_message(stage.name());
     }
 }
@@ -37,17 +36,17 @@ impl Drop for Baking {
     }
 }
 
-/// Shows the error so far and the time left, and ends the render on Ctrl-C.
-pub struct Rendering {
+/// Progress bar of a render with its error estimate and the time left. Ends the render on Ctrl-C.
+pub(crate) struct Rendering {
     bar: ProgressBar,
     target: Target,
 }
 
-/// Set by Ctrl-C. A second one ends the program at once.
+/// Whether Ctrl-C was pressed. A second one ends the program at once.
 static STOP: AtomicBool = AtomicBool::new(false);
 
 impl Rendering {
-    pub fn start(target: Target) -> Self {
+    pub(crate) fn start(target: Target) -> Self {
         // Fails only if a handler is there already; then that one decides.
         let _ = ctrlc::set_handler(|| {
             if STOP.swap(true, Ordering::Relaxed) {
@@ -85,7 +84,7 @@ fn message(p: &Progress, left: Option<f64>) -> String {
     format!("{:.0} spp, relMSE {error}, {speed:.1} Mrays/s, {left} left", p.spp)
 }
 
-/// `42 s`, `3:05 min`, `2:07 h`.
+/// Duration as in `42 s`, `3:05 min`, `2:07 h`.
 fn duration(seconds: f64) -> String {
     let s = seconds.ceil() as u64;
     match s {
@@ -99,7 +98,7 @@ fn duration(seconds: f64) -> String {
 mod tests {
     use super::*;
 
-    /// Dies if the error is taken to fall as 1 / sqrt(work), or a stop watch shows NaN at the start.
+    /// Killed by: an error that falls as 1 / sqrt(work), a time left of NaN at the start.
     #[test]
     fn time_left() {
         let p = Progress { spp: 16.0, rays: 1_000_000, seconds: 10.0, relmse_estimate: Some(0.04) };

@@ -1,12 +1,15 @@
 //! `croupier render`
 
 use super::cache::CacheFlags;
-use super::notes::Notes;
+use super::console::{Outcome, say, say_json};
+use super::notes::{Notes, about};
 use super::output::Outputs;
 use super::progress::Rendering;
+use super::scene;
 use super::settings::SettingsFlags;
-use super::{Outcome, say, say_json, scene};
-use croupier::{MAX_PATH_LENGTH, Scene};
+use super::values::{exr_path, positive, stops};
+use croupier::Scene;
+use croupier::unstable::MAX_PATH_LENGTH;
 use croupier_host::render::{PlanSummary, RenderOptions, RenderResult, RenderStats, Target, check, render_scene};
 use croupier_host::statistics::Statistics;
 use serde::Serialize;
@@ -14,37 +17,37 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Folder with scene.json, .obj file, or baked .crp file; the built-in Cornell box if absent
-    pub scene: Option<PathBuf>,
+    pub(crate) scene: Option<PathBuf>,
     #[command(flatten)]
-    pub flags: Flags,
+    pub(crate) flags: Flags,
 }
 
-/// How to render and where to put it.
+/// Flags of a render.
 #[derive(clap::Args)]
-pub struct Flags {
-    /// Where the picture goes; a tone-mapped PNG goes beside it
+pub(crate) struct Flags {
+    /// EXR file of the picture; a tone-mapped PNG is written beside it
     #[arg(short, long, value_name = "FILE", default_value = "croupier.exr", value_parser = exr_path)]
     output: PathBuf,
     #[command(flatten)]
     settings: SettingsFlags,
     #[command(flatten)]
     until: Until,
-    /// Threads, 0 for one per processor; the image does not depend on them
+    /// Threads, 0 for one per processor; the image does not depend on their number
     #[arg(long, value_name = "N", default_value_t = RenderOptions::default().threads)]
     threads: usize,
-    /// Stops of exposure for the PNG; 0 if absent, 1 for the built-in scene
-    #[arg(long, value_name = "STOPS", value_parser = super::stops, allow_negative_numbers = true)]
+    /// Exposure of the PNG in stops, -100 to 100; 0 if absent, 1 for the built-in scene
+    #[arg(long, value_name = "STOPS", value_parser = stops, allow_negative_numbers = true)]
     exposure: Option<f32>,
-    /// Add the denoised picture as layer `denoised`, and make the PNG from it
+    /// Add the denoised picture as layer `denoised`, and tone-map it for the PNG
     #[arg(long)]
     denoise: bool,
-    /// Also write roulette factors, costs and paths as pictures with legends: NAME.factor1.png to NAME.factor4.png,
-    /// NAME.cost.png, NAME.paths.png
+    /// Also write roulette factors, rays per sample and paths per sample as false-colour pictures with legends:
+    /// NAME.factor1.png to NAME.factor4.png, NAME.cost.png, NAME.paths.png
     #[arg(long)]
     false_color: bool,
-    /// Print what paths, iterations and learning took
+    /// Print statistics of paths, iterations and time
     #[arg(long)]
     stats: bool,
     /// Print the figures as one line of JSON
@@ -55,21 +58,24 @@ pub struct Flags {
     cache: CacheFlags,
 }
 
-/// When to stop; 64 samples per pixel if nothing is given.
+/// Stop condition; 64 samples per pixel if none is given.
 #[derive(clap::Args)]
 #[group(multiple = false)]
 struct Until {
-    /// Stop after this many samples per pixel
+    /// Stop after this many samples per pixel, at least 1 [default: 64]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
-    /// Stop after this time, loading and writing not counted: no iteration begins that would pass it at the speed so
-    /// far, one that has begun is finished, and the first, a sample per pixel, is rendered in any case
+    /// Stop after this many seconds of rendering, above 0, without loading and writing: no iteration begins that would
+    /// pass them at the speed so far, one that has begun is finished, and the first, a sample per pixel, is rendered in
+    /// any case
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     seconds: Option<f64>,
-    /// Stop after this many rays: no iteration begins that would pass them at the cost so far, but for the first
+    /// Stop after this many rays of all kinds, at least 1: no iteration but the first begins that would pass them at
+    /// the cost so far
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     rays: Option<u64>,
-    /// Stop after the iteration that brings the estimated relMSE to this, with 4 samples per pixel at least
+    /// Stop after the iteration that brings the estimated relMSE down to this, above 0, with 4 samples per pixel at
+    /// least
     #[arg(long, value_name = "E", value_parser = positive, allow_negative_numbers = true)]
     until_error: Option<f64>,
 }
@@ -83,7 +89,7 @@ impl Until {
 }
 
 impl Flags {
-    /// The same for the library.
+    /// Options for the library.
     fn options(&self) -> Result<RenderOptions, Box<dyn Error>> {
         let mut options = RenderOptions {
             target: self.until.target(),
@@ -92,9 +98,9 @@ impl Flags {
             calibrate: self.stats,
             ..self.settings.options()?
         };
+        self.cache.apply(&mut options)?;
         // Said before the scene is loaded.
         check(&options)?;
-        self.cache.apply(&mut options)?;
         Ok(options)
     }
 }
@@ -119,31 +125,31 @@ struct Report<'a> {
     false_color: &'a [PathBuf],
     #[serde(skip_serializing_if = "Option::is_none")]
     cache_out: Option<&'a Path>,
-    /// Those of the files above that are complete.
+    /// Complete files.
     written: &'a [PathBuf],
 }
 
 /// Runs the command.
-pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
+pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     let outputs = Outputs::new(&flags.output, flags.cache.cache_out.as_deref(), flags.false_color);
     // Said now, not after an hour of rendering.
     outputs.check()?;
     let options = flags.options()?;
     let (bytes, mut notes) = scene::open(path)?;
-    let validated = Scene::from_bytes(&bytes).map_err(|e| scene::about(path)(&e))?;
+    let validated = Scene::from_bytes(&bytes).map_err(|e| about(path)(&e))?;
     if let Some(text) = shortened(&validated, options.settings.max_depth) {
         notes.add(path, text);
     }
     let watch = Rendering::start(options.target);
     let result = render_scene(validated, &options, &watch)
-        .map_err(|e| flags.cache.about(&e).unwrap_or_else(|| scene::about(path)(&e)))?;
+        .map_err(|e| flags.cache.about(&e).unwrap_or_else(|| about(path)(&e)))?;
     drop(watch);
     let RenderResult { picture, stats, statistics, plan, cache, stopped_early } = &result;
     if let Some([x, y]) = stats.first_non_finite {
         let count = stats.counters.get("non_finite").unwrap_or(&1);
         notes.add(path, format!("{count} contributions were not finite and left out, the first in pixel ({x}, {y})"));
     }
-    // Its lamp lights the walls to about a fifth of white.
+    // Its area light brings the walls to about a fifth of white.
     let exposure = flags.exposure.unwrap_or(if path.is_none() { 1.0 } else { 0.0 });
     let image = if flags.denoise { "denoised" } else { "" };
     let written = outputs.write(picture, cache.as_deref(), image, exposure);
@@ -172,7 +178,7 @@ pub fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     written.error.map_or(Ok(()), |e| Err(e.into()))
 }
 
-/// What to say if paths end before the scene wants them to, and nobody asked for it.
+/// Note that paths end earlier than the scene asks for, if no flag asked for it.
 fn shortened(scene: &Scene<'_>, given: u32) -> Option<String> {
     let wanted = scene.info.max_depth;
     let text = || format!("paths end after {MAX_PATH_LENGTH} segments, the scene asks for {wanted}");
@@ -201,21 +207,4 @@ fn print(r: &Report<'_>) -> Outcome {
     }
     let names: Vec<_> = r.written.iter().map(|p| p.display().to_string()).collect();
     if names.is_empty() { Ok(()) } else { say(&format!("wrote {}", names.join(", "))) }
-}
-
-fn exr_path(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
-        Ok(path)
-    } else {
-        Err("the name must end in .exr".into())
-    }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
-        Ok(_) => Err("must be above 0 and finite".into()),
-        Err(e) => Err(e.to_string()),
-    }
 }

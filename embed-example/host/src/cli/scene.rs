@@ -1,6 +1,6 @@
-//! From a path to scene bytes.
+//! Scene bytes of a path.
 
-use super::notes::Notes;
+use super::notes::{Notes, about};
 use super::progress;
 use croupier_host::bake::{self, BakeError};
 use croupier_host::builtin;
@@ -8,16 +8,15 @@ use croupier_host::description::SceneDescription;
 use croupier_host::load::{self, LoadReport};
 use memmap2::Mmap;
 use std::error::Error;
-use std::fmt::Display;
 use std::fs::File;
 use std::ops::Deref;
 use std::path::Path;
 
 /// A scene blob, in memory or on disk.
-pub enum SceneBytes {
-    /// A baked file, mapped: pages are read when they are touched.
+pub(crate) enum SceneBytes {
+    /// Mapped baked file: pages are read when they are touched.
     Mapped(Mmap),
-    /// Baked just now.
+    /// Scene that was baked just now.
     Baked(bake::Baked),
 }
 
@@ -34,7 +33,7 @@ impl Deref for SceneBytes {
 
 /// Opens a scene: a baked `.crp` file, anything that loads and bakes (a folder with `scene.json`, an `.obj`), or,
 /// without a path, the built-in one. What had to be assumed, ignored or left out is printed and returned.
-pub fn open(path: Option<&Path>) -> Result<(SceneBytes, Notes), Box<dyn Error>> {
+pub(crate) fn open(path: Option<&Path>) -> Result<(SceneBytes, Notes), Box<dyn Error>> {
     let (description, loaded) = match path {
         Some(path) if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")) => {
             return Ok((map(path)?, Notes::default()));
@@ -68,12 +67,4 @@ fn map(path: &Path) -> Result<SceneBytes, Box<dyn Error>> {
     // does is asked of the user in the help text of `bake`.
     let map = unsafe { Mmap::map(&file) }.map_err(failed)?;
     Ok(SceneBytes::Mapped(map))
-}
-
-/// Puts the scene's name in front of an error or a note about its content.
-pub fn about<'a>(path: Option<&'a Path>) -> impl Fn(&dyn Display) -> String + 'a {
-    move |e| match path {
-        Some(path) => format!("{}: {e}", path.display()),
-        None => format!("built-in scene: {e}"),
-    }
 }

@@ -1,24 +1,24 @@
 //! Flags of the core's settings: one for each row of their table.
 
 use clap::{Arg, ArgMatches, Command, FromArgMatches, error::ErrorKind};
-use croupier::learn::Learning;
-use croupier::learn::cache::CacheSize;
-use croupier::{MAX_PATH_LENGTH, SettingError, SettingInfo, SettingRange, Settings, Strategy};
+use croupier::unstable::learn::Learning;
+use croupier::unstable::{MAX_PATH_LENGTH, SettingInfo, SettingRange};
+use croupier::{SettingError, Settings, Strategy};
 use croupier_host::render::RenderOptions;
 use std::fmt::Write;
 
 /// Most pixels of a picture that the program renders and writes.
 const MAX_PIXELS: u64 = 1 << 30;
 
-/// The settings that are given, with their texts.
+/// Settings given on the command line, with their texts.
 #[derive(Debug)]
-pub struct SettingsFlags {
+pub(crate) struct SettingsFlags {
     given: Vec<(&'static SettingInfo, String)>,
 }
 
 impl SettingsFlags {
-    /// Options of the library: what is given, defaults for the rest.
-    pub fn options(&self) -> Result<RenderOptions, SettingError> {
+    /// Options for the library: given settings, and defaults for the others.
+    pub(crate) fn options(&self) -> Result<RenderOptions, SettingError> {
         let given = |name: &str| self.given.iter().find(|(row, _)| row.name == name).map(|(_, text)| text);
         let mut options = match given("rrs") {
             Some(text) => RenderOptions::new(Strategy::parse(text).map_err(SettingError::Strategy)?),
@@ -28,21 +28,13 @@ impl SettingsFlags {
             options.settings.set(row.name, text)?;
         }
         if given("shards").is_none() {
-            options.settings.shards = shards(&options.settings);
+            options.fit_shards();
         }
         Ok(options)
     }
 }
 
-/// The usual number of shards, less where their statistics do not fit. If not even those of one do, the core says what
-/// one needs.
-fn shards(settings: &Settings) -> u32 {
-    let learns = settings.strategy.space().is_some();
-    let fits = |shards: &u32| !learns || CacheSize::within(settings.learning.cache_bytes, *shards).is_some();
-    (1..=settings.shards).rev().find(fits).unwrap_or(1)
-}
-
-/// Values that the program accepts: those of the core, but for what would be cut or could not be written.
+/// Values that the program accepts: fewer than the core's where the core would cut a value without a word.
 fn range(row: &SettingInfo) -> SettingRange {
     match row.name {
         "max-depth" => SettingRange::Integers { min: 1, max: MAX_PATH_LENGTH.into() },
@@ -62,7 +54,7 @@ fn check(row: &'static SettingInfo, text: &str) -> Result<String, String> {
     }
 }
 
-/// The default in words.
+/// Default of a setting in words.
 fn default(row: &SettingInfo) -> String {
     let usual = RenderOptions::default().settings;
     match row.name {

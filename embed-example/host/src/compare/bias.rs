@@ -13,15 +13,16 @@
 //! low a variance, one that was hit has both too high. If the reference has fewer samples than the image, the mean of z
 //! drifts above 0 (by 0.1 to 0.3 with one firefly a block) without any bias. Robust location estimates are no way out:
 //! the median of means, winsorised and trimmed means of skewed noise are themselves biased, and the reference is a
-//! plain mean. The robust test therefore keeps the means and repairs the variances: a block's relative variance is the
+//! plain mean. The robust test therefore keeps the means and corrects the variances: a block's relative variance is the
 //! larger of its own and the average over the 3x3 blocks around it, for image and reference apart, because what one
 //! block missed its neighbours have seen. That takes the drift below 0.1 and only ever makes |z| smaller (Gaussian
 //! noise: 0.2 % beyond 3 instead of 0.27 %); a bias over an area larger than its noise still shows.
 
-use super::{CompareError, Estimate};
+use super::mean_image::MeanImage;
+use super::metric::CompareError;
 use serde::Serialize;
 
-/// How blocks are tested.
+/// Options of the test for bias.
 #[derive(Clone, Copy, Debug)]
 pub struct BiasOptions {
     /// Side of the square blocks in pixels, >= 1; blocks at the right and lower edge may be smaller.
@@ -38,24 +39,24 @@ impl Default for BiasOptions {
     }
 }
 
-/// One block and channel.
+/// Score of one block and channel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BlockZ {
-    /// First column.
+    /// First column of the block.
     pub x: usize,
-    /// First row.
+    /// First row of the block.
     pub y: usize,
-    /// 0, 1, 2 for R, G, B.
+    /// Channel: 0, 1, 2 for R, G, B.
     pub channel: usize,
-    /// Score; infinite if a mean is not finite.
+    /// z-score; infinite if a mean is not finite.
     pub z: f64,
-    /// Mean of the image.
+    /// Mean of the image over the block.
     pub image: f64,
-    /// Mean of the reference.
+    /// Mean of the reference over the block.
     pub reference: f64,
 }
 
-/// Outcome over all blocks and channels.
+/// Scores of all blocks and channels, summed up.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Bias {
     /// Number of z-scores: three per block.
@@ -73,7 +74,7 @@ pub struct Bias {
 }
 
 /// Tests `image` against `reference`. Both variances count; where one is 0 that side is taken as exact.
-pub fn bias(image: &Estimate, reference: &Estimate, options: &BiasOptions) -> Result<Bias, CompareError> {
+pub fn bias(image: &MeanImage, reference: &MeanImage, options: &BiasOptions) -> Result<Bias, CompareError> {
     Ok(Bias::of(&block_scores(image, reference, options)?))
 }
 
@@ -102,7 +103,7 @@ struct Blocks {
 }
 
 impl Blocks {
-    fn of(e: &Estimate, side: usize, columns: usize, rows: usize) -> Self {
+    fn of(e: &MeanImage, side: usize, columns: usize, rows: usize) -> Self {
         let mut mean = vec![[0.0; 3]; columns * rows];
         let mut variance = mean.clone();
         let mut pixels = vec![0.0; columns * rows];
@@ -144,8 +145,8 @@ impl Blocks {
 
 /// The score of every block and channel, row by row.
 pub fn block_scores(
-    image: &Estimate,
-    reference: &Estimate,
+    image: &MeanImage,
+    reference: &MeanImage,
     options: &BiasOptions,
 ) -> Result<Vec<BlockZ>, CompareError> {
     let (width, height) = (image.width, image.height);

@@ -1,4 +1,4 @@
-//! Showing that a difference is small, and the normal distribution.
+//! Test that a difference is small, and the normal distribution.
 
 use serde::Serialize;
 use std::f64::consts::{PI, SQRT_2};
@@ -6,7 +6,7 @@ use std::f64::consts::{PI, SQRT_2};
 /// Outcome of [`equivalence`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Equivalence {
-    /// The difference is shown to lie within the margin.
+    /// Whether the difference is shown to lie within the margin.
     pub equivalent: bool,
     /// The larger of the two one-sided p-values.
     pub p: f64,

@@ -1,29 +1,29 @@
-//! What a look-up in the learned statistics and entering a sample into them take, measured on the statistics of a
-//! finished render.
+//! Seconds of a look-up in the learned statistics and of recording a sample, measured on the statistics of a finished
+//! render.
 
 use crate::blob::AlignedBytes;
 use croupier::Scene;
-use croupier::learn::cache::{Cache, Training, VertexKind, VertexKind8};
-use croupier::simd::{F32x8, Mask8, Vec3x8};
+use croupier::unstable::learn::cache::{Cache, Training, VertexKind, VertexKind8};
+use croupier::unstable::simd::{F32x8, Mask8, Vec3x8};
 use std::hint::black_box;
 use std::time::Instant;
 
 /// Packets of eight per round.
 const PACKETS: usize = 1 << 12;
-/// The fastest of so many rounds counts: whatever slows one down is not the cache's.
+/// Rounds, of which the fastest counts: other work of the machine slows the others down.
 const ROUNDS: usize = 5;
 
 /// Seconds that one operation takes one thread. Measured in a loop of nothing else: in a render, where rays compete for
 /// the processor's caches, it takes rather more.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Calibration {
-    /// Finding and reading the statistics of a packet of eight vertices.
+    /// Look-up of the statistics of a packet of eight vertices.
     pub look_up: f64,
-    /// Entering one finished sample: adding it to its bin, not what gathers it in the ledger before.
+    /// Recording of one finished sample: adding it to its bin, without its bookkeeping in the ledger before.
     pub log: f64,
 }
 
-/// Measures at random places on the scene's triangles, facing as they do. Nothing if there is no memory for it.
+/// Measurement at random points of the scene's triangles with their normals. `None` if there is no memory for it.
 pub(super) fn calibrate(cache: &Cache<'_>, scene: &Scene<'_>) -> Option<Calibration> {
     let mut random = Random(scene.hash | 1);
     let vertices: Vec<_> = (0..PACKETS).map(|_| Packet::new(scene, &mut random)).collect();

@@ -1,26 +1,26 @@
-//! How many samples the next iteration gets.
+//! Samples of the next iteration.
 //!
 //! Iterations grow with the work that is done, so that statistics are renewed often at first and seldom later (EARS,
 //! SIGGRAPH 2022, section 5). For strategies that learn, work is counted in rays: when they begin to split, a camera
 //! sample may cost twenty times as much as the one before.
 
-use crate::render::Target;
+use super::observe::Target;
 use croupier::ErrorEstimate;
 
-/// Iterations grow to this many samples per pixel.
+/// Most samples per pixel of an iteration.
 pub const LARGEST_ITERATION: u32 = 64;
 
-/// Samples per pixel below which an estimated error is not believed.
+/// Samples per pixel from which on an error estimate ends a render.
 const FEWEST_JUDGED: u32 = 4;
 
-/// What was done, in all iterations or in one.
+/// Work of one iteration, or of all.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Work {
     /// Camera samples per pixel.
     pub samples: u32,
     /// Rays of all kinds.
     pub rays: u64,
-    /// Seconds, on the wall or by [`Observer::seconds`](crate::render::Observer::seconds).
+    /// Seconds, on the wall or by [`Observer::seconds`](super::Observer::seconds).
     pub seconds: f64,
 }
 

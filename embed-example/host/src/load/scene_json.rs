@@ -2,7 +2,10 @@
 
 use super::json::{self, Place};
 use super::{LoadError, Loader, obj};
-use crate::description::{Camera, Emitter, Environment, Material, Model, Reflectance, SceneDescription, ThinLens};
+use crate::description::{
+    Camera, Emitter, Environment, Material, Model, ParameterSource, Reflectance, SceneDescription, ThinLens,
+};
+use croupier::unstable::scene::blob::{EnvironmentKind, LightKind, MaterialKind};
 use std::path::Path;
 
 pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription, LoadError> {
@@ -62,39 +65,49 @@ fn material(
     name: &str,
     m: &Place<'_>,
 ) -> Result<Material, LoadError> {
-    let mut reflectance = || reflectance(loader, scene, folder, &m.get("reflectance")?);
-    let float = |key| m.get(key)?.float();
-    let rgb = |key| m.get(key)?.rgb();
     let kind = m.get("type")?;
-    let model = match kind.text()? {
-        "diffuse" => Model::Diffuse { reflectance: reflectance()? },
-        "mirror" => Model::Mirror { reflectance: reflectance()? },
-        "conductor" => Model::Conductor { eta: rgb("eta")?, k: rgb("k")?, reflectance: reflectance()? },
-        "roughconductor" => Model::RoughConductor {
-            eta: rgb("eta")?,
-            k: rgb("k")?,
-            reflectance: reflectance()?,
-            alpha: float("alpha")?,
-        },
-        "dielectric" => Model::Dielectric { int_ior: float("int_ior")?, ext_ior: float("ext_ior")? },
-        "roughdielectric" => {
-            Model::RoughDielectric { int_ior: float("int_ior")?, ext_ior: float("ext_ior")?, alpha: float("alpha")? }
-        }
-        "thindielectric" => Model::ThinDielectric { int_ior: float("int_ior")?, ext_ior: float("ext_ior")? },
-        "plastic" => {
-            Model::Plastic { reflectance: reflectance()?, int_ior: float("int_ior")?, ext_ior: float("ext_ior")? }
-        }
-        "roughplastic" => Model::RoughPlastic {
-            reflectance: reflectance()?,
-            int_ior: float("int_ior")?,
-            ext_ior: float("ext_ior")?,
-            alpha: float("alpha")?,
-        },
-        "null" => Model::Null,
-        other => return Err(kind.error(format!("unknown material type `{other}`"))),
-    };
+    let name_of_kind = kind.text()?;
+    let kind = MaterialKind::from_name(name_of_kind)
+        .ok_or_else(|| kind.error(format!("unknown material type `{name_of_kind}`")))?;
+    let model = Model::from_source(kind, &mut Parameters { loader, scene, folder, m })?;
     let two_sided = m.find("twosided")?.map_or(Ok(false), |t| t.flag())?;
     Ok(Material { name: name.into(), two_sided, model })
+}
+
+/// Parameters of a material, all required.
+struct Parameters<'a, 'v> {
+    loader: &'a mut Loader,
+    scene: &'a mut SceneDescription,
+    folder: &'a Path,
+    m: &'a Place<'v>,
+}
+
+impl ParameterSource for Parameters<'_, '_> {
+    type Error = LoadError;
+
+    fn reflectance(&mut self) -> Result<Reflectance, LoadError> {
+        reflectance(self.loader, self.scene, self.folder, &self.m.get("reflectance")?)
+    }
+
+    fn eta(&mut self) -> Result<[f32; 3], LoadError> {
+        self.m.get("eta")?.rgb()
+    }
+
+    fn k(&mut self) -> Result<[f32; 3], LoadError> {
+        self.m.get("k")?.rgb()
+    }
+
+    fn int_ior(&mut self) -> Result<f32, LoadError> {
+        self.m.get("int_ior")?.float()
+    }
+
+    fn ext_ior(&mut self) -> Result<f32, LoadError> {
+        self.m.get("ext_ior")?.float()
+    }
+
+    fn alpha(&mut self) -> Result<f32, LoadError> {
+        self.m.get("alpha")?.float()
+    }
 }
 
 fn reflectance(
@@ -119,33 +132,40 @@ fn reflectance(
 
 fn emitter(loader: &mut Loader, scene: &mut SceneDescription, folder: &Path, e: &Place<'_>) -> Result<(), LoadError> {
     let kind = e.get("type")?;
-    let environment = match kind.text()? {
-        "area" => {
-            let place = e.get("material")?;
-            let name = place.text()?;
-            let index = scene.materials.iter().position(|m| m.name == name);
-            let index = index.ok_or_else(|| place.error(format!("there is no material `{name}`")))?;
-            scene.emitters.push(Emitter::Area { material: index as u32, radiance: e.get("radiance")?.rgb()? });
-            return Ok(());
+    let name = kind.text()?;
+    let emitter = match LightKind::from_name(name) {
+        Some(LightKind::Area) => {
+            Emitter::Area { material: material_index(scene, e)?, radiance: e.get("radiance")?.rgb()? }
         }
-        "point" => {
-            let (position, intensity) = (e.get("position")?.rgb()?, e.get("intensity")?.rgb()?);
-            scene.emitters.push(Emitter::Point { position, intensity });
-            return Ok(());
+        Some(LightKind::Point) => {
+            Emitter::Point { position: e.get("position")?.rgb()?, intensity: e.get("intensity")?.rgb()? }
         }
-        "directional" => {
-            let (direction, irradiance) = (e.get("direction")?.rgb()?, e.get("irradiance")?.rgb()?);
-            scene.emitters.push(Emitter::Directional { direction, irradiance });
-            return Ok(());
+        Some(LightKind::Directional) => {
+            Emitter::Directional { direction: e.get("direction")?.rgb()?, irradiance: e.get("irradiance")?.rgb()? }
         }
-        "constant" => Environment::Constant { radiance: e.get("radiance")?.rgb()? },
-        "envmap" => envmap(loader, folder, e)?,
-        other => return Err(kind.error(format!("unknown emitter type `{other}`"))),
+        // An environment's type is that of its own kind.
+        Some(LightKind::Environment) | None => {
+            let environment = match EnvironmentKind::from_name(name) {
+                Some(EnvironmentKind::Constant) => Environment::Constant { radiance: e.get("radiance")?.rgb()? },
+                Some(EnvironmentKind::Map) => envmap(loader, folder, e)?,
+                None => return Err(kind.error(format!("unknown emitter type `{name}`"))),
+            };
+            return match scene.environment.replace(environment) {
+                None => Ok(()),
+                Some(_) => Err(e.error("there is already an environment")),
+            };
+        }
     };
-    if scene.environment.replace(environment).is_some() {
-        return Err(e.error("there is already an environment"));
-    }
+    scene.emitters.push(emitter);
     Ok(())
+}
+
+/// Index of the material that an area emitter names.
+fn material_index(scene: &SceneDescription, e: &Place<'_>) -> Result<u32, LoadError> {
+    let place = e.get("material")?;
+    let name = place.text()?;
+    let index = scene.materials.iter().position(|m| m.name == name);
+    index.map(|i| i as u32).ok_or_else(|| place.error(format!("there is no material `{name}`")))
 }
 
 fn envmap(loader: &mut Loader, folder: &Path, e: &Place<'_>) -> Result<Environment, LoadError> {

@@ -1,0 +1,139 @@
+//! Lights, the environment and alias tables: the records, and the tables of what readers and writers of a blob know
+//! about each kind.
+//!
+//! A light is a row of `light_table` here, a file `light/NAME.rs`, and a row of `models!` in `light/mod.rs`. From the
+//! row here follow its effects and the validator's checks.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Largest emission (radiance, intensity or irradiance, any channel): its square still fits `f32`.
+pub const MAX_EMISSION: f32 = 1e18;
+
+/// The light kinds, one row each, handed to the macro `$then`: kind and number in the blob, name, effects of which a
+/// kernel needs at least one to sample it, and the fields of the record that it uses.
+macro_rules! light_table {
+    ($then:ident) => {
+        $then! {
+            /// Emitting triangle (its front side).
+            Area = 0, "area", [AREA_LIGHTS], [Triangle, Emission];
+            /// Environment, map or constant.
+            Environment = 1, "environment", [ENVIRONMENT, CONSTANT], [Environment];
+            /// Isotropic point.
+            Point = 2, "point", [DELTA_LIGHTS], [Position, Emission];
+            /// Parallel light.
+            Directional = 3, "directional", [DELTA_LIGHTS], [Direction, Emission];
+        }
+    };
+}
+pub(crate) use light_table;
+
+/// The environment kinds, one row each, handed to the macro `$then`: kind and number in the blob, name in scene files,
+/// effect.
+macro_rules! environment_table {
+    ($then:ident) => {
+        $then! {
+            /// Constant radiance.
+            Constant = 0, "constant", CONSTANT;
+            /// Lat-long map.
+            Map = 1, "envmap", ENVIRONMENT;
+        }
+    };
+}
+pub(crate) use environment_table;
+
+macro_rules! define_lights {
+    ($($(#[$doc:meta])* $kind:ident = $number:literal, $name:literal, [$($effect:ident),*], [$($field:ident),*];)*) => {
+        kinds! {
+            /// Light kinds.
+            LightKind { $($(#[$doc])* $kind = $number, $name;)* }
+        }
+
+        impl LightKind {
+            /// Fields of [`Light`] that it uses.
+            pub const fn fields(self) -> &'static [LightField] {
+                match self { $(Self::$kind => &[$(LightField::$field),*]),* }
+            }
+        }
+    };
+}
+light_table!(define_lights);
+
+macro_rules! define_environments {
+    ($($(#[$doc:meta])* $kind:ident = $number:literal, $name:literal, $effect:ident;)*) => {
+        kinds! {
+            /// Environment kinds.
+            EnvironmentKind { $($(#[$doc])* $kind = $number, $name;)* }
+        }
+    };
+}
+environment_table!(define_environments);
+
+/// Fields of a [`Light`] that a kind may use, a closed set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightField {
+    /// `triangle` and `area`: a triangle that refers back, and its area.
+    Triangle,
+    /// The scene's one [`Environment`], which refers back; it holds what is emitted, and which effect that is.
+    Environment,
+    /// `vector`: a position.
+    Position,
+    /// `vector`: the unit direction towards the light.
+    Direction,
+    /// `emission`, up to [`MAX_EMISSION`].
+    Emission,
+}
+
+/// One light, a cache line; fields a kind does not use are 0.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Light {
+    /// [`LightKind`].
+    pub kind: u32,
+    /// Area: index of the triangle.
+    pub triangle: u32,
+    /// Area: area of the triangle.
+    pub area: f32,
+    /// Zero.
+    pub reserved: u32,
+    /// Point: position. Directional: unit direction towards the light.
+    pub vector: [f32; 3],
+    /// Area: radiance. Point: intensity. Directional: irradiance on a facing surface.
+    pub emission: [f32; 3],
+    /// Zero: room for kinds to come (the axis and cosines of a cone, the radius of a sphere), so that they need no
+    /// other version of the blob.
+    pub params: [f32; 6],
+}
+
+/// Entry of an alias table over n items (Vose 1991) with integer thresholds: a 32-bit number r picks slot
+/// `i = (r * n) >> 32` and keeps it if the low word `(r * n) as u32 < threshold`, else takes `alias`. A threshold of
+/// `u32::MAX` means "always keep" and has `alias == i`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Alias {
+    /// Keep slot i below this.
+    pub threshold: u32,
+    /// Item that is picked instead of i.
+    pub alias: u32,
+    /// Probability of item i over all slots.
+    pub probability: f32,
+}
+
+/// Environment of the scene.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Environment {
+    /// [`EnvironmentKind`].
+    pub kind: u32,
+    /// Index of the environment's light.
+    pub light: u32,
+    /// Map: columns, >= 1.
+    pub width: u32,
+    /// Map: rows, >= 2.
+    pub height: u32,
+    /// Map: rows of the rotation world -> map space.
+    pub to_local: [[f32; 3]; 3],
+    /// Constant: radiance. Map: scale.
+    pub radiance: [f32; 3],
+}
+
+const _: () = assert!(size_of::<Light>() == 64);

@@ -1,0 +1,187 @@
+//! Materials and textures: the records, and the table of what readers and writers of a blob know about each kind.
+//!
+//! A scattering model is a row of `material_table` here, a kernel `bsdf/NAME.rs`, and a row of `models!` in
+//! `bsdf/mod.rs`. From the row here follow its effect and the effect's name, the validator's checks, what the host's
+//! baker asks for and derives, and the keys in scene files. A parameter that no model has yet is a [`Parameter`] more;
+//! every place that must know it then fails to compile.
+
+use bytemuck::{Pod, Zeroable};
+
+/// GGX widths of rough materials.
+pub const ALPHA_RANGE: [f32; 2] = [1e-4, 1.0];
+/// Relative refractive indices of dielectrics and plastics.
+pub const ETA_RANGE: [f32; 2] = [0.01, 100.0];
+/// Refractive indices and extinctions of conductors.
+pub const CONDUCTOR_RANGE: [f32; 2] = [0.0, 1e4];
+/// Smallest value of the larger of refractive index and extinction of a conductor, per channel: with both 0 the Fresnel
+/// reflectance would be 0/0 at normal incidence.
+pub const MIN_CONDUCTOR: f32 = 1e-4;
+/// Reflectances and transmittances.
+pub const REFLECTANCE_RANGE: [f32; 2] = [0.0, 1.0];
+/// Internal reflectances of coats: below 1, so that 1 - reflectance * fdr is above 0.
+pub const FDR_RANGE: [f32; 2] = [0.0, 1.0 - f32::EPSILON];
+/// Entries of a table of transmittances: equally spaced cosines from 0 to 1, both ends included.
+pub const TRANSMITTANCE_ENTRIES: usize = 64;
+
+/// The material kinds, one row each, handed to the macro `$then`: kind and number in the blob, name in scene files,
+/// effect, whether light passes it, whether it has delta lobes only, and the parameters that it uses.
+macro_rules! material_table {
+    ($then:ident) => {
+        $then! {
+            /// Lambertian reflection.
+            Diffuse = 0, "diffuse", DIFFUSE, transmissive: false, delta: false, [Reflectance];
+            /// Perfect mirror without Fresnel.
+            Mirror = 1, "mirror", MIRROR, transmissive: false, delta: true, [Reflectance];
+            /// Smooth conductor.
+            Conductor = 2, "conductor", CONDUCTOR, transmissive: false, delta: true, [ComplexEta, Reflectance];
+            /// GGX conductor.
+            RoughConductor = 3, "roughconductor", ROUGH_CONDUCTOR, transmissive: false, delta: false,
+                [ComplexEta, Reflectance, Alpha];
+            /// Smooth dielectric interface.
+            Dielectric = 4, "dielectric", DIELECTRIC, transmissive: true, delta: true, [RelativeEta];
+            /// GGX dielectric interface.
+            RoughDielectric = 5, "roughdielectric", ROUGH_DIELECTRIC, transmissive: true, delta: false,
+                [RelativeEta, Alpha];
+            /// Thin dielectric sheet.
+            ThinDielectric = 6, "thindielectric", THIN_DIELECTRIC, transmissive: true, delta: true, [RelativeEta];
+            /// Smooth coat over a diffuse base.
+            Plastic = 7, "plastic", PLASTIC, transmissive: false, delta: false,
+                [Reflectance, RelativeEta, InternalReflectance];
+            /// GGX coat over a diffuse base.
+            RoughPlastic = 8, "roughplastic", ROUGH_PLASTIC, transmissive: false, delta: false,
+                [Reflectance, RelativeEta, Alpha, InternalReflectance, TransmittanceTable];
+            /// Index-matched boundary.
+            Null = 9, "null", NULL, transmissive: true, delta: true, [];
+        }
+    };
+}
+pub(crate) use material_table;
+
+/// Row of the table of material kinds: the facts that do not depend on the kernel.
+#[derive(Clone, Copy, Debug)]
+pub struct MaterialFacts {
+    /// Light passes it: it scatters from behind as well, and being two-sided means nothing.
+    pub transmissive: bool,
+    /// It has delta lobes only.
+    pub delta: bool,
+    /// Parameters that it uses.
+    pub parameters: &'static [Parameter],
+}
+
+macro_rules! define {
+    ($($(#[$doc:meta])* $kind:ident = $number:literal, $name:literal, $effect:ident,
+        transmissive: $transmissive:literal, delta: $delta:literal, [$($parameter:ident),*];)*) => {
+        kinds! {
+            /// Scattering models.
+            MaterialKind { $($(#[$doc])* $kind = $number, $name;)* }
+        }
+
+        impl MaterialKind {
+            /// Row of the table.
+            pub const fn facts(self) -> &'static MaterialFacts {
+                match self {
+                    $(Self::$kind => &MaterialFacts {
+                        transmissive: $transmissive,
+                        delta: $delta,
+                        parameters: &[$(Parameter::$parameter),*],
+                    }),*
+                }
+            }
+        }
+    };
+}
+material_table!(define);
+
+/// Parameters of scattering models, a closed set. The formulas are in `bsdf/`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Parameter {
+    /// `reflectance`, or the texture in its place: diffuse albedo, or scale of a specular reflection.
+    Reflectance,
+    /// `alpha`: GGX width.
+    Alpha,
+    /// `eta[0]`: refractive index behind the front side over that before it.
+    RelativeEta,
+    /// `eta` and `k`: complex refractive index per channel.
+    ComplexEta,
+    /// `fdr`, derived: reflectance of the coat from inside for diffuse light, by the table if there is one.
+    InternalReflectance,
+    /// `table`, derived from `eta[0]` and `alpha`: energy that the coat transmits from outside.
+    TransmittanceTable,
+}
+
+impl Parameter {
+    /// Every parameter.
+    pub const ALL: &'static [Self] = &[
+        Self::Reflectance,
+        Self::Alpha,
+        Self::RelativeEta,
+        Self::ComplexEta,
+        Self::InternalReflectance,
+        Self::TransmittanceTable,
+    ];
+
+    /// Smallest and largest value allowed of each number.
+    pub const fn range(self) -> [f32; 2] {
+        match self {
+            Self::Reflectance | Self::TransmittanceTable => REFLECTANCE_RANGE,
+            Self::Alpha => ALPHA_RANGE,
+            Self::RelativeEta => ETA_RANGE,
+            Self::ComplexEta => CONDUCTOR_RANGE,
+            Self::InternalReflectance => FDR_RANGE,
+        }
+    }
+
+    /// Keys in scene files; none for what baking derives from other parameters.
+    pub const fn keys(self) -> &'static [&'static str] {
+        match self {
+            Self::Reflectance => &["reflectance"],
+            Self::Alpha => &["alpha"],
+            Self::RelativeEta => &["int_ior", "ext_ior"],
+            Self::ComplexEta => &["eta", "k"],
+            Self::InternalReflectance | Self::TransmittanceTable => &[],
+        }
+    }
+}
+
+/// One material, a cache line; fields a kind does not use are 0. See `bsdf/` for each model's parameters.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Material {
+    /// [`MaterialKind`].
+    pub kind: u32,
+    /// [`MATERIAL_TWO_SIDED`].
+    pub flags: u32,
+    /// Texture index that replaces `reflectance`, or [`NONE`](super::NONE).
+    pub texture: u32,
+    /// First entry of this material's table in the tables section, or [`NONE`](super::NONE).
+    pub table: u32,
+    /// Linear Rec. 709; diffuse albedo or scale of the specular reflection.
+    pub reflectance: [f32; 3],
+    /// GGX width.
+    pub alpha: f32,
+    /// Conductors: real refractive index per channel. Dielectrics and plastics: `eta[0]` = int_ior / ext_ior.
+    pub eta: [f32; 3],
+    /// Plastics: reflectance of the interface from inside for diffuse light (`Fdr`, or `R` of the rough plastic).
+    pub fdr: f32,
+    /// Conductors: extinction per channel.
+    pub k: [f32; 3],
+    /// Zero.
+    pub reserved: f32,
+}
+
+/// Both sides behave like the front.
+pub const MATERIAL_TWO_SIDED: u32 = 1;
+
+/// One texture: `width * height` texels from `first` in the texels section; row 0 is the top (v = 1).
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Texture {
+    /// First texel.
+    pub first: u32,
+    /// Columns, >= 1.
+    pub width: u32,
+    /// Rows, >= 1.
+    pub height: u32,
+    /// Zero.
+    pub reserved: u32,
+}

@@ -1,0 +1,96 @@
+//! Results of a render: sums of the pixels, and a record of every iteration.
+
+use super::calibrate::Calibration;
+use super::schedule::Work;
+use croupier::unstable::film::{PixelAov, PixelStats};
+use croupier::unstable::learn::PictureStatistics;
+use croupier::{Counters, ErrorEstimate};
+
+/// One finished iteration.
+#[derive(Clone, Copy, Debug)]
+pub struct IterationRecord {
+    /// Camera samples per pixel, rays, and seconds with all phases.
+    pub work: Work,
+    /// Counters of the iteration.
+    pub counters: Counters,
+    /// Seconds of tracing.
+    pub tracing: f64,
+    /// Seconds of merging the shards' pixels and measuring the picture's variance.
+    pub merging: f64,
+    /// Seconds of estimating the pixels (denoising).
+    pub estimating: f64,
+    /// Seconds of merging the scene's statistics and rebuilding their tree.
+    pub learning: f64,
+    /// Error and cost of a camera sample; `None` unless something learns from the picture.
+    pub picture: Option<PictureStatistics>,
+    /// Size of the cache after the iteration, if there is one.
+    pub cache: Option<CacheRecord>,
+    /// Error estimate of the picture after the iteration.
+    pub error: ErrorEstimate,
+}
+
+/// The cache's size after an iteration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CacheRecord {
+    /// Leaves in use.
+    pub leaves: u32,
+    /// Subdivisions of leaves for which there was no room, in all iterations so far. A leaf that remains too large
+    /// counts again in each.
+    pub subdivisions_refused: u64,
+}
+
+/// A finished render.
+#[derive(Clone, Debug)]
+pub struct Rendered {
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// Sums per pixel, row by row.
+    pub pixels: Vec<PixelStats>,
+    /// Auxiliary sums; empty if not asked for.
+    pub aovs: Vec<PixelAov>,
+    /// Counters of the whole render.
+    pub counters: Counters,
+    /// Error estimate of the picture.
+    pub error: ErrorEstimate,
+    /// Camera samples per pixel of the finished iterations.
+    pub spp: u32,
+    /// Wall time of rendering alone.
+    pub seconds: f64,
+    /// Name of the kernel profile.
+    pub profile: &'static str,
+    /// Bytes of the shared block and of all shards.
+    pub memory: [usize; 2],
+    /// Whether the observer ended the render before its target.
+    pub stopped_early: bool,
+    /// Threads that traced.
+    pub threads: usize,
+    /// Records of all iterations, the one that was stopped included.
+    pub iterations: Vec<IterationRecord>,
+    /// Saved cache, if asked for.
+    pub cache: Option<Vec<u8>>,
+    /// Seconds of a look-up and of recording a sample, if asked for and anything is looked up.
+    pub calibration: Option<Calibration>,
+}
+
+impl Rendered {
+    /// Mean radiance, row by row, rgb.
+    pub fn image(&self) -> Vec<[f32; 3]> {
+        self.pixels.iter().map(|p| p.mean().map(|x| x as f32)).collect()
+    }
+
+    /// Standard error of the mean radiance, row by row, rgb.
+    pub fn stderr(&self) -> Vec<[f32; 3]> {
+        self.pixels.iter().map(|p| p.variance_of_mean().map(|v| v.sqrt() as f32)).collect()
+    }
+
+    /// Rays per second, in millions.
+    pub fn mrays_per_s(&self) -> f64 {
+        self.counters.rays() as f64 / self.seconds.max(1e-9) * 1e-6
+    }
+
+    /// Order-sensitive hash of the picture's bits: equal for any number of threads and any instruction set.
+    pub fn hash(&self) -> u64 {
+        let image = self.image();
+        croupier::unstable::scene::blob::content_hash(bytemuck::cast_slice(&image))
+    }
+}

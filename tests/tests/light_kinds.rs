@@ -1,0 +1,132 @@
+//! Every kind of light under one contract: what its samples add up to is the irradiance by an independent formula, and
+//! they say of themselves what the table of kinds says. A kind without an example does not compile.
+
+use croupier::unstable::light::{LightSample8, PowerSelector, sample};
+use croupier::unstable::scene::Effects;
+use croupier::unstable::scene::blob::{EnvironmentKind, LightKind};
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier_tests::light_oracle::{V, cross, dot, length, sub, wide};
+use croupier_tests::light_scene::{IDENTITY, LightScene};
+use croupier_tests::stats::{Mean, SplitMix};
+use std::f64::consts::PI;
+
+const CORNERS: [[f32; 3]; 3] = [[1.0, 2.0, 0.5], [0.3, 1.5, 2.0], [-1.5, 2.5, 0.0]];
+const RGB: [f32; 3] = [2.0, 1.0, 0.25];
+/// Samples, eight at a time.
+const PACKETS: usize = 1 << 14;
+
+/// Adds an example of a kind to a scene; the irradiance that it gives a surface at the origin that faces +y, over its
+/// emission.
+fn example(kind: LightKind, s: LightScene) -> (LightScene, f64) {
+    match kind {
+        LightKind::Area => (s.triangle(CORNERS, Some(RGB)), triangle()),
+        LightKind::Environment => (s.constant(RGB), PI),
+        LightKind::Point => {
+            let p = [0.5f32, 2.0, -1.0];
+            let r = length(wide(p));
+            (s.delta(kind, p, RGB), f64::from(p[1]) / r.powi(3))
+        }
+        LightKind::Directional => (s.delta(kind, [0.0, 0.8, 0.6], RGB), f64::from(0.8f32)),
+    }
+}
+
+/// The integral of cos cos' / r^2 over the triangle, by its midpoints.
+fn triangle() -> f64 {
+    let [a, b, c] = CORNERS.map(wide);
+    let normal = cross(sub(b, a), sub(c, a));
+    let n = 400;
+    let mut sum = 0.0;
+    for k in 0..n * n {
+        let [s, t] = [k / n, k % n].map(|i| (f64::from(i) + 0.5) / f64::from(n));
+        let p: V = std::array::from_fn(|i| a[i] * (1.0 - s) + s * (b[i] * (1.0 - t) + c[i] * t));
+        let d = p.map(|x| x / length(p));
+        // |normal| s ds dt is the area
+        sum += (-dot(normal, d)).max(0.0) * s * d[1] / dot(p, p);
+    }
+    sum / f64::from(n * n)
+}
+
+/// Calls `see` with samples at the origin.
+fn samples(s: &LightScene, seed: u64, mut see: impl FnMut(&LightSample8)) {
+    let (scene, mut rng) = (s.scene(), SplitMix(seed));
+    for _ in 0..PACKETS {
+        let words = std::array::from_fn(|_| U32x8::from_fn(|_| rng.word()));
+        let up = Vec3x8::splat(0.0, 1.0, 0.0);
+        see(&sample(&scene, &PowerSelector(scene), Vec3x8::ZERO, up, words, Mask8::all_lanes()));
+    }
+}
+
+/// Mean irradiance that samples give, with its standard error; over the emission.
+fn irradiance(s: &LightScene, seed: u64) -> (f64, f64) {
+    let mut mean = Mean::default();
+    samples(s, seed, |l| {
+        let estimate = l.valid.zero_unless(l.radiance.y * l.wi.y.max(F32x8::ZERO) / l.pdf) / RGB[1];
+        estimate.to_array().into_iter().for_each(|x| mean.add(f64::from(x)));
+    });
+    (mean.mean(), mean.error())
+}
+
+#[track_caller]
+fn assert_near(what: &str, (mean, error): (f64, f64), expected: f64) {
+    assert!(error < 0.01 * expected, "{what}: a standard error of {error} sees nothing");
+    let off = (mean - expected).abs();
+    assert!(off <= 5.0 * error + 1e-5 * expected, "{what}: {mean} +- {error}, expected {expected}");
+}
+
+/// Killed by: a kind that is dispatched to another one's sampler, a density without cosine or distance, a selection
+/// probability that is left out (all of them together).
+#[test]
+fn irradiance_is_the_formulas() {
+    let (mut all, mut total) = (LightScene::default(), 0.0);
+    for (seed, kind) in (0..).zip(LightKind::ALL) {
+        let (alone, expected) = example(*kind, LightScene::default());
+        assert_near(kind.name(), irradiance(&alone.finish(), seed), expected);
+        all = example(*kind, all).0;
+        total += expected;
+    }
+    assert_near("all kinds", irradiance(&all.finish(), 100), total);
+}
+
+/// A kind whose effect the profile lacks gives no sample; delta lights say so. Killed by: an effect of the wrong row,
+/// `delta` that is not set.
+#[test]
+fn samples_agree_with_the_table() {
+    for kind in LightKind::ALL {
+        let scene = example(*kind, LightScene::default()).0.finish();
+        let delta = Effects::of_light(*kind).intersects(Effects::DELTA_LIGHTS);
+        let mut seen = 0;
+        samples(&scene, 7, |l| {
+            seen += l.valid.count();
+            assert_eq!((l.delta & l.valid).count(), if delta { l.valid.count() } else { 0 }, "{}", kind.name());
+        });
+        assert!(seen > 1000, "{}", kind.name());
+        let view = scene.scene();
+        for (profile, wanted) in [(Effects::of_light(*kind), true), (Effects(!Effects::of_light(*kind).0), false)] {
+            let words = [U32x8::splat(0x5555_5555); 4];
+            let s = croupier::unstable::light::sample_of(
+                profile,
+                &view,
+                &PowerSelector(view),
+                Vec3x8::ZERO,
+                Vec3x8::ZERO,
+                words,
+                Mask8::all_lanes(),
+            );
+            assert_eq!(s.valid.any(), wanted, "{}", kind.name());
+        }
+    }
+}
+
+/// Both kinds of environment light a surface alike where they hold the same. Killed by: a map that is sampled as a
+/// constant, a scale that is left out.
+#[test]
+fn environments_agree() {
+    for kind in EnvironmentKind::ALL {
+        let s = LightScene::default();
+        let s = match kind {
+            EnvironmentKind::Constant => s.constant(RGB),
+            EnvironmentKind::Map => s.map(vec![RGB.map(|x| x / 2.0); 16 * 9], [16, 9], 2.0, IDENTITY),
+        };
+        assert_near(kind.name(), irradiance(&s.finish(), 9), PI);
+    }
+}
