@@ -326,7 +326,7 @@ mod tests {
         let scene = Scene::from_bytes(&scene.bytes).unwrap();
         let settings = Settings { size: [5, 3], ..Settings::for_scene(&scene) };
         let o = Options::new(settings, Target::Spp(1));
-        let mut r = drive_scene(scene, &o, &super::Unobserved).unwrap();
+        let mut r = drive_scene(scene, &o, &drive::Unobserved).unwrap();
         assert_eq!(stats(&r).first_non_finite, None);
         r.counters.first_non_finite = 8;
         assert_eq!(stats(&r).first_non_finite, Some([2, 1]));
