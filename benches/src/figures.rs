@@ -14,7 +14,8 @@ pub struct Checked {
     pub wrong: Vec<String>,
 }
 
-/// Compares every marked figure of a document, but for blocks of code, with the results that `read` finds by their names.
+/// Compares every marked figure of a document with the results that `read` finds by their names. Blocks of code are
+/// left out.
 pub fn check(document: &str, read: impl Fn(&str) -> Result<Results, Box<dyn Error>>) -> Checked {
     let mut checked = Checked::default();
     let mut files = HashMap::new();
@@ -26,8 +27,15 @@ pub fn check(document: &str, read: impl Fn(&str) -> Result<Results, Box<dyn Erro
             continue;
         }
         let mut rest = *line;
-        while let Some((before, marker)) = rest.split_once("<!-- ") {
-            let Some((text, after)) = marker.split_once("-->") else { break };
+        while let Some((before, marker)) = rest.split_once("<!--") {
+            let marker = marker.trim_start();
+            let Some((text, after)) = marker.split_once("-->") else {
+                // not to be left unchecked when a paragraph is wrapped anew
+                if ["", "=", "table"].iter().any(|s| marker.split(' ').next() == Some(*s)) {
+                    checked.wrong.push(format!("line {}: a marker that does not end on its line", i + 1));
+                }
+                break;
+            };
             rest = after;
             let text = text.trim();
             let table = text.strip_prefix("table = ");

@@ -4,7 +4,7 @@ use crate::clock::cpu_seconds;
 use crate::stats::time_to;
 use crate::subject::Subject;
 use crate::variant::Variant;
-use croupier::film::PixelStats;
+use croupier::unstable::film::PixelStats;
 use croupier::{Film, Scene, Settings};
 use croupier_host::compare::{CompareError, relmse};
 use croupier_host::drive::{Options, drive_scene};

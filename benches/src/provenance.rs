@@ -9,6 +9,7 @@ pub fn of_this_run(bin: &str) -> Vec<(String, String)> {
         ("commit", Some(commit())),
         ("command", Some(command(bin))),
         ("machine", Some(machine())),
+        ("load before", load()),
         ("compiler", Some(COMPILER.into())),
         ("instruction set", Some(instruction_set())),
         ("arithmetic", Some(ARITHMETIC.into())),
@@ -21,7 +22,7 @@ pub fn of_this_run(bin: &str) -> Vec<(String, String)> {
 pub const COMPILER: &str = env!("RUSTC_VERSION");
 
 /// Arithmetic of this build.
-pub const ARITHMETIC: &str = if croupier::simd::REPRODUCIBLE { "reproducible" } else { "fast" };
+pub const ARITHMETIC: &str = if croupier::unstable::simd::REPRODUCIBLE { "reproducible" } else { "fast" };
 
 /// Instruction set of this build: `x86-64-v3` with AVX2 and FMA.
 pub fn instruction_set() -> String {
@@ -52,7 +53,7 @@ fn commit() -> String {
 /// The command that makes the same table; absolute paths are cut to their last part.
 fn command(bin: &str) -> String {
     let release = if cfg!(debug_assertions) { "" } else { " --release" };
-    let fast = if croupier::simd::REPRODUCIBLE { "" } else { " --features fast" };
+    let fast = if croupier::unstable::simd::REPRODUCIBLE { "" } else { " --features fast" };
     let args: Vec<String> = std::env::args().skip(1).map(|a| shortened(&a)).collect();
     let args = if args.is_empty() { String::new() } else { format!(" -- {}", args.join(" ")) };
     format!("cargo run{release} -p croupier-benches{fast} --bin {bin}{args}")
@@ -82,6 +83,11 @@ fn machine() -> String {
     let kind = kind.map_or(String::new(), |(family, model)| format!(" (family {family}, model {model})"));
     let cores = std::thread::available_parallelism().map_or("unknown".into(), |n| n.to_string());
     format!("{model}{kind}, {cores} cores")
+}
+
+/// Processes that wanted a core in the minute before, on average: what else the machine did, which times tell of.
+fn load() -> Option<String> {
+    Some(std::fs::read_to_string("/proc/loadavg").ok()?.split(' ').next()?.into())
 }
 
 /// Output of a program without its line end; `None` if it cannot run or fails.

@@ -4,7 +4,7 @@
 //! ([`STEP`], [`END`]).
 
 use crate::clock::Clock;
-use croupier::profile::{AnyProfile, DiffuseOnly, Full, Profile};
+use croupier::unstable::profile::{AnyProfile, DiffuseOnly, Full, Profile};
 use croupier::{Budget, Counters, Plan, Scene, Session, SessionError, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
 use std::error::Error;

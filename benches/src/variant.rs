@@ -1,6 +1,6 @@
 //! What a row of a table renders with: a roulette strategy, and perhaps other choices.
 
-use croupier::learn::{ControlVariate, Learning, PixelEstimator};
+use croupier::unstable::learn::{ControlVariate, Learning, PixelEstimator};
 use croupier::{Settings, Strategy};
 
 /// Other choices by name, and what they are.

@@ -60,6 +60,8 @@ fn figures_that_do_not_agree_are_found() {
         ("1<!-- = sample / cbox, ears / Grays/s -->", "no such row or column"),
         ("1<!-- = sample / Speed-down / cbox / ears -->", "no such table"),
         ("1<!-- = sample / cbox -->", "is not FILE"),
+        ("1<!-- = sample / cbox, ears /\nMrays/s -->", "does not end on its line"),
+        ("1<!--\n= sample / cbox, ears / Mrays/s -->", "does not end on its line"),
         ("1<!-- = other / cbox / ears -->", "no other"),
         (
             "<!-- table = sample / Speed-up over classic -->\n| a | adrrs |\n|---|---|\n| cbox | 1.15 |",

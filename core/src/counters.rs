@@ -1,13 +1,13 @@
-//! What happened: work, lane utilisation and every event in which a bound was met.
+//! Counts of work, lane utilisation and every event in which a bound was reached.
 
 use crate::cost::{COST_BOUNCE, COST_CAMERA, COST_SHADOW};
 
-/// Lanes used of lanes offered.
+/// Lane utilisation of a stage: lanes used of lanes offered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Utilisation {
-    /// Packets run.
+    /// Number of packets run.
     pub packets: u64,
-    /// Active lanes in them.
+    /// Number of active lanes in them.
     pub lanes: u64,
 }
 
@@ -36,7 +36,7 @@ pub struct Counters {
     pub camera_rays: u64,
     /// Closest-hit rays from scattering.
     pub scatter_rays: u64,
-    /// Shadow rays.
+    /// Shadow rays traced.
     pub shadow_rays: u64,
     /// Camera samples finished.
     pub camera_samples: u64,
@@ -44,23 +44,23 @@ pub struct Counters {
     pub vertex_samples: u64,
     /// Vertices at which roulette ended the path.
     pub paths_terminated: u64,
-    /// Samples that splitting added.
+    /// Samples of vertices that splitting added.
     pub splits: u64,
-    /// Lanes whose factor was cut to 1 because the ring was nearly full.
+    /// Lanes whose splitting factor was limited to 1 because the ring was nearly full.
     pub splits_limited_by_ring: u64,
-    /// Lanes whose factor was cut to 1 because their camera sample had used up its split budget.
+    /// Lanes whose splitting factor was limited to 1 because their camera sample had used up its split budget.
     pub splits_limited_by_budget: u64,
-    /// Shadow rays that roulette spared.
+    /// Shadow rays terminated by roulette before they were traced.
     pub shadow_rays_terminated: u64,
-    /// Light samples that roulette spared.
+    /// Light samples skipped: samples of vertices for which roulette left out next event estimation.
     pub light_samples_skipped: u64,
     /// Sum of the segments of all paths, shared ones counted for each.
     pub path_segments: u64,
     /// Samples that were offered to the statistics, the refused ones included.
     pub samples_logged: u64,
     /// Samples that were not learned from because their bin had enough of this iteration
-    /// ([`crate::learn::cache::BIN_LIMIT`]), or because a number overflowed. Many of them: the statistics lean to the
-    /// first tiles of each shard.
+    /// ([`crate::learn::cache::BIN_LIMIT`]), or because a number overflowed. If there are many, the statistics
+    /// represent mainly the first tiles of each shard.
     pub samples_refused: u64,
     /// Shadow rays whose visibility was not learned from because their bin had enough of this
     /// iteration ([`crate::learn::cache::BIN_LIMIT`]).
@@ -70,43 +70,44 @@ pub struct Counters {
     pub ledger_full: u64,
     /// Vertices whose factor was not a finite number and became 1.
     pub factors_not_finite: u64,
-    /// Hits at which a path ended because of the longest path length ([`crate::MAX_PATH_LENGTH`]) before its `max_depth`.
+    /// Hits at which a path ended because of the longest path length ([`crate::MAX_PATH_LENGTH`]) before its
+    /// `max_depth`.
     pub max_length_reached: u64,
-    /// Light samples so near to a point light that its distance was taken for larger (NUMERICS SOL-5).
+    /// Light samples so near to a point light that the distance was clamped to a larger one (NUMERICS SOL-5).
     pub distances_clamped: u64,
     /// Contributions or weights that were not finite and were not added.
     pub non_finite: u64,
     /// Film index of the pixel of the first of them, plus 1; 0 if there is none.
     pub first_non_finite: u64,
-    /// Scatter stage.
+    /// Lane utilisation of the scatter stage.
     pub scatter: Utilisation,
-    /// Closest-hit stage.
+    /// Lane utilisation of the closest-hit stage.
     pub trace: Utilisation,
-    /// Shadow stage.
+    /// Lane utilisation of the shadow-ray stage.
     pub occlude: Utilisation,
-    /// Surface stage (hits only).
+    /// Lane utilisation of the shading stage (hits only).
     pub surface: Utilisation,
-    /// Look-ups of statistics by place or pixel.
+    /// Lane utilisation of look-ups in learned statistics.
     pub look_ups: Utilisation,
-    /// Most vertices that waited at once.
+    /// Largest number of vertices that waited at once.
     pub ring_peak: u64,
 }
 
 impl Counters {
-    /// Rays of all kinds.
+    /// Number of rays of all kinds.
     pub fn rays(&self) -> u64 {
         self.camera_rays + self.scatter_rays + self.shadow_rays
     }
 
-    /// What efficiency is reckoned with: rays, each times its relative cost ([`crate::cost::COST_SHADOW`] and its
-    /// like).
+    /// Counted cost, by which efficiency is computed: rays, each times its relative cost ([`crate::cost::COST_SHADOW`]
+    /// and the like).
     pub fn cost(&self) -> f64 {
         let parts =
             [(self.camera_rays, COST_CAMERA), (self.scatter_rays, COST_BOUNCE), (self.shadow_rays, COST_SHADOW)];
         parts.iter().map(|&(rays, cost)| rays as f64 * f64::from(cost)).sum()
     }
 
-    /// Paths: camera samples and what splitting added.
+    /// Number of paths: camera samples and samples that splitting added.
     pub fn paths(&self) -> u64 {
         self.camera_samples + self.splits
     }

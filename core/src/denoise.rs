@@ -1,5 +1,5 @@
-//! The built-in denoiser: a guess at the noise-free picture from the noisy one, the errors of its pixels and what the
-//! first hits look like. In fixed memory, the same bits on every instruction set.
+//! The built-in denoiser: an estimate of the noise-free picture from the noisy one, the standard errors of its pixels,
+//! and albedo and normal of the first hits. In fixed memory, with the same bits on every instruction set.
 //!
 //! ```text
 //! prepare   e = color / albedo; pixels that are not finite are filled from their neighbours;
@@ -8,19 +8,19 @@
 //!           weight = kernel * max(0, 1 - |e(p) - e(q)|^2 / (k^2 (var(p) + var(q))) - feature distance)^2;
 //!           the variance of the mean goes along
 //! despeckle a pixel beyond all its 8 neighbours goes to the nearest of them, by 3 standard errors at most
-//! finish    what the picture lost or gained in all goes back to its noisy pixels; color = e * albedo
+//! finish    the difference of the means goes back to the noisy pixels; color = e * albedo
 //! ```
 //!
 //! Two pixels belong together if their standard errors explain their difference (Sakai et al., A Statistical Approach
-//! to Monte Carlo Denoising, SIGGRAPH Asia 2024, test memberships in one window): so a bright rare sample, whose error
-//! is as large as itself, is shared out, and an edge that the errors do not explain stays. The scales are those of
-//! Dammertz et al., Edge-Avoiding À-Trous Wavelet Transform, HPG 2010, with the variance carried along as by Schied et
-//! al., Spatiotemporal Variance-Guided Filtering, HPG 2017. Dividing by the albedo keeps textures.
+//! to Monte Carlo Denoising, SIGGRAPH Asia 2024, test memberships in one window): a rare bright sample, whose error is
+//! as large as itself, is distributed over its neighbours, and an edge that the errors do not explain stays. The scales
+//! are those of Dammertz et al., Edge-Avoiding À-Trous Wavelet Transform, HPG 2010, with the variance filtered along as
+//! by Schied et al., Spatiotemporal Variance-Guided Filtering, HPG 2017. Dividing by the albedo keeps textures.
 //!
-//! A weighted mean darkens a little where bright pixels find few companions, hence the last step: the mean of the
-//! picture is that of its samples. It has one limit: a pixel of one sample has no variance but its square, which
-//! excuses every difference. From one sample per pixel the features alone draw the edges, and a lamp that looks like
-//! its wall bleeds.
+//! A weighted mean darkens a little where bright pixels have few similar neighbours, hence the last step: the mean of
+//! the picture is that of its samples. One limit remains: the variance of a pixel with one sample is taken to be its
+//! square, which explains every difference. With one sample per pixel only the features make edges, and an emitter with
+//! the albedo and normal of the wall around it bleeds.
 
 mod filter;
 mod finish;
@@ -35,16 +35,18 @@ pub use planes::Planes;
 
 use grid::{FEATURES, Grid, SIGNAL};
 
-/// Distances of the taps, level by level.
+/// Distance of the taps at each level, pixels.
 const STEPS: [usize; 5] = [1, 2, 4, 8, 16];
 /// Standard errors of a difference at which two pixels stop belonging together at the first level. Chosen by hand
 /// after varying one number at a time, by the relMSE of seven scenes with 4 and 16 samples per pixel: no joint optimum,
 /// and not checked on other scenes.
 const MEMBERSHIP: f32 = 2.75;
-/// Its factor from level to level: neighbours have come to share samples, and variances count them as independent.
+/// Factor of [`MEMBERSHIP`] from level to level: filtered neighbours share samples, which variances count as
+/// independent.
 const MEMBERSHIP_DECAY: f32 = 0.95;
 
-/// Values of scratch memory that [`denoise`] needs for a picture of `size`; `usize::MAX` if that is not addressable.
+/// Number of values of scratch memory that [`denoise`] needs for a picture of `size`; `usize::MAX` if that is not
+/// addressable.
 pub fn scratch_len(size: [u32; 2]) -> usize {
     let grid = Grid::new(size);
     grid.rows.saturating_mul(grid.stride).saturating_mul(2 * SIGNAL + FEATURES)

@@ -3,17 +3,37 @@
 //! Data flows one way: scene bytes -> [`Scene`] (validated once) -> plan (how many bytes) -> the caller's
 //! memory -> session and shards -> `step` ... -> film.
 //!
+//! Layers, lowest first; each may use those above it in the table, and no others:
+//!
 //! | layer | knows | must not know |
 //! |---|---|---|
-//! | [`scene`] | the blob's sections, validation | how light moves |
-//! | [`accel`] | rays against the tree | materials, light |
-//! | [`bsdf`] | scattering in local frames | geometry, lights |
-//! | [`light`] | emission and its sampling | scattering |
-//! | [`rrs`] | how many samples a vertex gets | where it is |
-//! | [`learn`] | statistics by place and direction | how paths are traced |
-//! | `tracer` | packets, queues, stages | files, threads, clocks |
-//! | [`film`] | sums per pixel and their error | paths |
-//! | [`denoise`] | pictures and their errors | paths, films but for one copy |
+//! | `memory` | sizes first, then one carve | what is stored |
+//! | `names` | enumerations with names | what they stand for |
+//! | `cost` | counted cost of rays | clocks |
+//! | `counters` | what happened, bounds met | why |
+//! | `tiles` | which pixels belong to which shard | threads |
+//! | `rng` | keys and hashes | what is drawn |
+//! | `sampler` | what paths draw, in which dimensions | rays, light |
+//! | `scene` | the blob's sections, validation | how light moves |
+//! | `profile` | sets of effects | kernels |
+//! | `geometry` | rays, hits, points on surfaces | trees, materials |
+//! | `camera` | rays through pixels | scenes beyond the camera |
+//! | `texture` | texels at coordinates | materials |
+//! | `accel` | rays against the tree | materials, light |
+//! | `bsdf` | scattering in local frames | geometry, lights |
+//! | `light` | emission and its sampling | scattering |
+//! | `rrs` | how many samples a vertex gets | where it is |
+//! | `film` | sums per pixel and their error | paths |
+//! | `denoise` | pictures and their errors | paths, films but for one copy |
+//! | `setting` | settings by name and text | what they set |
+//! | `learn` | statistics by place and direction | materials, lights, how paths are traced |
+//! | `settings` | the caller's choices, their ranges | how they are followed |
+//! | `world` | what paths read | who owns it |
+//! | `tracer` | packets, the refill ring, stages, books | files, threads, clocks |
+//! | `plan` | how many bytes a render needs | where they come from |
+//! | `session` | iterations: merge, learn, begin again | how paths are traced |
+//!
+//! [`unstable`] shows most of them to hosts that want more than the names at the top.
 //!
 //! A host asks how much memory is needed, hands it over, and steps the shards from as many threads as it likes:
 //!
@@ -43,44 +63,116 @@
 //! Comments that say `NUMERICS XXX-n` refer to the rows of docs/NUMERICS.md: hard numerical cases and their tests.
 #![no_std]
 #![forbid(unsafe_code)]
+#![deny(clippy::expect_used, clippy::panic, clippy::unreachable, clippy::unwrap_used)]
 
-pub mod accel;
-pub mod bsdf;
-pub mod camera;
-pub mod cost;
+mod accel;
+mod bsdf;
+mod camera;
+mod cost;
 mod counters;
-pub mod denoise;
-pub mod film;
-pub mod geometry;
-pub mod learn;
-pub mod light;
+mod denoise;
+mod film;
+mod geometry;
+mod learn;
+mod light;
 mod memory;
 mod names;
 mod plan;
-pub mod profile;
-pub mod rng;
-pub mod rrs;
+mod profile;
+mod rng;
+mod rrs;
 mod sampler;
-pub mod scene;
+mod scene;
 mod session;
 mod setting;
 mod settings;
 #[cfg(test)]
 mod testing;
-pub mod texture;
+mod texture;
 mod tiles;
 mod tracer;
 mod world;
 
-pub use counters::{Counters, Utilisation};
-pub use croupier_simd as simd;
+pub use counters::Counters;
 pub use film::{ErrorEstimate, Film};
-pub use memory::{BLOCK_ALIGN, Layout, MemoryError};
+pub use memory::{BLOCK_ALIGN, MemoryError};
 pub use plan::Plan;
 pub use rrs::Strategy;
-pub use scene::{Effects, Scene, SceneError};
-pub use session::{Phase, Session, SessionBuilder, SessionError};
-pub use setting::{SettingError, SettingInfo, SettingRange, SettingValue};
-pub use settings::{MAX_PATH_LENGTH, MIN_RING, Settings, SettingsError};
-pub use tracer::{BYTES_PER_PATH, Budget, Shard, ShardError, StepResult};
-pub use world::{Iteration, World};
+pub use scene::{Scene, SceneError};
+pub use session::{Session, SessionError};
+pub use setting::SettingError;
+pub use settings::{Settings, SettingsError};
+pub use tracer::{Budget, Shard, ShardError, StepResult};
+
+/// Everything else that a host may replace, measure or test: kernels, statistics, the scene's layout.
+///
+/// **Unstable.** Names, signatures and behaviour in here may change in any 0.x version, without a version that announces
+/// it. The names at the top of the crate change only with a note in CHANGELOG.
+pub mod unstable {
+    pub use crate::counters::Utilisation;
+    pub use crate::memory::Layout;
+    pub use crate::scene::Effects;
+    pub use crate::session::{Phase, SessionBuilder};
+    pub use crate::setting::{SettingInfo, SettingRange, SettingValue};
+    pub use crate::settings::{MAX_PATH_LENGTH, MIN_RING};
+    pub use crate::tracer::BYTES_PER_PATH;
+    pub use crate::world::{Iteration, World};
+    pub use croupier_simd as simd;
+
+    /// Rays against triangles.
+    pub mod accel {
+        pub use crate::accel::*;
+    }
+    /// Scattering models in the local shading frame.
+    pub mod bsdf {
+        pub use crate::bsdf::*;
+    }
+    /// Rays through pixels.
+    pub mod camera {
+        pub use crate::camera::*;
+    }
+    /// Counted cost of rays.
+    pub mod cost {
+        pub use crate::cost::*;
+    }
+    /// Denoising of pictures with known errors.
+    pub mod denoise {
+        pub use crate::denoise::*;
+    }
+    /// Sums per pixel and their errors.
+    pub mod film {
+        pub use crate::film::*;
+    }
+    /// Rays, hits and points on surfaces.
+    pub mod geometry {
+        pub use crate::geometry::*;
+    }
+    /// Statistics learned from paths.
+    pub mod learn {
+        pub use crate::learn::*;
+    }
+    /// Emission and its sampling.
+    pub mod light {
+        pub use crate::light::*;
+    }
+    /// Kernel profiles: effects that are compiled in.
+    pub mod profile {
+        pub use crate::profile::*;
+    }
+    /// Counter-based random numbers.
+    pub mod rng {
+        pub use crate::rng::*;
+    }
+    /// Strategies of Russian roulette and splitting.
+    pub mod rrs {
+        pub use crate::rrs::*;
+    }
+    /// The scene blob and its records.
+    pub mod scene {
+        pub use crate::scene::*;
+    }
+    /// Texture look-up.
+    pub mod texture {
+        pub use crate::texture::*;
+    }
+}

@@ -1,21 +1,21 @@
-//! The caller's memory: sizes first, then one carve.
+//! Memory of the caller: sizes are asked for first, then each block is carved once.
 
 use bytemuck::Pod;
 use core::fmt;
 
-/// Blocks must start at a multiple of this many bytes.
+/// Alignment of blocks, bytes.
 pub const BLOCK_ALIGN: usize = 64;
 
 /// Size and alignment of a block that the caller provides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
-    /// Bytes.
+    /// Size of the block, bytes.
     pub size: usize,
-    /// Alignment of its first byte.
+    /// Alignment of its first byte, bytes.
     pub align: usize,
 }
 
-/// Why a block cannot be used.
+/// Reason why a block cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MemoryError {
     /// The block is too small.
@@ -40,7 +40,8 @@ impl fmt::Display for MemoryError {
 
 impl core::error::Error for MemoryError {}
 
-/// Adds up the bytes of successive slices, each started at [`BLOCK_ALIGN`]. `None` is "more than addressable".
+/// Sum of the bytes of successive slices, each starting at a multiple of [`BLOCK_ALIGN`]; `None` if that is not
+/// addressable.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Measure(pub Option<usize>);
 
@@ -61,13 +62,13 @@ impl Measure {
     }
 }
 
-/// Hands out successive slices of a block.
+/// Source of successive slices of a block.
 pub(crate) struct Carver<'m> {
     rest: &'m mut [u8],
 }
 
 impl<'m> Carver<'m> {
-    /// Checks the block.
+    /// Checks size and alignment of the block.
     pub(crate) fn new(block: &'m mut [u8], layout: Layout) -> Result<Self, MemoryError> {
         let given = block.len();
         let rest = block.get_mut(..layout.size).ok_or(MemoryError::TooSmall { needed: layout.size, given })?;
@@ -77,15 +78,15 @@ impl<'m> Carver<'m> {
         Ok(Self { rest })
     }
 
-    /// The next `n` records, zeroed; the sequence of calls must be that of [`Measure::add`].
+    /// Takes the next `n` records, zeroed; the sequence of calls must be that of [`Measure::add`].
     pub(crate) fn take<T: Pod>(&mut self, n: usize) -> Result<&'m mut [T], MemoryError> {
         let records = self.take_unset(n)?;
         records.fill(T::zeroed());
         Ok(records)
     }
 
-    /// The next `n` records with whatever the caller's memory holds: for slabs that are written before they are read.
-    /// The system need not provide pages that are never used. `Debug` shows what is there.
+    /// Takes the next `n` records with the bytes that the caller's memory holds: for slabs that are written before they
+    /// are read. Pages that are never used need not exist. `Debug` shows the bytes that are there.
     pub(crate) fn take_unset<T: Pod>(&mut self, n: usize) -> Result<&'m mut [T], MemoryError> {
         let used = n * size_of::<T>();
         let padded = (used + BLOCK_ALIGN - 1) & !(BLOCK_ALIGN - 1);

@@ -5,17 +5,17 @@ use crate::scene::Effects;
 
 /// A set of effects, fixed at compile time. A firmware defines its own; hosts choose one of the closed set here.
 pub trait Profile {
-    /// What the kernels contain.
+    /// Effects that the kernels contain.
     const EFFECTS: Effects;
-    /// Name for reports.
+    /// Name of the profile in reports.
     const NAME: &'static str;
 }
 
-/// Diffuse surfaces under area lights or a constant sky.
+/// Diffuse surfaces under area lights or a constant environment.
 #[derive(Clone, Copy, Debug)]
 pub struct DiffuseOnly;
 
-/// Everything.
+/// Every effect.
 #[derive(Clone, Copy, Debug)]
 pub struct Full;
 
@@ -33,7 +33,7 @@ impl Profile for Full {
     const NAME: &'static str = "full";
 }
 
-/// The closed set, for hosts that load arbitrary scenes.
+/// Closed set of profiles, for hosts that load arbitrary scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AnyProfile {
     /// [`DiffuseOnly`].
@@ -43,12 +43,12 @@ pub enum AnyProfile {
 }
 
 impl AnyProfile {
-    /// The smallest of the set that holds `effects`.
+    /// Smallest profile of the set that contains `effects`.
     pub const fn smallest(effects: Effects) -> Self {
         if DiffuseOnly::EFFECTS.contains(effects) { Self::DiffuseOnly } else { Self::Full }
     }
 
-    /// Its name.
+    /// Name of the profile in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::DiffuseOnly => DiffuseOnly::NAME,

@@ -1,18 +1,19 @@
-//! Counter-based random numbers: a path's numbers depend on its key and on the dimension only, never on the order
-//! in which packets are processed.
+//! Counter-based random numbers: a path's numbers depend on its key and on the dimension only, not on the order in
+//! which packets are processed.
 
 use croupier_simd::{F32x8, U32x8};
 
 /// Eight 64-bit keys, one per path vertex or sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Key8 {
-    /// Low words.
+    /// Low words of the keys.
     pub lo: U32x8,
-    /// High words.
+    /// High words of the keys.
     pub hi: U32x8,
 }
 
-/// Four random words per lane: `pcg4d` of Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 9(3) 2020.
+/// Hash of four words to four random words per lane: `pcg4d` of Jarzynski and Olano, "Hash Functions for GPU
+/// Rendering", JCGT 9(3) 2020.
 #[inline(always)]
 fn pcg4d(v: [U32x8; 4]) -> [U32x8; 4] {
     let [mut x, mut y, mut z, mut w] = v.map(|a| a * U32x8::splat(1_664_525) + U32x8::splat(1_013_904_223));
@@ -41,7 +42,7 @@ impl Key8 {
         self.words(dimension).map(U32x8::to_unit)
     }
 
-    /// The key of child number `n` (a sample of a vertex, the next vertex of a sample).
+    /// Key of child number `n` (a sample of a vertex, the next vertex of a sample).
     #[inline(always)]
     pub fn child(self, n: U32x8) -> Self {
         let [lo, hi, ..] = pcg4d([self.lo, self.hi, n, U32x8::splat(0x85eb_ca6b)]);
@@ -50,7 +51,7 @@ impl Key8 {
 }
 
 impl Key8 {
-    /// The key of a camera sample.
+    /// Key of a camera sample.
     #[inline(always)]
     pub fn camera(seed: u64, pixel: U32x8, sample: U32x8) -> Self {
         let [lo, hi, ..] = pcg4d([pixel, sample, U32x8::splat(seed as u32), U32x8::splat((seed >> 32) as u32)]);

@@ -25,13 +25,16 @@ pub(crate) fn pixel_at(size: [u32; 2], film: u32) -> [u32; 2] {
 pub(crate) struct BlockGrid {
     size: [u32; 2],
     side: u32,
+    columns: u32,
+    rows: u32,
 }
 
 impl BlockGrid {
     /// Blocks of `side` pixels, at least 1, of a picture with `size` columns and rows.
     #[inline]
     pub(crate) fn new(size: [u32; 2], side: u32) -> Self {
-        Self { size, side }
+        let [columns, rows] = size.map(|n| n.div_ceil(side));
+        Self { size, side, columns, rows }
     }
 
     /// Tiles of a picture with `size` columns and rows.
@@ -40,31 +43,23 @@ impl BlockGrid {
         Self::new(size, TILE)
     }
 
-    /// Columns and rows of blocks.
-    #[inline]
-    fn shape(self) -> [u32; 2] {
-        self.size.map(|n| n.div_ceil(self.side))
-    }
-
     /// Number of blocks.
     #[inline]
     pub(crate) fn count(self) -> usize {
-        let [columns, rows] = self.shape();
-        columns as usize * rows as usize
+        self.columns as usize * self.rows as usize
     }
 
     /// Number of the block around the pixel with a film index.
     #[inline]
     pub(crate) fn of_pixel(self, film: u32) -> u32 {
         let [x, y] = pixel_at(self.size, film);
-        y / self.side * self.shape()[0] + x / self.side
+        y / self.side * self.columns + x / self.side
     }
 
     /// First column and row of a block.
     #[inline]
     fn start(self, block: u32) -> [u32; 2] {
-        let [columns, _] = self.shape();
-        [block % columns * self.side, block / columns * self.side]
+        [block % self.columns * self.side, block / self.columns * self.side]
     }
 
     /// First column and row of a block, and those behind its last.
@@ -84,6 +79,8 @@ impl BlockGrid {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tiles {
     size: [u32; 2],
+    columns: u32,
+    rows: u32,
     shards: u32,
     /// Tiles to skip per row, so that a column does not belong to one shard.
     skew: u32,
@@ -98,30 +95,34 @@ impl Tiles {
     pub(crate) fn new(size: [u32; 2], shards: u32) -> Self {
         // near the golden section of the shard count: rows start far apart
         let skew = (f64::from(shards) * 0.618_034) as u32;
-        Self { size, shards, skew }
+        let BlockGrid { columns, rows, .. } = BlockGrid::tiles(size);
+        Self { size, columns, rows, shards, skew }
     }
 
     fn owner(&self, tile: u32) -> u32 {
-        let [columns, _] = BlockGrid::tiles(self.size).shape();
-        let (x, y) = (tile % columns, tile / columns);
+        let (x, y) = (tile % self.columns, tile / self.columns);
         ((u64::from(x) + u64::from(y) * u64::from(self.skew.max(1))) % u64::from(self.shards)) as u32
     }
 
-    /// The first tile of `shard` at or after `tile`.
+    /// First tile of `shard` at or after `tile`.
     pub(crate) fn next_of(&self, shard: u32, tile: u32) -> Option<u32> {
-        (tile..BlockGrid::tiles(self.size).count() as u32).find(|&t| self.owner(t) == shard)
+        (tile..self.columns * self.rows).find(|&t| self.owner(t) == shard)
     }
 
     /// Upper bound of the tiles that a shard owns.
     pub(crate) fn most_tiles(&self) -> usize {
         // per row of tiles the owners run through all shards in turn
-        let [columns, rows] = BlockGrid::tiles(self.size).shape();
-        (rows as usize).saturating_mul(columns.div_ceil(self.shards) as usize)
+        (self.rows as usize).saturating_mul(self.columns.div_ceil(self.shards) as usize)
     }
 
-    /// Column and row of slot `slot` of `tile` (Morton order), if inside the picture.
-    pub(crate) fn pixel(&self, tile: u32, slot: u32) -> Option<[u32; 2]> {
-        let [x, y] = BlockGrid::tiles(self.size).start(tile);
+    /// First column and row of a tile.
+    pub(crate) fn start(&self, tile: u32) -> [u32; 2] {
+        [tile % self.columns * TILE, tile / self.columns * TILE]
+    }
+
+    /// Column and row of slot `slot` (Morton order) of the tile that starts at `[x, y]`, if inside the picture.
+    #[inline]
+    pub(crate) fn pixel(&self, [x, y]: [u32; 2], slot: u32) -> Option<[u32; 2]> {
         let (x, y) = (x + even_bits(slot), y + even_bits(slot >> 1));
         (x < self.size[0] && y < self.size[1]).then_some([x, y])
     }
@@ -153,7 +154,7 @@ mod tests {
                     while let Some(tile) = next {
                         let [from, to] = grid.corners(tile);
                         let mut inside = 0;
-                        for [x, y] in (0..TILE_PIXELS).filter_map(|slot| tiles.pixel(tile, slot)) {
+                        for [x, y] in (0..TILE_PIXELS).filter_map(|slot| tiles.pixel(tiles.start(tile), slot)) {
                             let film = tiles.film_index([x, y]);
                             assert_eq!(pixel_at(size, film as u32), [x, y]);
                             assert_eq!(grid.of_pixel(film as u32), tile, "{size:?}");

@@ -37,7 +37,7 @@ impl F32x8 {
         Self::new([f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7)])
     }
 
-    /// The lanes as an array.
+    /// Array of the lanes.
     #[inline(always)]
     pub const fn to_array(self) -> [f32; 8] {
         self.0.to_array()
@@ -49,7 +49,7 @@ impl F32x8 {
         self.to_array()[i & 7]
     }
 
-    /// `self` with lane `i & 7` replaced by `x`.
+    /// Copy of `self` with lane `i & 7` replaced by `x`.
     #[inline(always)]
     pub fn with_lane(self, i: usize, x: f32) -> Self {
         let mut a = self.to_array();
@@ -57,8 +57,8 @@ impl F32x8 {
         Self::new(a)
     }
 
-    /// `self * a + b`: two roundings in `reproducible` arithmetic, one in `fast` where the target fuses.
-    /// Never use it where a sign must be exact (edge functions, NUMERICS TRI-1).
+    /// Sum of a product, `self * a + b`: two roundings in `reproducible` arithmetic, one in `fast` where the target
+    /// fuses. Never use it where a sign must be exact (edge functions, NUMERICS TRI-1).
     #[inline(always)]
     pub fn mul_add(self, a: Self, b: Self) -> Self {
         #[cfg(feature = "fast")]
@@ -67,7 +67,7 @@ impl F32x8 {
         return self * a + b;
     }
 
-    /// `self < o ? o : self`: a NaN in either gives `self`, and so do two zeros of different sign.
+    /// Larger of both, `self < o ? o : self`: a NaN in either gives `self`, and so do two zeros of different sign.
     #[inline(always)]
     pub fn max(self, o: Self) -> Self {
         // `maxps o, self` is this rule in one instruction; other targets' maxima treat NaN and zeros differently.
@@ -77,7 +77,7 @@ impl F32x8 {
         return self.lt(o).select(o, self);
     }
 
-    /// `o < self ? o : self`: a NaN in either gives `self`, and so do two zeros of different sign.
+    /// Smaller of both, `o < self ? o : self`: a NaN in either gives `self`, and so do two zeros of different sign.
     #[inline(always)]
     pub fn min(self, o: Self) -> Self {
         #[cfg(target_feature = "sse")]
@@ -86,7 +86,7 @@ impl F32x8 {
         return o.lt(self).select(o, self);
     }
 
-    /// Between `lo` and `hi` (`lo <= hi`, no NaN); a NaN becomes `lo`.
+    /// Clamped to `lo` and `hi` (`lo <= hi`, no NaN); a NaN becomes `lo`.
     #[inline(always)]
     pub fn clamp(self, lo: f32, hi: f32) -> Self {
         Self::splat(lo).max(self).min(Self::splat(hi))
@@ -148,7 +148,7 @@ impl F32x8 {
         }
     }
 
-    /// `self * self`.
+    /// Square.
     #[inline(always)]
     pub fn sqr(self) -> Self {
         self * self
@@ -204,7 +204,7 @@ impl F32x8 {
         Mask8(self.0.simd_eq(o.0))
     }
 
-    /// The bit patterns.
+    /// Bit patterns of the lanes.
     #[inline(always)]
     pub fn to_bits(self) -> U32x8 {
         bytemuck::cast(self)
@@ -216,7 +216,7 @@ impl F32x8 {
         bytemuck::cast(b)
     }
 
-    /// Towards zero; saturates, NaN gives 0.
+    /// Integers, rounded towards zero and saturating; NaN gives 0.
     #[inline(always)]
     pub fn to_i32(self) -> I32x8 {
         I32x8(self.0.trunc_int())

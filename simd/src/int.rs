@@ -37,7 +37,7 @@ macro_rules! common {
         Self::new([f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7)])
             }
 
-            /// The lanes as an array.
+            /// Array of the lanes.
             #[inline(always)]
             pub const fn to_array(self) -> [$s; 8] {
                 self.0.to_array()
@@ -117,7 +117,7 @@ impl U32x8 {
         a[0].min(a[4]).min(a[2].min(a[6])).min(a[1].min(a[5]).min(a[3].min(a[7])))
     }
 
-    /// The same bits as signed numbers.
+    /// Signed numbers of the same bits.
     #[inline(always)]
     pub fn to_i32(self) -> I32x8 {
         bytemuck::cast(self)
@@ -131,7 +131,7 @@ impl I32x8 {
         F32x8(self.0.round_float())
     }
 
-    /// The same bits as unsigned numbers.
+    /// Unsigned numbers of the same bits.
     #[inline(always)]
     pub fn to_u32(self) -> U32x8 {
         bytemuck::cast(self)

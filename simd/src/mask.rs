@@ -11,35 +11,35 @@ pub struct Mask8(pub(crate) f32x8);
 const BITS: [u32; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
 
 impl Mask8 {
-    /// No lane.
+    /// Mask without lanes.
     pub const NONE: Self = Self(f32x8::splat(0.0));
 
-    /// All lanes equal to `b`.
+    /// Mask with all lanes equal to `b`.
     #[inline(always)]
     pub fn splat(b: bool) -> Self {
         Self(bytemuck::cast(wide::u32x8::splat(u32::from(b).wrapping_neg())))
     }
 
-    /// All lanes.
+    /// Mask with all lanes.
     #[inline(always)]
     pub fn all_lanes() -> Self {
         Self(!f32x8::splat(0.0))
     }
 
-    /// Lane `i` from bit `i`; higher bits are ignored.
+    /// Mask with lane `i` from bit `i`; higher bits are ignored.
     #[inline(always)]
     pub fn from_bits(bits: u32) -> Self {
         let b = wide::u32x8::new(BITS);
         Self(bytemuck::cast((wide::u32x8::splat(bits) & b).simd_eq(b)))
     }
 
-    /// The first `n` lanes.
+    /// Mask with the first `n` lanes.
     #[inline(always)]
     pub fn first(n: usize) -> Self {
         Self::from_bits((1u32 << n.min(8)) - 1)
     }
 
-    /// Lane `i` as bit `i`.
+    /// Bits of the lanes: bit `i` is lane `i`.
     #[inline(always)]
     pub fn bits(self) -> u32 {
         self.0.to_bitmask()
@@ -63,19 +63,19 @@ impl Mask8 {
         self.bits() == 0
     }
 
-    /// How many lanes are set.
+    /// Number of set lanes.
     #[inline(always)]
     pub fn count(self) -> u32 {
         self.bits().count_ones()
     }
 
-    /// Lane `i`; `false` outside `0..8`.
+    /// State of lane `i`; `false` outside `0..8`.
     #[inline(always)]
     pub fn lane(self, i: usize) -> bool {
         i < 8 && self.bits() >> i & 1 == 1
     }
 
-    /// The set lanes' numbers, ascending.
+    /// Numbers of the set lanes, ascending.
     #[inline(always)]
     pub fn lanes(self) -> Lanes {
         Lanes(self.bits())

@@ -18,24 +18,24 @@ pub struct Vec3x8 {
 pub const LUMINANCE: [f64; 3] = [0.212_671, 0.715_16, 0.072_169];
 
 impl Vec3x8 {
-    /// All components 0.
+    /// Zero vectors.
     pub const ZERO: Self = Self::splat(0.0, 0.0, 0.0);
-    /// All components 1.
+    /// Vectors with all components 1.
     pub const ONE: Self = Self::splat(1.0, 1.0, 1.0);
 
-    /// From components.
+    /// Vectors of these components.
     #[inline(always)]
     pub const fn new(x: F32x8, y: F32x8, z: F32x8) -> Self {
         Self { x, y, z }
     }
 
-    /// The same vector in all lanes.
+    /// One vector in all lanes.
     #[inline(always)]
     pub const fn splat(x: f32, y: f32, z: f32) -> Self {
         Self { x: F32x8::splat(x), y: F32x8::splat(y), z: F32x8::splat(z) }
     }
 
-    /// The same value in all three components.
+    /// Vectors with one value in all three components.
     #[inline(always)]
     pub const fn grey(x: F32x8) -> Self {
         Self { x, y: x, z: x }
@@ -92,7 +92,8 @@ impl Vec3x8 {
         v / v.length()
     }
 
-    /// `self / |self|` for vectors whose squared length neither under- nor overflows (1e-18 < |v| < 1e18).
+    /// Unit vector, `self / |self|`, for vectors whose squared length neither under- nor overflows (1e-18 < |v| <
+    /// 1e18).
     #[inline(always)]
     pub fn normalize_fast(self) -> Self {
         self * (F32x8::ONE / self.length())

@@ -2,7 +2,7 @@
 //! writer that turns its parts into bytes. Corrupting a part and writing it again gives a blob with a valid hash.
 
 use bytemuck::{Pod, Zeroable};
-use croupier::scene::blob::*;
+use croupier::unstable::scene::blob::*;
 
 /// Bytes at an address that is a multiple of 64.
 #[derive(Clone, Debug)]

@@ -2,10 +2,10 @@
 //! equations over complex indices), written without looking at the vector code, and the table of cases under test.
 
 use crate::quadrature::{jittered, midpoint};
-use croupier::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
-use croupier::scene::blob::{Camera, Material, MaterialKind, NONE, SceneInfo};
-use croupier::scene::{Effects, Records, Scene};
-use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
+use croupier::unstable::scene::blob::{Camera, Material, MaterialKind, NONE, SceneInfo};
+use croupier::unstable::scene::{Effects, Records, Scene};
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_host::microfacet;
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
 

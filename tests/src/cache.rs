@@ -2,17 +2,17 @@
 
 use crate::stats::SplitMix;
 use bytemuck::{Pod, Zeroable};
-use croupier::learn::Objective;
-use croupier::learn::cache::{Cache, CacheSize, Training, VertexKind, VertexKind8};
-use croupier::rrs::Local8;
-use croupier::scene::blob::content_hash;
-use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::learn::Objective;
+use croupier::unstable::learn::cache::{Cache, CacheSize, Training, VertexKind, VertexKind8};
+use croupier::unstable::rrs::Local8;
+use croupier::unstable::scene::blob::content_hash;
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C, align(64))]
 struct Line([u8; 64]);
 
-/// Memory for the shared side and a training side each.
+/// Memory for the shared side and the training sides of a cache.
 pub struct Blocks {
     size: CacheSize,
     shared: Vec<Line>,
@@ -20,14 +20,14 @@ pub struct Blocks {
 }
 
 impl Blocks {
-    /// For a number of leaves or a little more.
+    /// Memory for a number of leaves or a little more.
     pub fn leaves(leaves: usize, shards: usize) -> Self {
         let size =
             CacheSize::within((leaves + 4) * (2326 + 832 * shards) + 4096, shards as u32).expect("room for a cache");
         Self::new(size, shards)
     }
 
-    /// Not zeroed: the cache must not rely on it.
+    /// Memory that is not zeroed: the cache must not rely on it.
     pub fn new(size: CacheSize, shards: usize) -> Self {
         let lines = |bytes: usize| vec![Line([0xa5; 64]); bytes / 64];
         let shard = Training::layout(size).unwrap().size;
@@ -50,19 +50,19 @@ impl Blocks {
 /// Bounds of most tests: not a cube, not at the origin.
 pub const BOUNDS: [[f32; 3]; 2] = [[-1.0, 2.0, -3.0], [3.0, 4.5, 0.25]];
 
-/// A place near the surface of a ball in [`BOUNDS`] and a direction: what vertices look like.
+/// Position near the surface of a ball in [`BOUNDS`], and a direction, as vertices have them.
 pub fn vertex(rng: &mut SplitMix) -> ([f32; 3], [f32; 3]) {
     let n = rng.direction();
     let c = [1.0, 3.25, -1.5];
     (core::array::from_fn(|a| (c[a] + 1.1 * n[a] + rng.range(-0.01, 0.01)) as f32), n.map(|x| x as f32))
 }
 
-/// Kind of this number.
+/// Kind with this number, in all lanes.
 pub fn kind(number: u32) -> VertexKind8 {
     VertexKind8::splat(VertexKind::ALL[number as usize])
 }
 
-/// Number of any kind.
+/// Number of a random kind.
 pub fn any_kind(rng: &mut SplitMix) -> u32 {
     (rng.bits() % VertexKind::ALL.len() as u64) as u32
 }
@@ -73,7 +73,7 @@ pub fn find(cache: &Cache<'_>, number: u32, p: [f32; 3], d: [f32; 3]) -> u32 {
     cache.find(kind(number), p, d, Mask8::all_lanes()).lane(5)
 }
 
-/// What is known of the bins `8 k` to `8 k + 7`.
+/// Statistics of all bins, eight at a time.
 pub fn locals(cache: &Cache<'_>) -> impl Iterator<Item = Local8> {
     let local = |k: u32| cache.local(U32x8::from_fn(|i| 8 * k + i as u32), Mask8::all_lanes());
     (0..cache.bins() / 8).map(local)
@@ -104,7 +104,7 @@ pub fn iterate(cache: &mut Cache<'_>, shards: &mut [Training<'_>], n: usize, spl
             assert!(t.log(bin, x, (rng.bits() >> 61) as f32));
             assert!(t.log_pair(bin, x));
             assert!(t.log_shadow(bin, x[0] < 0.02));
-            t.log_light(bin, x, 0.5);
+            t.log_nee(bin, x, 0.5);
         }
     }
     cache.begin_merge(1.0);
@@ -112,7 +112,7 @@ pub fn iterate(cache: &mut Cache<'_>, shards: &mut [Training<'_>], n: usize, spl
     cache.freeze(split);
 }
 
-/// The cache's bytes.
+/// Saved bytes of the cache.
 pub fn saved(cache: &Cache<'_>) -> Vec<u8> {
     let mut bytes = vec![0x5a; cache.saved_len()];
     assert_eq!(cache.save(&mut bytes), Ok(bytes.len()));
@@ -125,41 +125,41 @@ pub fn rehash(bytes: &mut [u8]) {
     bytes[8..16].copy_from_slice(&h.to_le_bytes());
 }
 
-/// Where the sums start in saved bytes.
+/// Offset of the sums in saved bytes.
 pub fn sums_at(bytes: &[u8]) -> usize {
     let nodes = u32::from_le_bytes(bytes[20..24].try_into().unwrap()) as usize;
     64 + nodes.div_ceil(8) * 8
 }
 
-/// A node of the oracle.
-enum Node {
+/// Node of the oracle's trees.
+enum OracleNode {
     Inner(Vec<usize>),
     Leaf(usize),
 }
 
-/// Numbers of a bin.
+/// Number of sums of a bin.
 pub const FIELDS: usize = 15;
 
-/// Of a bin: count, pairs, cost, sum (3), squared sum (3), pair sum (3), shadow rays, those that met nothing, squares
-/// of light samples.
+/// Sums of a bin: count, pairs, cost, sum (3), squared sum (3), pair sum (3), shadow rays, unoccluded ones, squares of
+/// next event estimation.
 pub type Sums = [f64; FIELDS];
 
-/// What saved bytes mean, in f64.
+/// Reader of saved bytes, in f64.
 pub struct Oracle {
-    nodes: Vec<Node>,
+    nodes: Vec<OracleNode>,
     roots: [usize; 4],
     lo: [f64; 3],
     edge: f64,
-    /// Per leaf and bin.
+    /// Sums per leaf and bin.
     pub leaves: Vec<[Sums; 16]>,
 }
 
-/// A leaf of the oracle.
+/// Leaf of the oracle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// Its number in the order of the bytes.
+    /// Number in the order of the bytes.
     pub leaf: usize,
-    /// Its edge, world units.
+    /// Edge, world units.
     pub edge: f64,
 }
 
@@ -180,17 +180,17 @@ impl Oracle {
         sums: &mut impl Iterator<Item = &'b [u8]>,
     ) -> usize {
         let node = if *shape.next().unwrap() == 1 {
-            Node::Inner((0..8).map(|_| self.read(shape, sums)).collect())
+            OracleNode::Inner((0..8).map(|_| self.read(shape, sums)).collect())
         } else {
             let mut number = || f64::from_le_bytes(sums.next().unwrap().try_into().unwrap());
             self.leaves.push([(); 16].map(|()| [(); FIELDS].map(|()| number())));
-            Node::Leaf(self.leaves.len() - 1)
+            OracleNode::Leaf(self.leaves.len() - 1)
         };
         self.nodes.push(node);
         self.nodes.len() - 1
     }
 
-    /// Is the place so near to a border of the finest grid that f32 may take the other side?
+    /// Is the position so near to a border of the finest grid that f32 may take the other side?
     pub fn ambiguous(&self, p: [f64; 3]) -> bool {
         (0..3).any(|a| {
             let cell = (p[a] - self.lo[a]) / self.edge * 65_536.0;
@@ -198,11 +198,11 @@ impl Oracle {
         })
     }
 
-    /// The leaf around a place, the nearest one for places outside.
+    /// Leaf around a position, the nearest one for positions outside.
     pub fn cell(&self, kind: u32, p: [f64; 3]) -> Cell {
         let (mut lo, mut edge) = (self.lo, self.edge);
         let mut node = self.roots[kind as usize];
-        while let Node::Inner(children) = &self.nodes[node] {
+        while let OracleNode::Inner(children) = &self.nodes[node] {
             edge *= 0.5;
             let mut child = 0;
             for a in 0..3 {
@@ -213,22 +213,22 @@ impl Oracle {
             }
             node = children[child];
         }
-        let Node::Leaf(leaf) = self.nodes[node] else { unreachable!() };
+        let OracleNode::Leaf(leaf) = self.nodes[node] else { unreachable!() };
         Cell { leaf, edge }
     }
 
-    /// Moves a place into the cube.
+    /// Moves a position into the cube.
     pub fn clamp(&self, p: [f64; 3]) -> [f64; 3] {
         core::array::from_fn(|a| p[a].clamp(self.lo[a], self.lo[a] + self.edge * (1.0 - 1e-7)))
     }
 
-    /// One number summed over everything.
+    /// One sum, over all bins of all leaves.
     pub fn total(&self, field: usize) -> f64 {
         self.leaves.iter().flatten().map(|b| b[field]).sum()
     }
 }
 
-/// Height (-1 to 1) and azimuth (0 to 2 pi) of a direction on the turned sphere that the bins are cut from.
+/// Height (-1 to 1) and azimuth (0 to 2 pi) of a direction on the rotated sphere that the bins are cut from.
 pub fn height_and_azimuth(d: [f64; 3]) -> [f64; 2] {
     let dot = |r: [f64; 3]| (r[0] * d[0] + r[1] * d[1] + r[2] * d[2]) / 3.0;
     let (height, x, y) = (dot([2.0, -1.0, 2.0]), dot([2.0, 2.0, -1.0]), dot([-1.0, 2.0, 2.0]));

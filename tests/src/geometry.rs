@@ -1,9 +1,9 @@
 //! Meshes, random rays and an f64 brute-force oracle for traversal.
 
-use croupier::geometry::Ray8;
-use croupier::scene::blob::{Camera, NONE, SceneInfo, Triangle, Vertex};
-use croupier::scene::{Effects, Records, Scene};
-use croupier::simd::{F32x8, Vec3x8};
+use croupier::unstable::geometry::Ray8;
+use croupier::unstable::scene::blob::{Camera, NONE, SceneInfo, Triangle, Vertex};
+use croupier::unstable::scene::{Effects, Records, Scene};
+use croupier::unstable::simd::{F32x8, Vec3x8};
 use croupier_host::bvh::{Effort, Tree, build};
 
 /// A triangle's vertices.

@@ -1,9 +1,9 @@
 //! Surfaces and emitters asked about by triangle, as tests know them.
 
-use croupier::geometry::{self, Hit8, SurfaceHit8, SurfacePoint8};
-use croupier::light::{self, LightSelector};
-use croupier::scene::Scene;
-use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::geometry::{self, Hit8, SurfaceHit8, SurfacePoint8};
+use croupier::unstable::light::{self, LightSelector};
+use croupier::unstable::scene::Scene;
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Hits of the triangles at parameter `t` and weights `u`, `v`, in the lanes of `mask`.
 pub fn hit(scene: &Scene<'_>, triangle: U32x8, t: F32x8, u: F32x8, v: F32x8, mask: Mask8) -> SurfaceHit8 {

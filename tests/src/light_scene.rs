@@ -2,8 +2,8 @@
 
 use bytemuck::Zeroable;
 use croupier::Scene;
-use croupier::scene::blob::*;
-use croupier::scene::{Effects, Records};
+use croupier::unstable::scene::blob::*;
+use croupier::unstable::scene::{Effects, Records};
 use croupier_host::{alias, environment};
 
 /// Owns what a [`Scene`] borrows.

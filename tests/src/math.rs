@@ -3,7 +3,7 @@
 //! The oracle of every function is the f64 function of the platform's C library, whose error (below 1e-9 of an f32
 //! ULP) does not count. One ULP at Y is the spacing of f32 at the exact Y, at least the smallest subnormal.
 
-use croupier::simd::{F32x8, REPRODUCIBLE};
+use croupier::unstable::simd::{F32x8, REPRODUCIBLE};
 
 /// Stride of the tests' sweeps: 2^26 arguments.
 pub const STRIDE: u64 = 512;

@@ -1,58 +1,58 @@
-//! Transport as the textbook has it: one sample at a time, by recursion, sums in f64. Random numbers come by key, so
-//! every sample of the packet machine can be told again; the ray, material and light functions are the core's own,
-//! tested elsewhere. What is independent here is the bookkeeping: which sample counts what, where, and how many rays it
-//! took.
+//! Recursive path tracer, one sample at a time, sums in f64: an oracle of the tracer's bookkeeping. Random numbers
+//! follow from keys, so it traces the same samples; the ray, material and light functions are the core's own, tested
+//! elsewhere. Independent are the weights of samples, their bins and their counted rays.
 //!
 //! For flat-shaded scenes of area lights without textures, lens and environment, and the absolute objective.
 
 use crate::cache::Sums;
 use crate::hit::{area_pdf, area_radiance, surface_point};
-use croupier::accel::{Intersector, WideBvh};
-use croupier::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
-use croupier::cost::COST_SHADOW;
-use croupier::geometry::{Ray8, offset, shadow_ray};
-use croupier::learn::cache::{Cache, VertexKind, VertexKind8};
-use croupier::light::{LightSample8, PowerSelector, power_heuristic, sample};
-use croupier::rng::Key8;
-use croupier::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind};
-use croupier::simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
-use croupier::{Scene, camera};
+use croupier::Scene;
+use croupier::unstable::accel::{Intersector, WideBvh};
+use croupier::unstable::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
+use croupier::unstable::camera;
+use croupier::unstable::cost::COST_SHADOW;
+use croupier::unstable::geometry::{Ray8, offset, shadow_ray};
+use croupier::unstable::learn::cache::{Cache, VertexKind, VertexKind8};
+use croupier::unstable::light::{LightSample8, PowerSelector, power_heuristic, sample};
+use croupier::unstable::rng::Key8;
+use croupier::unstable::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind};
+use croupier::unstable::simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
 
-/// What a replay needs to know.
+/// Recursive render of a scene, and what it has counted so far.
 pub struct Replay<'a, 's> {
-    /// The scene.
+    /// Scene to render.
     pub scene: Scene<'s>,
-    /// Its tree.
+    /// Intersector of the scene.
     pub bvh: WideBvh<'s>,
-    /// Numbers the bins; no tree has been split.
+    /// Cache that numbers the bins; no tree has been subdivided.
     pub cache: &'a Cache<'a>,
-    /// Settings of the same names.
+    /// Seed of the settings.
     pub seed: u64,
-    /// See [`Self::seed`].
+    /// Longest path of the settings.
     pub max_depth: u32,
-    /// See [`Self::seed`].
+    /// Size of the picture of the settings.
     pub size: [u32; 2],
-    /// Samples per vertex.
+    /// Number of samples per vertex.
     pub factor: u32,
-    /// Per bin.
+    /// Sums of the bins.
     pub sums: Vec<Sums>,
-    /// Rays of all kinds, samples of vertices.
+    /// Number of rays of all kinds, and of samples of vertices.
     pub counted: [u64; 2],
 }
 
-/// A bounce or a camera ray on its way.
-struct Flight {
+/// Scattered ray or camera ray.
+struct RayState {
     ray: Ray8,
     from: Vec3x8,
     normal: Vec3x8,
     pdf: F32x8,
-    alone: bool,
+    skip_mis: bool,
     key: Key8,
     depth: u32,
 }
 
-/// A vertex.
-struct Place {
+/// Path vertex.
+struct PathVertex {
     p: Vec3x8,
     error: F32x8,
     ng: Vec3x8,
@@ -62,7 +62,7 @@ struct Place {
     kind: MaterialKind,
 }
 
-struct AlbedoOf<'a, 's>(&'a Scene<'s>, &'a Place);
+struct AlbedoOf<'a, 's>(&'a Scene<'s>, &'a PathVertex);
 
 impl<'s> Visitor<'s> for AlbedoOf<'_, 's> {
     type Out = (Vec3x8, bool);
@@ -73,7 +73,7 @@ impl<'s> Visitor<'s> for AlbedoOf<'_, 's> {
     }
 }
 
-struct Scatter<'a, 's>(&'a Scene<'s>, &'a Place, Vec3x8, [F32x8; 3]);
+struct Scatter<'a, 's>(&'a Scene<'s>, &'a PathVertex, Vec3x8, [F32x8; 3]);
 
 impl<'s> Visitor<'s> for Scatter<'_, 's> {
     type Out = (Eval8, Sample8);
@@ -88,7 +88,7 @@ impl<'s> Visitor<'s> for Scatter<'_, 's> {
     }
 }
 
-/// One lane works, the others rest.
+/// Mask of the only lane in use.
 fn one() -> Mask8 {
     Mask8::first(1)
 }
@@ -98,7 +98,7 @@ fn rgb(v: Vec3x8) -> [f64; 3] {
 }
 
 impl Replay<'_, '_> {
-    /// Radiance of one camera sample.
+    /// Radiance of one camera sample, rgb.
     pub fn camera_sample(&mut self, [x, y]: [u32; 2], sample: u32) -> [f64; 3] {
         let key = Key8::camera(self.seed, U32x8::splat(y * self.size[0] + x), U32x8::splat(sample));
         let [u0, u1, ..] = key.uniforms(0);
@@ -110,20 +110,20 @@ impl Replay<'_, '_> {
             F32x8::splat(y as f32) + u1,
             lens,
         );
-        self.fly(&Flight {
+        self.trace(&RayState {
             ray: Ray8 { o, d, tmin: F32x8::ZERO, tmax: F32x8::INFINITY },
             from: o,
             normal: Vec3x8::ZERO,
             pdf: F32x8::ONE,
-            alone: true,
+            skip_mis: true,
             key: key.child(U32x8::splat(0)),
             depth: 1,
         })
         .0
     }
 
-    /// Radiance against a ray and what it cost.
-    fn fly(&mut self, f: &Flight) -> ([f64; 3], f64) {
+    /// Radiance along a ray, and its counted cost.
+    fn trace(&mut self, f: &RayState) -> ([f64; 3], f64) {
         self.counted[0] += 1;
         let (hit, d) = (self.bvh.closest(&f.ray, one()), f.ray.d);
         if (hit.hit & one()).none() {
@@ -133,7 +133,7 @@ impl Replay<'_, '_> {
         let point = surface_point(&scene, hit.triangle, hit.u, hit.v, one());
         let emitted = area_radiance(&scene, hit.triangle, d, point.ng, one());
         let other = area_pdf(&scene, &PowerSelector(scene), f.from, f.normal, hit.triangle, d, hit.t, one());
-        let mis = if f.alone { F32x8::ONE } else { power_heuristic(f.pdf, other) };
+        let mis = if f.skip_mis { F32x8::ONE } else { power_heuristic(f.pdf, other) };
         let found = rgb(emitted * mis);
         let triangle = &scene.triangles[hit.triangle.lane(0) as usize];
         let material = &scene.materials[triangle.material as usize];
@@ -145,7 +145,7 @@ impl Replay<'_, '_> {
             return (found, 1.0);
         }
         let [r, g, b] = material.reflectance;
-        let place = Place {
+        let vertex = PathVertex {
             p: point.p,
             error: point.error,
             ng: point.ng,
@@ -154,12 +154,12 @@ impl Replay<'_, '_> {
             inputs: Inputs8 { material: U32x8::splat(triangle.material), reflectance: Vec3x8::splat(r, g, b) },
             kind,
         };
-        let (value, cost) = self.scatter(&place, f.key, f.depth);
+        let (value, cost) = self.scatter(&vertex, f.key, f.depth);
         ([0, 1, 2].map(|c| found[c] + value[c]), 1.0 + cost)
     }
 
-    /// Reflected radiance at a vertex and what it cost; logs the samples.
-    fn scatter(&mut self, v: &Place, key: Key8, depth: u32) -> ([f64; 3], f64) {
+    /// Reflected radiance at a vertex, and its counted cost; logs the samples.
+    fn scatter(&mut self, v: &PathVertex, key: Key8, depth: u32) -> ([f64; 3], f64) {
         let (albedo, delta) = dispatch(v.kind, AlbedoOf(&self.scene, v));
         let dir = match v.kind {
             MaterialKind::Diffuse => v.ns,
@@ -203,8 +203,9 @@ impl Replay<'_, '_> {
         (mean, rays)
     }
 
-    /// One light sample and one bounce: what they give, the light sample's part of it, what they cost.
-    fn sample(&mut self, v: &Place, key: Key8, depth: u32, delta: bool) -> ([f64; 3], [f64; 3], f64) {
+    /// One sample of a vertex, next event estimation and a bounce: radiance, the part of next event estimation, counted
+    /// cost.
+    fn sample(&mut self, v: &PathVertex, key: Key8, depth: u32, delta: bool) -> ([f64; 3], [f64; 3], f64) {
         let scene = self.scene;
         let [a, b, c, _] = key.uniforms(0);
         let light = if delta {
@@ -223,14 +224,14 @@ impl Replay<'_, '_> {
                 x = rgb(direct);
             }
         }
-        let lit = x;
+        let nee = x;
         if s.valid.lane(0) && s.weight.any_positive().lane(0) {
-            let (radiance, rays) = self.fly(&Flight {
+            let (radiance, rays) = self.trace(&RayState {
                 ray: Ray8 { o: offset(v.p, v.ng, v.error, s.wi), d: s.wi, tmin: F32x8::ZERO, tmax: F32x8::INFINITY },
                 from: v.p,
                 normal: v.ng,
                 pdf: s.pdf,
-                alone: s.delta.lane(0),
+                skip_mis: s.delta.lane(0),
                 key: key.child(U32x8::splat(0)),
                 depth: depth + 1,
             });
@@ -238,6 +239,6 @@ impl Replay<'_, '_> {
             (0..3).for_each(|c| x[c] += weight[c] * radiance[c]);
             cost += rays;
         }
-        (x, lit, cost)
+        (x, nee, cost)
     }
 }

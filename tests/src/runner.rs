@@ -1,10 +1,10 @@
 //! Drives the core by hand, in any order of shards and steps; compiled once for all tests.
 
-use croupier::accel::{Intersector, WideBvh};
-use croupier::film::{PixelAov, PixelStats};
-use croupier::learn::PictureStatistics;
-use croupier::learn::cache::CacheError;
-use croupier::profile::{DiffuseOnly, Full, Profile};
+use croupier::unstable::accel::{Intersector, WideBvh};
+use croupier::unstable::film::{PixelAov, PixelStats};
+use croupier::unstable::learn::PictureStatistics;
+use croupier::unstable::learn::cache::CacheError;
+use croupier::unstable::profile::{DiffuseOnly, Full, Profile};
 use croupier::{
     Budget, Counters, ErrorEstimate, Plan, Scene, Session, SessionError, Settings, Shard, StepResult, Strategy,
 };
@@ -213,7 +213,7 @@ fn learning_with<P: Profile + Sync, I: Intersector + Sync>(
     }
 }
 
-/// A block as a host's pool may give it: NaNs, and indices beyond everything. Nothing may hang on what it holds.
+/// A block as a host's pool may give it: NaNs, and indices beyond everything. Nothing may depend on what it holds.
 fn used_memory(bytes: usize) -> AlignedBytes {
     let mut block = AlignedBytes::zeroed(bytes);
     block.as_mut().fill(0xff);

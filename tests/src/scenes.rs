@@ -29,8 +29,8 @@ pub fn camera(origin: [f64; 3], target: [f64; 3], vfov_deg: f64, size: [u32; 2])
     Camera { origin, target, up, vfov_deg, size, lens: None }
 }
 
-/// A scene that only the constant sky of radiance 1 lights.
-pub fn under_white_sky(camera: Camera) -> SceneDescription {
+/// A scene that only the constant environment of radiance 1 lights.
+pub fn in_white_environment(camera: Camera) -> SceneDescription {
     SceneDescription {
         environment: Some(Environment::Constant { radiance: [1.0; 3] }),
         camera,
@@ -138,9 +138,9 @@ pub fn place(scene: &mut SceneDescription, scale: f32, offset: f32) {
     (c.origin, c.target) = (c.origin.map(at64), c.target.map(at64));
 }
 
-/// The Cornell box with coloured walls and a lamp over most of the ceiling, 2 x 2 x 2 around the origin, seen through
-/// its open front. Every pixel sees floor or walls; the lamp itself is out of view, large, and the walls are dim, so
-/// that the noise of one sample stays below its mean.
+/// The Cornell box with coloured walls and an emitter over most of the ceiling, 2 x 2 x 2 around the origin, seen
+/// through its open front. Every pixel sees floor or walls; the emitter itself is out of view, large, and the walls are
+/// dim, so that the noise of one sample stays below its mean.
 pub fn cornell(size: [u32; 2]) -> SceneDescription {
     let mut s = SceneDescription {
         camera: camera([0.0, 0.0, 4.4], [0.0, -0.35, 0.0], 12.0, size),
@@ -149,15 +149,15 @@ pub fn cornell(size: [u32; 2]) -> SceneDescription {
     let white = s.add_material("white", diffuse([0.6, 0.55, 0.5]));
     let red = s.add_material("red", diffuse([0.55, 0.1, 0.08]));
     let green = s.add_material("green", diffuse([0.12, 0.45, 0.15]));
-    let lamp = s.add_material("lamp", diffuse([0.0; 3]));
+    let emitter = s.add_material("emitter", diffuse([0.0; 3]));
     let z = |z: f32, to: f32| facing_z(1.0, z, to);
     add_quad(&mut s, "floor", white, facing_y(1.0, -1.0, 1.0));
     add_quad(&mut s, "ceiling", white, facing_y(1.0, 1.0, -1.0));
     add_quad(&mut s, "back", white, z(-1.0, 1.0));
     add_quad(&mut s, "left", red, [[-1.0, -1.0, 1.0], [-1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, 1.0, 1.0]]);
     add_quad(&mut s, "right", green, [[1.0, -1.0, -1.0], [1.0, -1.0, 1.0], [1.0, 1.0, 1.0], [1.0, 1.0, -1.0]]);
-    add_quad(&mut s, "lamp", lamp, facing_y(0.875, 0.984_375, -1.0));
-    s.emitters.push(Emitter::Area { material: lamp, radiance: [6.0, 5.0, 4.0] });
+    add_quad(&mut s, "emitter", emitter, facing_y(0.875, 0.984_375, -1.0));
+    s.emitters.push(Emitter::Area { material: emitter, radiance: [6.0, 5.0, 4.0] });
     s
 }
 
@@ -180,7 +180,7 @@ pub fn everything(size: [u32; 2]) -> SceneDescription {
         texels: (0..64).map(|i| texel(i % 8, i / 8)).collect(),
     });
     let floor = s.add_material("floor", Model::Diffuse { reflectance: Reflectance::Texture(0) });
-    let lamp = s.add_material("lamp", grey(0.3));
+    let emitter = s.add_material("emitter", grey(0.3));
     let glass = s.add_material("glass", Model::Dielectric { int_ior: 1.5, ext_ior: 1.0 });
     let sheet = s.add_material("sheet", Model::ThinDielectric { int_ior: 1.5, ext_ior: 1.0 });
     let air = s.add_material("air", Model::Null);
@@ -191,14 +191,14 @@ pub fn everything(size: [u32; 2]) -> SceneDescription {
     let white = Reflectance::Constant([1.0; 3]);
     let metal = s.add_material("metal", Model::RoughConductor { eta, k, reflectance: white, alpha: 0.2 });
     add_quad(&mut s, "floor", floor, facing_y(4.0, 0.0, 1.0));
-    add_quad(&mut s, "lamp", lamp, facing_y(0.5, 3.0, -1.0));
+    add_quad(&mut s, "emitter", emitter, facing_y(0.5, 3.0, -1.0));
     let smooth = Sphere { subdivisions: 3, smooth: true, inwards: false };
     add_sphere(&mut s, glass, [-1.1, 0.6, 0.6], 0.5, smooth);
     add_sphere(&mut s, coat, [0.0, 0.7, -0.4], 0.6, smooth);
     add_sphere(&mut s, metal, [1.2, 0.6, 0.3], 0.5, smooth);
     add_quad(&mut s, "sheet", sheet, facing_z(0.4, 1.6, 1.0).map(|[x, y, z]| [x - 0.2, y + 0.5, z]));
     add_box(&mut s, air, [0.5, 0.05, 1.0], [1.0, 0.5, 1.5], false);
-    s.emitters.push(Emitter::Area { material: lamp, radiance: [8.0, 7.0, 6.0] });
+    s.emitters.push(Emitter::Area { material: emitter, radiance: [8.0, 7.0, 6.0] });
     s.emitters.push(Emitter::Point { position: [-2.0, 2.0, 1.5], intensity: [2.0, 3.0, 4.0] });
     s.emitters.push(Emitter::Directional { direction: [-1.0, -2.0, -0.5], irradiance: [0.5, 0.45, 0.4] });
     s.environment = Some(croupier_host::builtin::sky());
@@ -230,23 +230,23 @@ pub fn spot(rho: f32, size: [u32; 2]) -> SceneDescription {
     s
 }
 
-/// A closed diffuse box with a lamp, which the camera sees in its 4 x 4 pixels.
-pub fn lamp_box() -> SceneDescription {
+/// A closed diffuse box with an emitter, which the camera sees in its 4 x 4 pixels.
+pub fn box_with_emitter() -> SceneDescription {
     let mut s = SceneDescription {
         camera: camera([0.1, -0.1, 0.9], [0.1, 0.4, -1.0], 80.0, [4, 4]),
         ..SceneDescription::default()
     };
     let wall = s.add_material("wall", diffuse([0.7, 0.5, 0.3]));
-    let lamp = s.add_material("lamp", grey(0.4));
+    let emitter = s.add_material("emitter", grey(0.4));
     add_box(&mut s, wall, [-1.0; 3], [1.0; 3], true);
-    add_quad(&mut s, "lamp", lamp, facing_y(0.3, 0.96, -1.0));
-    s.emitters.push(Emitter::Area { material: lamp, radiance: [5.0, 6.0, 7.0] });
+    add_quad(&mut s, "emitter", emitter, facing_y(0.3, 0.96, -1.0));
+    s.emitters.push(Emitter::Area { material: emitter, radiance: [5.0, 6.0, 7.0] });
     s
 }
 
 /// The same with a mirror and a block of glass, whose caustics are rare and bright.
 pub fn mirror_and_glass() -> SceneDescription {
-    let mut s = lamp_box();
+    let mut s = box_with_emitter();
     let mirror = s.add_material("mirror", Model::Mirror { reflectance: Reflectance::Constant([0.9, 0.8, 0.7]) });
     let glass = s.add_material("glass", Model::Dielectric { int_ior: 1.5, ext_ior: 1.0 });
     add_quad(&mut s, "mirror", mirror, facing_z(0.7, -0.9, 1.0));

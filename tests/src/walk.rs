@@ -2,7 +2,7 @@
 //! and that is out of range panics.
 
 use croupier::Scene;
-use croupier::scene::blob::*;
+use croupier::unstable::scene::blob::*;
 
 /// Entries of a traversal stack that pushes all children of a node but the one it enters.
 const STACK: usize = 256;

@@ -1,7 +1,7 @@
 //! Everything under light from everywhere: radiance is the albedo, and 1 where nothing is lost.
 
 use croupier::Settings;
-use croupier::scene::blob::MaterialKind;
+use croupier::unstable::scene::blob::MaterialKind;
 use croupier_host::description::{Model, Reflectance};
 use croupier_tests::bsdf::{Case, assert_every_kind, at_angle};
 use croupier_tests::runner::{Image, render, settings};
@@ -61,9 +61,9 @@ fn pairs() -> Vec<(Model, Case)> {
 }
 
 /// One quad of a material around the origin, facing +z, seen at `degrees` from its normal; beyond 90 from behind.
-fn quad_under_sky(model: Model, two_sided: bool, degrees: f64) -> Vec<u8> {
+fn quad_in_white_environment(model: Model, two_sided: bool, degrees: f64) -> Vec<u8> {
     let w = at_angle(degrees, 0.0).map(|x| 10.0 * x);
-    let mut s = under_white_sky(camera(w, [0.0; 3], 0.01, [4, 4]));
+    let mut s = in_white_environment(camera(w, [0.0; 3], 0.01, [4, 4]));
     let material = s.add_material("surface", model);
     s.materials[0].two_sided = two_sided;
     add_quad(&mut s, "quad", material, facing_z(1.0, 0.0, 1.0));
@@ -99,7 +99,7 @@ fn one_bounce_shows_the_albedo() {
             for lobe in case.lobes(wo) {
                 expected = std::array::from_fn(|c| expected[c] + lobe.weight[c]);
             }
-            let scene = quad_under_sky(*model, false, *degrees);
+            let scene = quad_in_white_environment(*model, false, *degrees);
             let settings = Settings { max_depth: 2, ..settings(&scene, "none") };
             let image = render(&scene, &settings, 4096);
             assert_radiance(&format!("{} at {degrees} degrees", case.name()), &image, expected, limit);
@@ -119,7 +119,7 @@ fn first_hits_have_their_albedo() {
             for lobe in case.lobes(wo) {
                 expected = std::array::from_fn(|c| expected[c] + lobe.weight[c]);
             }
-            let scene = quad_under_sky(*model, false, degrees);
+            let scene = quad_in_white_environment(*model, false, degrees);
             let image = render(&scene, &Settings { aovs: true, max_depth: 2, ..settings(&scene, "none") }, 16);
             let hits: f64 = image.aovs.iter().map(|a| a.hits).sum();
             assert_eq!(hits, 256.0);
@@ -151,10 +151,10 @@ fn backs_are_black_or_fronts() {
             for lobe in case.lobes(front) {
                 expected = std::array::from_fn(|c| expected[c] + lobe.weight[c]);
             }
-            let scene = quad_under_sky(*model, true, 180.0 - degrees);
+            let scene = quad_in_white_environment(*model, true, 180.0 - degrees);
             let image = render(&scene, &settings(&scene, "none"), 4096);
             assert_radiance(&format!("back of a two-sided {}", case.name()), &image, expected, limit);
-            let scene = quad_under_sky(*model, false, 180.0 - degrees);
+            let scene = quad_in_white_environment(*model, false, 180.0 - degrees);
             let image = render(&scene, &settings(&scene, "none"), 16);
             assert_eq!(image.mean(), 0.0, "back of a one-sided {}", case.name());
         }
@@ -181,7 +181,7 @@ fn lossless_spheres_are_invisible() {
     let strategies = ["none", "classic:2", "fixed:0.7", "throughput"];
     let limit = limit(spheres.len() * strategies.len() * 3);
     for (model, case) in &spheres {
-        let mut s = under_white_sky(camera([0.0, 0.0, 5.0], [0.0; 3], 30.0, [8, 8]));
+        let mut s = in_white_environment(camera([0.0, 0.0, 5.0], [0.0; 3], 30.0, [8, 8]));
         let material = s.add_material("surface", *model);
         let flat = Sphere { subdivisions: 3, smooth: false, inwards: false };
         add_sphere(&mut s, material, [0.0; 3], 1.0, flat);
@@ -199,7 +199,7 @@ fn lossless_spheres_are_invisible() {
 #[test]
 fn glass_around_a_white_sphere_changes_nothing() {
     let sphere = Sphere { subdivisions: 4, smooth: false, inwards: false };
-    let mut s = under_white_sky(camera([0.0, 0.0, 5.0], [0.0; 3], 15.0, [8, 8]));
+    let mut s = in_white_environment(camera([0.0, 0.0, 5.0], [0.0; 3], 15.0, [8, 8]));
     let glass = s.add_material("glass", Model::Dielectric { int_ior: 1.5, ext_ior: 1.0 });
     let white = s.add_material("white", grey(1.0));
     add_sphere(&mut s, glass, [0.0; 3], 1.0, sphere);
@@ -208,12 +208,12 @@ fn glass_around_a_white_sphere_changes_nothing() {
     let image = render(&scene, &Settings { max_depth: 200, ..settings(&scene, "none") }, 512);
     assert_radiance("white sphere in glass", &image, [1.0; 3], limit(7));
 
-    let mut s = under_white_sky(camera([0.0; 3], [0.3, 0.2, -1.0], 40.0, [8, 8]));
+    let mut s = in_white_environment(camera([0.0; 3], [0.3, 0.2, -1.0], 40.0, [8, 8]));
     let glass = s.add_material("glass", Model::Dielectric { int_ior: 1.5, ext_ior: 1.0 });
     add_sphere(&mut s, glass, [0.0; 3], 1.0, sphere);
     let scene = blob(&s);
     let image = render(&scene, &Settings { max_depth: 200, ..settings(&scene, "none") }, 1024);
-    assert_radiance("sky from within glass", &image, [2.25; 3], limit(7));
+    assert_radiance("environment from within glass", &image, [2.25; 3], limit(7));
 }
 
 /// In a closed box of albedo rho that emits L, radiance is L (1 + rho + rho^2 + ...), one term per path segment:
@@ -250,7 +250,7 @@ fn closed_boxes_sum_the_geometric_series() {
 /// The same inside a sphere of triangles.
 #[test]
 fn a_closed_sphere_sums_the_geometric_series() {
-    let mut s = under_white_sky(camera([0.2, 0.1, 0.0], [0.0, 1.0, -1.0], 60.0, [4, 4]));
+    let mut s = in_white_environment(camera([0.2, 0.1, 0.0], [0.0, 1.0, -1.0], 60.0, [4, 4]));
     let wall = s.add_material("wall", grey(0.5));
     add_sphere(&mut s, wall, [0.0; 3], 1.0, Sphere { subdivisions: 3, smooth: true, inwards: true });
     s.emitters.push(croupier_host::description::Emitter::Area { material: wall, radiance: [0.5; 3] });

@@ -6,7 +6,7 @@
 //! multiple importance sampling must give the same.
 
 use croupier::Settings;
-use croupier::scene::blob::MaterialKind;
+use croupier::unstable::scene::blob::MaterialKind;
 use croupier_host::description::*;
 use croupier_tests::bsdf::{Case, unit};
 use croupier_tests::light_oracle::{Map, cross, dot, length, sub, wide};
@@ -53,13 +53,14 @@ fn facing_triangles(s: &SceneDescription, material: u32) -> Vec<[V; 3]> {
     s.triangles.iter().filter(|t| t.material == material).map(corners).filter(towards).collect()
 }
 
-/// A floor of albedo 0.8 and a lamp of radiance 2 made by `build`; what the lamp adds to the floor, by the formula.
-fn lamp_scene(build: impl Fn(&mut SceneDescription, u32)) -> (SceneDescription, f64) {
+/// A floor of albedo 0.8 and an emitter of radiance 2 made by `build`; what the emitter adds to the floor, by the
+/// formula.
+fn emitter_scene(build: impl Fn(&mut SceneDescription, u32)) -> (SceneDescription, f64) {
     let mut s = spot(0.8, [4, 4]);
-    let lamp = s.add_material("lamp", grey(0.0));
-    build(&mut s, lamp);
-    s.emitters.push(Emitter::Area { material: lamp, radiance: [2.0; 3] });
-    let irradiance: f64 = facing_triangles(&s, lamp).iter().map(|t| 2.0 * polygon_irradiance(t)).sum();
+    let emitter = s.add_material("emitter", grey(0.0));
+    build(&mut s, emitter);
+    s.emitters.push(Emitter::Area { material: emitter, radiance: [2.0; 3] });
+    let irradiance: f64 = facing_triangles(&s, emitter).iter().map(|t| 2.0 * polygon_irradiance(t)).sum();
     (s, irradiance * 0.8 / PI)
 }
 
@@ -104,10 +105,10 @@ const TRIANGLES: [(&str, [[f32; 3]; 3]); 5] = [
 #[test]
 fn triangle_lights_follow_lambert() {
     for (name, corners) in TRIANGLES {
-        let (s, expected) = lamp_scene(|s, lamp| add_triangle(s, lamp, corners, true));
+        let (s, expected) = emitter_scene(|s, emitter| add_triangle(s, emitter, corners, true));
         assert!(expected > 0.0);
         assert_mean(name, &render_depth(&s, 2, 8192), expected, 0.008);
-        let (s, none) = lamp_scene(|s, lamp| add_triangle(s, lamp, corners, false));
+        let (s, none) = emitter_scene(|s, emitter| add_triangle(s, emitter, corners, false));
         let image = render_depth(&s, 2, 16);
         assert_eq!((none, image.mean()), (0.0, 0.0), "{name} from behind");
     }
@@ -119,7 +120,7 @@ fn triangle_lights_follow_lambert() {
 fn sphere_lights_follow_the_closed_form() {
     let (centre, radius) = ([0.5f32, 1.2, -0.2], 0.6);
     let shape = Sphere { subdivisions: 4, smooth: true, inwards: false };
-    let (mut s, expected) = lamp_scene(|s, lamp| add_sphere(s, lamp, centre, radius, shape));
+    let (mut s, expected) = emitter_scene(|s, emitter| add_sphere(s, emitter, centre, radius, shape));
     let d2 = dot(wide(centre), wide(centre));
     let closed = PI * 2.0 * f64::from(radius).powi(2) / d2 * f64::from(centre[1]) / d2.sqrt() * 0.8 / PI;
     assert!((expected / closed - 1.0).abs() < 0.01, "{expected} by its triangles, {closed} for a sphere");
@@ -185,7 +186,7 @@ fn highlights_match_quadrature() {
     ] {
         for (name, corners) in [("mirrored", mirrored), ("slanted", SLANTED)] {
             let (model, case) = receiver(kind, alpha);
-            let (mut s, _) = lamp_scene(|s, lamp| add_triangle(s, lamp, corners, true));
+            let (mut s, _) = emitter_scene(|s, emitter| add_triangle(s, emitter, corners, true));
             s.materials[0].model = model;
             let expected = reflected(&case, corners);
             // a sharp highlight beside the mirror direction is next to nothing
@@ -198,7 +199,7 @@ fn highlights_match_quadrature() {
     // a delta lobe beside a diffuse one: the mirrored light is seen in it, whole
     let (model, case) = receiver(Plastic, 0.0);
     for (name, corners, seen) in [("mirrored", mirrored, 1.0), ("slanted", SLANTED, 0.0)] {
-        let (mut s, _) = lamp_scene(|s, lamp| add_triangle(s, lamp, corners, true));
+        let (mut s, _) = emitter_scene(|s, emitter| add_triangle(s, emitter, corners, true));
         s.materials[0].model = model;
         let wo = unit([0.0, 0.4, 0.3]);
         let expected = reflected(&case, corners) + seen * 2.0 * case.lobes(wo)[0].weight[0];
@@ -263,7 +264,7 @@ fn highlights_of_points_are_exact() {
 }
 
 /// Irradiance of the floor by quadrature over the upper hemisphere.
-fn sky_irradiance(radiance: impl Fn(V) -> V) -> V {
+fn environment_irradiance(radiance: impl Fn(V) -> V) -> V {
     let n = 1000;
     let mut sum = [0.0; 3];
     for i in 0..n * n {
@@ -296,7 +297,7 @@ fn environment_maps_light_by_their_integral() {
         });
         let map = Map::new(&texels, width, height);
         let to_map = |d: V| -> V { std::array::from_fn(|i| (0..3).map(|j| to_world[j][i] * d[j]).sum()) };
-        let irradiance = sky_irradiance(|d| map.lookup(to_map(d)));
+        let irradiance = environment_irradiance(|d| map.lookup(to_map(d)));
         let image = render_depth(&s, 2, 8192);
         for (c, scale) in [0.5, 1.0, 2.0].into_iter().enumerate() {
             let (mean, error) = (image.channel(c), image.error_of_channel(c));
@@ -309,35 +310,36 @@ fn environment_maps_light_by_their_integral() {
     }
 }
 
-/// All kinds together: the sum, with the sky behind the lamp hidden by it. Killed by: one light chosen for another's
-/// probability.
+/// All kinds together: the sum, with the environment behind the emitter hidden by it. Killed by: one light chosen for
+/// another's probability.
 #[test]
 fn lights_add_up() {
-    let (mut s, lamp) = lamp_scene(|s, lamp| add_triangle(s, lamp, SLANTED, true));
+    let (mut s, emitter) = emitter_scene(|s, emitter| add_triangle(s, emitter, SLANTED, true));
     let hidden = 0.25 * polygon_irradiance(&SLANTED.map(wide));
     s.environment = Some(Environment::Constant { radiance: [0.25; 3] });
     s.emitters.push(Emitter::Point { position: [0.0, 2.0, -1.0], intensity: [3.0; 3] });
     s.emitters.push(Emitter::Directional { direction: [0.6, -0.8, 0.0], irradiance: [0.7; 3] });
     let point = 3.0 * 2.0 / 5f64.powf(1.5);
-    let expected = lamp + 0.8 / PI * (0.25 * PI - hidden + point + 0.7 * 0.8);
+    let expected = emitter + 0.8 / PI * (0.25 * PI - hidden + point + 0.7 * 0.8);
     assert_mean("all lights", &render_depth(&s, 2, 16_384), expected, 0.004);
 }
-/// A lamp whose plane goes through the origin of coordinates, or nearly: its position has no rounding error there, the
-/// distance to it has. Killed by: a shadow ray that ends at the lamp's own error bound (up to 70 % of the light lost).
+/// An emitter whose plane goes through the origin of coordinates, or nearly: its position has no rounding error there,
+/// the distance to it has. Killed by: a shadow ray that ends at the emitter's own error bound (up to 70 % of the light
+/// lost).
 #[test]
-fn lamps_do_not_stand_in_their_own_light() {
+fn emitters_do_not_shadow_themselves() {
     for height in [2.0f32, 3.0, 20.0, 100.0] {
         for half in [0.01f32, 0.3, 30.0] {
             for tilt in [0.0, 0.1] {
                 let corners = [[-half, height, -half], [half, height + tilt * half, -half], [0.0, height, half]];
-                let (scene, expected) = lamp_scene(|s, lamp| add_triangle(s, lamp, corners, true));
+                let (scene, expected) = emitter_scene(|s, emitter| add_triangle(s, emitter, corners, true));
                 for shift in [0.0, -height, -0.999 * height] {
                     let mut s = scene.clone();
                     s.vertices.iter_mut().for_each(|v| v.position[1] += shift);
                     s.camera.origin[1] += f64::from(shift);
                     s.camera.target[1] += f64::from(shift);
                     let image = render_depth(&s, 2, 2048);
-                    let what = format!("lamp of {half} at {height}, tilted by {tilt}, moved by {shift}");
+                    let what = format!("emitter of {half} at {height}, tilted by {tilt}, moved by {shift}");
                     // moving rounds the corners
                     let rounding = 1e-6 * f64::from(height / half);
                     let off = (image.mean() - expected).abs();
@@ -351,8 +353,8 @@ fn lamps_do_not_stand_in_their_own_light() {
 }
 
 /// Needles of every direction, thin rectangles' halves up to 1e6 : 1 and obtuse ones up to 1e3 : 1 (beyond, normals in
-/// f32 tilt by a percent and more). Killed by: a lamp's triangle that a shadow ray hits before its end, because t is a
-/// mean of far away vertices with inexact weights; a normal from two nearly parallel edges.
+/// f32 tilt by a percent and more). Killed by: an emitter's triangle that a shadow ray hits before its end, because t
+/// is a mean of far away vertices with inexact weights; a normal from two nearly parallel edges.
 #[test]
 fn needles_shine_like_other_triangles() {
     let mut rng = SplitMix(21);
@@ -372,7 +374,7 @@ fn needles_shine_like_other_triangles() {
             }
             let mut corners = [corner(-1.0, 0.0), corner(1.0, 0.0), corner(if obtuse { 0.3 } else { 1.0 }, 1.0)];
             corners.rotate_left(k % 3);
-            let (s, expected) = lamp_scene(|s, lamp| add_triangle(s, lamp, corners, true));
+            let (s, expected) = emitter_scene(|s, emitter| add_triangle(s, emitter, corners, true));
             let image = render_depth(&s, 2, 8192);
             assert_mean(&format!("needle of {aspect} : 1, {corners:?}"), &image, expected, 0.02);
         }

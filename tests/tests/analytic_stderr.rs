@@ -1,14 +1,15 @@
-//! What the film says about its own error is true.
+//! The error that the film estimates is the true one.
 
 use croupier::Settings;
-use croupier::film::{PixelStats, REL_MSE_EPSILON};
+use croupier::unstable::film::{PixelStats, REL_MSE_EPSILON};
 use croupier_tests::runner::{Image, Schedule, render, scheduled, settings};
 use croupier_tests::scenes::*;
 use croupier_tests::stats::normal_tail;
 
-/// A grey wall under a white sky: every pixel's mean is exactly 0.5, and multiple importance sampling makes it noisy.
+/// A grey wall under a white environment: every pixel's mean is exactly 0.5, and multiple importance sampling makes it
+/// noisy.
 fn grey_wall(size: [u32; 2]) -> Vec<u8> {
-    let mut s = under_white_sky(camera([0.0, 0.0, 10.0], [0.0; 3], 1.0, size));
+    let mut s = in_white_environment(camera([0.0, 0.0, 10.0], [0.0; 3], 1.0, size));
     let wall = s.add_material("wall", grey(0.5));
     add_quad(&mut s, "wall", wall, facing_z(1.0, 0.0, 1.0));
     blob(&s).to_vec()
@@ -83,7 +84,7 @@ fn the_error_estimate_is_right_on_average() {
 
 /// A diffuse box with strategies that end and split paths: `classic`, which starts late, states the true relMSE; where
 /// roulette or splitting meets every path, packets' combs make the true one smaller, up to 2.4 times: one iteration
-/// states an upper bound, several show it. Intervals miss on the low side, because few samples have met the rare bright
+/// states an upper bound, several show it. Intervals miss on the low side, because few samples contain the rare bright
 /// paths: with 64 samples 84 of 100 intervals of `classic` hold the true error, with 16 those of `fixed:3.3` as many.
 /// The limits of the mean ratios after iterations were set beforehand; those of the intervals, and the 64 samples of
 /// `fixed:3.3`, were set after runs had shown this. Killed by: a sum of squares per path instead of per camera sample,
@@ -150,7 +151,7 @@ fn the_worst_pixels_are_left_out() {
     assert!(image.error.low < image.error.rel_mse && image.error.rel_mse < image.error.high);
 }
 
-/// One sample cannot know its error and does not claim to: its own square stands in. Killed by: a division by
+/// One sample has no measurable variance: its square is used. Killed by: a division by
 /// `n - 1 = 0`.
 #[test]
 fn one_sample_claims_nothing() {

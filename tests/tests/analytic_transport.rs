@@ -26,9 +26,9 @@ fn assert_mean(what: &str, image: &Image, expected: f64, power: f64) {
 
 /// A far emitting wall behind (z < 0) or on the side of the camera (z > 0).
 fn add_wall_of_light(s: &mut SceneDescription, z: f32) {
-    let lamp = s.add_material("lamp", grey(0.0));
-    add_quad(s, "lamp", lamp, facing_z(2000.0, z, -z));
-    s.emitters.push(Emitter::Area { material: lamp, radiance: [1.0; 3] });
+    let emitter = s.add_material("emitter", grey(0.0));
+    add_quad(s, "emitter", emitter, facing_z(2000.0, z, -z));
+    s.emitters.push(Emitter::Area { material: emitter, radiance: [1.0; 3] });
 }
 
 /// A glass pane seen at 0 to 70 degrees passes (1 - R) / (1 + R) and reflects 2 R / (1 + R), as a real slab with all
@@ -63,11 +63,11 @@ fn slabs_pass_and_reflect_by_fresnel() {
     }
 }
 
-/// Four reflections between parallel mirrors, then the sky: r^4, and nothing if paths end one segment earlier. Killed
-/// by: a reflection about the wrong normal, a depth off by one.
+/// Four reflections between parallel mirrors, then the environment: r^4, and nothing if paths end one segment earlier.
+/// Killed by: a reflection about the wrong normal, a depth off by one.
 #[test]
 fn mirror_corridors_multiply() {
-    let mut s = under_white_sky(camera([0.0; 3], [1.0, 0.0, 1.0], 0.05, [4, 4]));
+    let mut s = in_white_environment(camera([0.0; 3], [1.0, 0.0, 1.0], 0.05, [4, 4]));
     let tint = [0.9f32, 0.5, 0.2];
     let mirror = s.add_material("mirror", Model::Mirror { reflectance: Reflectance::Constant(tint) });
     // hits at z = 1, 3, 5, 7, then past z = 8
@@ -85,30 +85,30 @@ fn mirror_corridors_multiply() {
     assert_eq!(render_as(&s, "none", 4, 16).mean(), 0.0);
 }
 
-/// Depth 1 sees emitters and the sky, depth 2 adds direct light, depth 3 one reflection more. Killed by: an emitter
-/// that is not seen directly, light samples at the last vertex.
+/// Depth 1 sees emitters and the environment, depth 2 adds direct light, depth 3 one reflection more. Killed by: an
+/// emitter that is not seen directly, light samples at the last vertex.
 #[test]
 fn depth_counts_segments() {
-    let mut s = under_white_sky(camera([0.0, 1.0, 6.0], [0.0, 1.0, 0.0], 40.0, [32, 32]));
+    let mut s = in_white_environment(camera([0.0, 1.0, 6.0], [0.0, 1.0, 0.0], 40.0, [32, 32]));
     s.environment = Some(Environment::Constant { radiance: [0.125; 3] });
     let floor = s.add_material("floor", grey(0.5));
-    let lamp = s.add_material("lamp", grey(0.5));
+    let emitter = s.add_material("emitter", grey(0.5));
     add_quad(&mut s, "floor", floor, facing_y(2.0, 0.0, 1.0));
-    add_quad(&mut s, "lamp", lamp, facing_z(0.5, 0.0, 1.0).map(|[x, y, z]| [x, y + 1.5, z]));
-    s.emitters.push(Emitter::Area { material: lamp, radiance: [3.0, 2.0, 1.0] });
+    add_quad(&mut s, "emitter", emitter, facing_z(0.5, 0.0, 1.0).map(|[x, y, z]| [x, y + 1.5, z]));
+    s.emitters.push(Emitter::Area { material: emitter, radiance: [3.0, 2.0, 1.0] });
     s.emitters.push(Emitter::Point { position: [0.0, 3.0, 1.0], intensity: [1.0; 3] });
 
-    let (sky, front, ground) = ([0, 0], [15, 12], [15, 24]);
+    let (environment, front, ground) = ([0, 0], [15, 12], [15, 24]);
     let at = |image: &Image, [x, y]: [u32; 2]| image.pixels[(y * 32 + x) as usize].mean();
 
     let one = render_as(&s, "none", 1, 16);
     assert_eq!(one.counters.rays(), 32 * 32 * 16, "camera rays only");
-    assert_eq!((at(&one, sky), at(&one, front), at(&one, ground)), ([0.125; 3], [3.0, 2.0, 1.0], [0.0; 3]));
+    assert_eq!((at(&one, environment), at(&one, front), at(&one, ground)), ([0.125; 3], [3.0, 2.0, 1.0], [0.0; 3]));
     let two = render_as(&s, "none", 2, 64);
-    assert_eq!(at(&two, sky), [0.125; 3]);
+    assert_eq!(at(&two, environment), [0.125; 3]);
     assert!(at(&two, front)[0] > 3.01 && at(&two, ground)[0] > 0.02);
     let three = render_as(&s, "none", 3, 64);
-    assert!(three.mean() > two.mean() * 1.001, "light between floor and lamp");
+    assert!(three.mean() > two.mean() * 1.001, "light between floor and emitter");
     let end = |max_depth| render_as(&s, "none", max_depth, 64).mean();
     assert!(end(30) > three.mean() && (end(60) / end(30) - 1.0).abs() < 1e-4);
 }
@@ -141,8 +141,8 @@ fn learned_strategies_keep_direct_light() {
     }
 }
 
-/// Boundaries of type `null` leave the picture alone: around objects, around the camera, before the sky. Killed by: a
-/// delta lobe that is weighted against light sampling, a direction that changes on the way through.
+/// Boundaries of type `null` leave the picture alone: around objects, around the camera, before the environment. Killed
+/// by: a delta lobe that is weighted against light sampling, a direction that changes on the way through.
 #[test]
 fn null_boundaries_are_invisible() {
     let plain = cornell([8, 8]);
@@ -162,13 +162,13 @@ fn null_boundaries_are_invisible() {
     let (difference, error) = (a.mean() - b.mean(), a.error_of_mean().hypot(b.error_of_mean()));
     assert!(difference.abs() < 4.0 * error && error < 0.004 * a.mean(), "{difference} +- {error}");
 
-    // before the sky nothing is random: each boundary costs a segment and nothing else
-    let mut sky = under_white_sky(camera([0.0, 0.0, 5.0], [0.0; 3], 20.0, [8, 8]));
-    let air = sky.add_material("air", Model::Null);
-    add_sphere(&mut sky, air, [0.0; 3], 0.5, Sphere { subdivisions: 3, smooth: true, inwards: false });
-    let image = render_as(&sky, "none", 3, 16);
+    // before the environment nothing is random: each boundary costs a segment and nothing else
+    let mut environment = in_white_environment(camera([0.0, 0.0, 5.0], [0.0; 3], 20.0, [8, 8]));
+    let air = environment.add_material("air", Model::Null);
+    add_sphere(&mut environment, air, [0.0; 3], 0.5, Sphere { subdivisions: 3, smooth: true, inwards: false });
+    let image = render_as(&environment, "none", 3, 16);
     assert!(image.pixels.iter().all(|p| p.mean() == [1.0; 3]));
-    assert_eq!(render_as(&sky, "none", 2, 16).pixels[27].mean(), [0.0; 3]);
+    assert_eq!(render_as(&environment, "none", 2, 16).pixels[27].mean(), [0.0; 3]);
 }
 
 /// A one-sided wall is black from behind but still stops light. Killed by: culling of backs in traversal.
@@ -193,9 +193,9 @@ fn backs_do_not_emit() {
     for (front, expected) in [(1.0, 0.75), (-1.0, 0.0)] {
         let mut s =
             SceneDescription { camera: camera([0.0, 0.0, 5.0], [0.0; 3], 1.0, [4, 4]), ..SceneDescription::default() };
-        let lamp = s.add_material("lamp", grey(0.5));
-        add_quad(&mut s, "lamp", lamp, facing_z(1.0, 0.0, front));
-        s.emitters.push(Emitter::Area { material: lamp, radiance: [0.75; 3] });
+        let emitter = s.add_material("emitter", grey(0.5));
+        add_quad(&mut s, "emitter", emitter, facing_z(1.0, 0.0, front));
+        s.emitters.push(Emitter::Area { material: emitter, radiance: [0.75; 3] });
         assert_eq!(render_as(&s, "none", 10, 16).mean(), expected);
     }
 }
@@ -205,12 +205,12 @@ fn backs_do_not_emit() {
 #[test]
 fn lenses_blur_but_keep_light() {
     let scene = |radius: f32, focus_distance: f32| {
-        let mut s = under_white_sky(camera([0.0, 0.0, 5.0], [0.0; 3], 30.0, [16, 16]));
+        let mut s = in_white_environment(camera([0.0, 0.0, 5.0], [0.0; 3], 30.0, [16, 16]));
         s.camera.lens = (radius > 0.0).then_some(ThinLens { radius, focus_distance });
         s.environment = None;
-        let lamp = s.add_material("lamp", grey(0.0));
-        add_quad(&mut s, "lamp", lamp, facing_z(0.4, 0.0, 1.0));
-        s.emitters.push(Emitter::Area { material: lamp, radiance: [1.0; 3] });
+        let emitter = s.add_material("emitter", grey(0.0));
+        add_quad(&mut s, "emitter", emitter, facing_z(0.4, 0.0, 1.0));
+        s.emitters.push(Emitter::Area { material: emitter, radiance: [1.0; 3] });
         render_as(&s, "none", 1, 4096)
     };
     let (sharp, focused, blurred) = (scene(0.0, 1.0), scene(0.3, 5.0), scene(0.3, 2.5));

@@ -1,8 +1,8 @@
 //! Descriptions into blobs: what is kept, what is dropped, what is refused, and the same bytes every time.
 
 use croupier::Scene;
-use croupier::scene::Effects;
-use croupier::scene::blob::{ALIGN, Header, LightKind, NONE, Section, TRIANGLE_SMOOTH, content_hash};
+use croupier::unstable::scene::Effects;
+use croupier::unstable::scene::blob::{ALIGN, Header, LightKind, NONE, Section, TRIANGLE_SMOOTH, content_hash};
 use croupier_host::bake::{BakeOptions, Baked, Stage, bake};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin::{cornell_box, sky};
@@ -64,7 +64,7 @@ fn aligned_bytes_have_their_length() {
     }
 }
 
-/// Killed by: a sphere wound inwards; the lamp facing up; normals not of the sphere.
+/// Killed by: a sphere wound inwards; the emitter facing up; normals not of the sphere.
 #[test]
 fn the_cornell_box_faces_inwards_and_its_spheres_outwards() {
     let scene = cornell_box();
@@ -101,16 +101,16 @@ fn the_cornell_box_faces_inwards_and_its_spheres_outwards() {
 #[test]
 fn degenerate_triangles_are_dropped_and_counted() {
     let mut scene = one_triangle();
-    let lamp = scene.add_material("lamp", diffuse(0.0));
+    let emitter = scene.add_material("emitter", diffuse(0.0));
     let p = [[0.0; 3], [1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1e-6, 0.0]];
     // Collinear, a doubled index, doubled positions; then a proper light; then a needle of 1e6:1.
     let bad = [[0, 1, 2], [3, 3, 1], [4, 4, 4]];
-    scene.add_mesh("lines", lamp, &vertices(p), &bad, false);
-    scene.add_mesh("lamp", lamp, &vertices(p), &[[0, 4, 3]], false);
+    scene.add_mesh("lines", emitter, &vertices(p), &bad, false);
+    scene.add_mesh("emitter", emitter, &vertices(p), &[[0, 4, 3]], false);
     scene.add_mesh("needle", 0, &vertices(p), &[[0, 4, 5]], false);
     let tiny = [[0.0; 3], [1e-16, 0.0, 0.0], [0.0, 1e-16, 0.0]];
     scene.add_mesh("tiny", 0, &vertices(tiny), &[[0, 1, 2]], false);
-    scene.emitters.push(Emitter::Area { material: lamp, radiance: [1.0, 2.0, 3.0] });
+    scene.emitters.push(Emitter::Area { material: emitter, radiance: [1.0, 2.0, 3.0] });
     let baked = baked(&scene);
     let r = &baked.report;
     assert_eq!((r.triangles, r.dropped_degenerate, r.dropped_lights, r.lights), (4, 3, 3, 1));
@@ -180,7 +180,13 @@ fn camera_axes_reach_the_edges_of_the_picture() {
 fn lights_come_out_as_the_core_reads_them() {
     let mut scene = one_triangle();
     let black = scene.add_material("black", diffuse(0.0));
-    scene.add_mesh("black lamp", black, &vertices([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 1.0]]), &[[0, 1, 2]], false);
+    scene.add_mesh(
+        "black emitter",
+        black,
+        &vertices([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 1.0]]),
+        &[[0, 1, 2]],
+        false,
+    );
     scene.emitters = vec![
         Emitter::Area { material: black, radiance: [0.0; 3] },
         Emitter::Point { position: [1.0, 2.0, 3.0], intensity: [4.0, 5.0, 6.0] },

@@ -1,9 +1,9 @@
 //! Every scattering model against its f64 oracle, one direction pair at a time.
 
-use croupier::bsdf::fresnel::{self, Index8};
-use croupier::bsdf::{self, CacheDirection, Lobes, facts};
-use croupier::scene::blob::MaterialKind;
-use croupier::simd::{F32x8, Mask8, Vec3x8};
+use croupier::unstable::bsdf::fresnel::{self, Index8};
+use croupier::unstable::bsdf::{self, CacheDirection, Lobes, facts};
+use croupier::unstable::scene::blob::MaterialKind;
+use croupier::unstable::simd::{F32x8, Mask8, Vec3x8};
 use croupier_tests::bsdf::*;
 use croupier_tests::stats::SplitMix;
 
@@ -328,11 +328,12 @@ fn dead_lanes_do_not_disturb() {
             let mask = Mask8::from_bits(set);
             let (whole, part) = (case.model(Mask8::all_lanes()), case.model(mask));
             let (wo, u) = (directions(&mut rng), uniform(&mut rng));
-            let spoil =
+            let corrupt =
                 |x: F32x8, k: usize| F32x8::from_fn(|l| if mask.lane(l) { x.lane(l) } else { bad[(l + k) % 5] });
-            let bad_wo = Vec3x8::new(spoil(wo.x, 0), spoil(wo.y, 1), spoil(wo.z, 0));
-            let (a, b) = (whole.sample(wo, u), part.sample(bad_wo, [spoil(u[0], 2), spoil(u[1], 0), spoil(u[2], 0)]));
-            let bad_wi = Vec3x8::new(spoil(a.wi.x, 1), spoil(a.wi.y, 0), spoil(a.wi.z, 2));
+            let bad_wo = Vec3x8::new(corrupt(wo.x, 0), corrupt(wo.y, 1), corrupt(wo.z, 0));
+            let (a, b) =
+                (whole.sample(wo, u), part.sample(bad_wo, [corrupt(u[0], 2), corrupt(u[1], 0), corrupt(u[2], 0)]));
+            let bad_wi = Vec3x8::new(corrupt(a.wi.x, 1), corrupt(a.wi.y, 0), corrupt(a.wi.z, 2));
             let (e, g) = (whole.eval(wo, a.wi), part.eval(bad_wo, bad_wi));
             let (p, q) = (whole.albedo(wo), part.albedo(bad_wo));
             for l in mask.lanes() {

@@ -1,8 +1,8 @@
 //! What the scattering models are made of: Fresnel terms, maps, bake-time tables; and the statistics that judge them.
 
-use croupier::bsdf::fresnel::{self, Index8};
-use croupier::bsdf::{ggx::Ggx8, warp};
-use croupier::simd::{F32x8, Vec3x8};
+use croupier::unstable::bsdf::fresnel::{self, Index8};
+use croupier::unstable::bsdf::{ggx::Ggx8, warp};
+use croupier::unstable::simd::{F32x8, Vec3x8};
 use croupier_host::microfacet;
 use croupier_tests::bsdf::*;
 use croupier_tests::quadrature::{jittered, midpoint, tanh_sinh};
@@ -27,7 +27,7 @@ fn dielectric_fresnel() {
             for l in 0..8 {
                 let (c, r) = (f64::from(cos.lane(l)), f64::from(i.reflectance.lane(l)));
                 let error = (r - fresnel_dielectric(c, 1.0, e)).abs();
-                // e^2 = cos^2 - critical is known to 1e-7; where it is small, so is what hangs on it
+                // e^2 = cos^2 - critical is known to 1e-7; where it is small, so is what depends on it
                 let slack = 1e-7 / (c * c - critical).abs().max(1e-4);
                 let class = if slack > 1e-5 { 2 } else { usize::from((e - 1.0).abs() < 0.05) };
                 worst[class] = worst[class].max(error);
@@ -193,7 +193,7 @@ fn rough_plastic_tables() {
     for (alpha, eta) in [(0.05f32, 1.5f32), (0.3, 1.5), (1.0, 1.5), (0.3, 2.4), (0.3, 1.1)] {
         let table = microfacet::rough_plastic(f64::from(alpha), f64::from(eta));
         // a white interface: what it transmits without 1 / eta^2, what it reflects from inside
-        let kind = croupier::scene::blob::MaterialKind::RoughDielectric;
+        let kind = croupier::unstable::scene::blob::MaterialKind::RoughDielectric;
         let case = Case::new(kind, [0.0; 3], [eta; 3], [0.0; 3], alpha);
         let parts = |wo: V, reflect: bool| {
             let n = 200;

@@ -1,8 +1,8 @@
 //! Scattering models as a whole: samples follow their density, densities integrate to 1, energy is what quadrature of
 //! the oracle says.
 
-use croupier::scene::blob::MaterialKind;
-use croupier::simd::{F32x8, Mask8};
+use croupier::unstable::scene::blob::MaterialKind;
+use croupier::unstable::simd::{F32x8, Mask8};
 use croupier_tests::bsdf::*;
 use croupier_tests::quadrature::jittered;
 use croupier_tests::stats::*;

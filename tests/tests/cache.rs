@@ -1,7 +1,7 @@
-//! The statistics cache: where a vertex belongs, what is summed, how the tree grows, what is looked up.
+//! The statistics cache: bins of vertices, sums, growth of the tree, look-ups.
 
-use croupier::learn::cache::{BIN_LIMIT, Cache, CacheSize, MAX_VALUE, NO_BIN, VertexKind, VertexKind8};
-use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::learn::cache::{BIN_LIMIT, Cache, CacheSize, MAX_VALUE, NO_BIN, VertexKind, VertexKind8};
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_tests::cache::*;
 use croupier_tests::stats::{FAMILY_ALPHA, SplitMix, chi_square, sidak};
 use std::collections::{HashMap, HashSet};
@@ -112,8 +112,8 @@ fn direction_bins_have_equal_area() {
     assert_eq!(axes.iter().collect::<HashSet<_>>().len(), 6);
 }
 
-/// The jittered look-up is that of a place moved by `jitter - 0.5` of the leaf's edge, as the oracle moves it. Killed
-/// by: moving by a whole edge, by the edge of another depth, jitter of one axis used for another.
+/// The jittered look-up is that of a position moved by `jitter - 0.5` of the leaf's edge, as the oracle moves it.
+/// Killed by: moving by a whole edge, by the edge of another depth, jitter of one axis used for another.
 #[test]
 fn jitter_stays_within_half_a_leaf() {
     let (mut blocks, mut rng) = (Blocks::leaves(2000, 2), SplitMix(3));
@@ -146,10 +146,10 @@ fn jitter_stays_within_half_a_leaf() {
 
 /// From the middle of a dark cell to the middle of a bright one: what is looked up, averaged over the jitter, goes up
 /// in a straight line from cell to cell, also where one has half the edge of the other; without jitter it jumps by all
-/// of the difference at the border. So blocks of cells do not show. Killed by: no jitter or half of it, an edge that is
-/// not that of the place's own cell.
+/// of the difference at the border. So cells are not visible as blocks. Killed by: no jitter or half of it, an edge
+/// that is not that of the position's own cell.
 #[test]
-fn borders_of_cells_do_not_show() {
+fn borders_of_cells_are_not_visible() {
     for (samples, edge) in [(1000, 2.0f32), (4000, 1.0)] {
         let (mut blocks, mut rng) = (Blocks::leaves(60, 1), SplitMix(12));
         let (mut cache, mut shards) = blocks.carve(LO, HI);
@@ -164,7 +164,7 @@ fn borders_of_cells_do_not_show() {
         }
         cache.begin_merge(0.0);
         cache.absorb(t);
-        // the bright cells are divided if they have many samples
+        // the bright cells are subdivided if they have many samples
         cache.freeze(3000.0);
         let mean = |bins: U32x8| cache.local(bins, ALL()).mean.x.to_array().iter().sum::<f32>() / 8.0;
         let at = |x: f32| Vec3x8::splat(x, LO[1] + 0.7, LO[2] + 1.1);
@@ -180,7 +180,7 @@ fn borders_of_cells_do_not_show() {
         let places: Vec<f32> = (-31..=31).map(|k| (k as f32 + 0.5) / 32.0).filter(|x| *x < 0.5 * edge).collect();
         let found: Vec<f32> = places.iter().copied().map(|x| smooth(border + x)).collect();
         for (x, found) in places.iter().zip(&found) {
-            // the box around the place has the edge of its own cell
+            // the box around the position has the edge of its own cell
             let own = if *x < 0.0 { 2.0 } else { edge };
             assert!((found - (1.0 + 2.0 * x / own)).abs() < 0.03, "{found} at {x}, edge {edge}");
         }
@@ -207,7 +207,7 @@ fn sums_equal_an_oracle() {
                 let cost = 20.0 * rng.f32();
                 assert!(t.log(bin as u32, x, cost) && t.log_pair(bin as u32, pair));
                 assert!(t.log_shadow(bin as u32, x[0] < 3.0));
-                t.log_light(bin as u32, x, 0.25);
+                t.log_nee(bin as u32, x, 0.25);
                 let e = &mut expected[bin];
                 e[14] += 0.25 * x.map(|x| f64::from(x) * f64::from(x)).iter().sum::<f64>();
                 e[12] += 1.0;
@@ -254,7 +254,7 @@ fn a_billion_samples_keep_their_mean() {
     }
     assert!(!t.log(7, [1.0; 3], 1.0) && !t.log_pair(7, [1.0; 3]));
     assert!(t.log(8, [1.0; 3], 1.0) && t.log_pair(8, [1.0; 3]));
-    t.log_light(7, [1.0; 3], 1.0);
+    t.log_nee(7, [1.0; 3], 1.0);
     assert!((0..BIN_LIMIT).all(|k| t.log_shadow(7, k % 2 == 0)) && !t.log_shadow(7, true) && t.log_shadow(8, true));
     cache.absorb(t);
     let once = Oracle::new(&saved(&cache)).leaves[0][7];
@@ -275,7 +275,7 @@ fn a_billion_samples_keep_their_mean() {
     }
     assert!(!t.log(cache.bins(), [1.0; 3], 1.0) && !t.log(NO_BIN, [1.0; 3], 1.0) && !t.log_pair(NO_BIN, [1.0; 3]));
     for _ in 0..BIN_LIMIT {
-        (0..9).for_each(|_| t.log_light(3, [f32::MAX; 3], f32::MAX));
+        (0..9).for_each(|_| t.log_nee(3, [f32::MAX; 3], f32::MAX));
         assert!(t.log(3, [f32::MAX, -5.0, 2.0], f32::MAX) && t.log_pair(3, [f32::MAX; 3]));
     }
     cache.absorb(t);
@@ -287,7 +287,7 @@ fn a_billion_samples_keep_their_mean() {
 }
 
 /// Children hold exactly an eighth of their parent each, down to the level where that is few enough. Killed by: new
-/// leaves that start empty, a share of a quarter, splitting once only.
+/// leaves that start empty, a share of a quarter, subdividing once only.
 #[test]
 fn children_inherit_their_parents_sums() {
     let (mut blocks, mut rng) = (Blocks::leaves(300, 1), SplitMix(6));
@@ -317,7 +317,7 @@ fn children_inherit_their_parents_sums() {
     }
 }
 
-/// Killed by: writing beyond the leaves, counting nothing, splitting in the order of numbers instead of size.
+/// Killed by: writing beyond the leaves, counting nothing, subdividing in the order of numbers instead of size.
 #[test]
 fn a_full_arena_refuses_and_counts() {
     let (mut blocks, mut rng) = (Blocks::leaves(60, 1), SplitMix(7));
@@ -340,10 +340,10 @@ fn a_full_arena_refuses_and_counts() {
     assert_eq!(cache.subdivisions_refused(), refused);
 }
 
-/// A cell that has met nothing bright leans on its surroundings, which have; the more samples it has, the less. Killed
-/// by: shrinking towards the leaf only.
+/// A cell without bright samples is shrunk towards its surroundings, which have some; the more samples it has, the
+/// less. Killed by: shrinking towards the leaf only.
 #[test]
-fn cells_lean_on_their_surroundings() {
+fn cells_shrink_towards_their_surroundings() {
     let (mut blocks, mut rng) = (Blocks::leaves(60, 1), SplitMix(11));
     let (mut cache, mut shards) = blocks.carve(LO, HI);
     iterate(&mut cache, &mut shards, 4000, 500.0, &mut rng);
@@ -366,12 +366,12 @@ fn cells_lean_on_their_surroundings() {
     assert!(moments[0] > 0.0 && moments[1] > 0.0 && moments[1] < 0.01 * moments[0], "{moments:?}");
 }
 
-/// Roots of visibilities against f64: directions that shadow rays were traced in, those that were not and lean on their
-/// leaf, a cell that leans on its surroundings, nothing known; shadow rays go to the leaf of their vertex and to the
-/// bin of their own direction. Killed by: rounding down, a share instead of its root, the vertex's bin, shrinking by
-/// all samples of a bin instead of its shadow rays, no memory of earlier iterations.
+/// Square roots of visibilities against f64: directions with shadow rays, directions without that are shrunk towards
+/// their leaf, a cell that is shrunk towards its surroundings, nothing known; shadow rays go to the leaf of their
+/// vertex and to the bin of their own direction. Killed by: rounding down, a share instead of its root, the vertex's
+/// bin, shrinking by all samples of a bin instead of its shadow rays, no memory of earlier iterations.
 #[test]
-fn visibilities_are_what_shadow_rays_met() {
+fn visibilities_equal_an_oracle() {
     let (mut blocks, mut rng) = (Blocks::leaves(60, 1), SplitMix(13));
     let (mut cache, mut shards) = blocks.carve(LO, HI);
     iterate(&mut cache, &mut shards, 4000, 500.0, &mut rng);
@@ -417,7 +417,7 @@ fn visibilities_are_what_shadow_rays_met() {
     for none in [cache.bins(), NO_BIN] {
         assert_eq!(cache.visibility_root(U32x8::splat(none)).lane(0), 1.0);
     }
-    // a second place: its share and that of the surroundings differ
+    // a second position: its share and that of the surroundings differ
     let bin = find(&cache, 0, HI, up);
     let t = &mut shards[0];
     t.clear(cache.bins());
@@ -433,27 +433,27 @@ fn visibilities_are_what_shadow_rays_met() {
     is(roots(&cache, LO, up), bin(18.5, 600.0, leaf(18.5, 600.0)));
 }
 
-/// The light samples' share of the squares: of a bin that leans on its leaf, of one without samples, at most 1. Killed
-/// by: shares of counts, of one channel, light squares that do not lean on what the others do, a chance that is left
-/// out or squared, squares that are not finite.
+/// Share of next event estimation in the squares: of a bin that is shrunk towards its leaf, of one without samples, at
+/// most 1. Killed by: shares of counts, of one channel, squares that are shrunk otherwise than the others, a
+/// probability that is left out or squared, squares that are not finite.
 #[test]
-fn light_shares_are_of_all_squares() {
+fn nee_shares_are_of_all_squares() {
     let mut blocks = Blocks::leaves(2, 1);
     let (mut cache, mut shards) = blocks.carve(LO, HI);
     let t = &mut shards[0];
     t.clear(cache.bins());
     for k in 0..1000 {
-        // squares of 29 a sample; every second one has a light sample, of twice what it gave: 20 over all samples,
+        // squares of 29 a sample; every second one uses next event estimation, divided by 1/2: 20 over all samples,
         // halved
         t.log(0, [2.0, 3.0, 4.0], 1.0);
         if k % 2 == 0 {
-            t.log_light(0, [2.0, 6.0, 0.0], 0.5);
+            t.log_nee(0, [2.0, 6.0, 0.0], 0.5);
         }
         t.log(1, [1.0, 0.0, 0.0], 1.0);
-        t.log_light(1, [0.0, 1.0, 2.0], 1.0);
+        t.log_nee(1, [0.0, 1.0, 2.0], 1.0);
     }
-    [f32::NAN, f32::INFINITY].iter().for_each(|x| t.log_light(0, [1.0, *x, 1.0], 1.0));
-    [cache.bins(), NO_BIN].iter().for_each(|none| t.log_light(*none, [1.0; 3], 1.0));
+    [f32::NAN, f32::INFINITY].iter().for_each(|x| t.log_nee(0, [1.0, *x, 1.0], 1.0));
+    [cache.bins(), NO_BIN].iter().for_each(|none| t.log_nee(*none, [1.0; 3], 1.0));
     cache.begin_merge(1.0);
     cache.absorb(t);
     cache.freeze(f64::INFINITY);
@@ -499,7 +499,7 @@ fn what_is_looked_up() {
     }
 }
 
-/// What is looked up is what was gathered, up to the stated rounding, and bins that are not in use are empty. Killed
+/// Look-ups give what was logged, up to the stated rounding, and bins that are not in use are empty. Killed
 /// by: fewer bits, rounding the other way, channels or moments that change places, whatever memory held.
 #[test]
 fn look_ups_round_as_stated() {

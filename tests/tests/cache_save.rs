@@ -1,7 +1,7 @@
-//! The statistics cache as bytes: round trips, merging, and what happens to bytes that are wrong.
+//! The statistics cache as bytes: round trips, merging, damaged bytes.
 
-use croupier::learn::Objective;
-use croupier::learn::cache::CacheError;
+use croupier::unstable::learn::Objective;
+use croupier::unstable::learn::cache::CacheError;
 use croupier_tests::cache::*;
 use croupier_tests::stats::SplitMix;
 
@@ -33,8 +33,8 @@ fn a_saved_cache_comes_back_bit_for_bit() {
     for _ in 0..10_000 {
         let (p, d) = vertex(&mut rng);
         let [a, b] = [&cache, &other].map(|c| {
-            let bin = croupier::simd::U32x8::splat(find(c, 0, p, d));
-            let l = c.local(bin, croupier::simd::Mask8::first(1));
+            let bin = croupier::unstable::simd::U32x8::splat(find(c, 0, p, d));
+            let l = c.local(bin, croupier::unstable::simd::Mask8::first(1));
             let others = [l.cost.lane(0), l.count.lane(0), c.visibility_root(bin).lane(0)];
             ([l.mean.lane(0), l.moment.lane(0), l.variance.lane(0), others], l.nee_share.lane(0))
         });
@@ -195,7 +195,7 @@ fn random_damage_never_panics() {
 }
 
 /// A cache full of random numbers from 0 to 1e100, which no samples explain, still gives finite look-ups, also after
-/// splitting and logging. Killed by: no saturation, a division by a count of 0, a variance below 0.
+/// subdividing and logging. Killed by: no saturation, a division by a count of 0, a variance below 0.
 #[test]
 fn a_poisoned_cache_gives_finite_numbers() {
     let (bytes, mut rng) = (learned(60, 4, 2000.0), SplitMix(11));

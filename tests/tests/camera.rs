@@ -1,8 +1,8 @@
 //! Camera rays against f64 geometry.
 
-use croupier::camera::{concentric_disk, generate};
-use croupier::scene::blob::Camera;
-use croupier::simd::F32x8;
+use croupier::unstable::camera::{concentric_disk, generate};
+use croupier::unstable::scene::blob::Camera;
+use croupier::unstable::simd::F32x8;
 use croupier_tests::light_oracle::{cross, dot, length, sub, unit, wide};
 use croupier_tests::stats::{SplitMix, chi_square_in_order};
 

@@ -1,7 +1,7 @@
-//! The denoiser: what it must keep, what it must remove, and what it must survive.
+//! The denoiser: what it must keep, what it must remove, and input that must not harm it.
 
-use croupier::denoise::{DenoiseError, Noisy, Part, Planes, denoise, scratch_len};
-use croupier::film::{PixelAov, PixelStats};
+use croupier::unstable::denoise::{DenoiseError, Noisy, Part, Planes, denoise, scratch_len};
+use croupier::unstable::film::{PixelAov, PixelStats};
 use croupier_tests::stats::SplitMix;
 
 /// A mean of `n` exponentially distributed samples of mean 1, and its estimated variance: few samples carry much.
@@ -74,7 +74,7 @@ fn mse(a: &[Rgb], b: &[Rgb]) -> f64 {
     a.as_flattened().iter().zip(b.as_flattened()).map(square).sum::<f64>() / (3 * a.len()) as f64
 }
 
-/// Killed by: the variance not carried from level to level, the correction of the level left out, a margin that takes
+/// Killed by: the variance not filtered from level to level, the correction of the mean left out, a margin that takes
 /// part.
 #[test]
 fn noise_goes_and_the_mean_stays() {
@@ -147,10 +147,10 @@ fn a_picture_without_noise_comes_back() {
     }
 }
 
-/// An exact lamp in a noisy wall: it neither bleeds nor takes part in the correction of the level; only its rim knows
-/// of the wall's noise. Killed by: the weight `noisy` of the correction set to 1.
+/// An exact emitter in a noisy wall: it neither bleeds nor takes part in the correction of the mean; the wall's noise
+/// reaches its rim only. Killed by: the weight `noisy` of the correction set to 1.
 #[test]
-fn a_lamp_keeps_its_value() {
+fn an_emitter_keeps_its_value() {
     let lamp = |x: usize, y: usize| (30..40).contains(&x) && (10..20).contains(&y);
     let truth = Picture::exact([70, 50], |x, y| if lamp(x, y) { [50.0; 3] } else { [0.2; 3] });
     let mut noisy = truth.clone().noisy(4, 13);
@@ -168,10 +168,10 @@ fn a_lamp_keeps_its_value() {
     }
 }
 
-/// One pixel has seen what the others missed: its energy is shared out, and all of it is still there. Killed by: a
-/// level or the correction of the level left out, fireflies clamped and forgotten, its own variance smoothed away.
+/// One pixel has a sample that all others missed: its energy is distributed over its neighbours, and none is lost.
+/// Killed by: a level or the correction of the mean left out, fireflies clamped, its own variance smoothed away.
 #[test]
-fn a_firefly_is_shared_out() {
+fn a_firefly_is_distributed() {
     let mut noisy = Picture::exact([97, 65], |_, _| [0.1; 3]).noisy(8, 17);
     let before = mean(&noisy.color);
     let at = 32 * 97 + 48;
@@ -183,7 +183,7 @@ fn a_firefly_is_shared_out() {
     assert!((ratio - 1.0).abs() < 0.01, "energy changed by a factor {ratio}");
     let largest = out.as_flattened().iter().fold(0.0f32, |a, &b| a.max(b));
     assert!(largest < energy / 300.0, "brightest pixel still {largest}");
-    // Near it, and not everywhere: the corners know nothing of it.
+    // Near it, and not everywhere: the corners are unchanged.
     assert!(
         f64::from(out[0][0]) < 2.0 * before && f64::from(out[at][0]) > 5.0 * before,
         "{} {}",
@@ -236,7 +236,7 @@ fn every_size_works() {
         let noisy = Picture::exact(size, |_, _| [1.0; 3]).noisy(16, u64::from(size[0]));
         let out = noisy.denoised();
         let (low, high) = noisy.color.iter().fold((f32::MAX, 0.0f32), |(l, h), p| (l.min(p[0]), h.max(p[0])));
-        // The correction of the level may leave the range of the samples a little.
+        // The correction of the mean may leave the range of the samples a little.
         assert!(out.as_flattened().iter().all(|x| (0.95 * low..=1.05 * high).contains(x)), "{size:?}");
         assert!((mean(&out) / mean(&noisy.color) - 1.0).abs() < 1e-4, "{size:?}");
         let black = Picture::exact(size, |_, _| [0.0; 3]).denoised();

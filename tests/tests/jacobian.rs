@@ -3,11 +3,11 @@
 //! 12,800)). Tolerance 2e-3: rounding of the f32 maps under differences of 1/64 is about 1e-4, and up to 1e-3 where the
 //! density varies fast.
 
-use croupier::camera;
-use croupier::light::{PowerSelector, sample};
-use croupier::scene::Effects;
-use croupier::scene::blob::{Camera, LightKind, MaterialKind};
-use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::camera;
+use croupier::unstable::light::{PowerSelector, sample};
+use croupier::unstable::scene::Effects;
+use croupier::unstable::scene::blob::{Camera, LightKind, MaterialKind};
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_tests::bsdf::{Case, assert_every_kind, at_angle, cases, has_density, lane, splat};
 use croupier_tests::jacobian::{Deviation, V, deviation};
 use croupier_tests::light_scene::{IDENTITY, LightScene};
@@ -149,7 +149,7 @@ fn lights() {
             // seen from behind: nothing to sample, which the other winding covers
             continue;
         }
-        let selection = |s: &croupier::light::LightSample8| {
+        let selection = |s: &croupier::unstable::light::LightSample8| {
             let table = scene.light_alias;
             f64::from(if s.infinite.lane(0) { table.last() } else { table.first() }.unwrap().probability)
         };
@@ -178,7 +178,7 @@ fn lights() {
         };
         // the row's and the cell's probability, by the tables
         let (rows, width) = (8usize, 16usize);
-        let pick = |table: &[croupier::scene::blob::Alias], r: u32| {
+        let pick = |table: &[croupier::unstable::scene::blob::Alias], r: u32| {
             let x = u64::from(r) * table.len() as u64;
             let (i, low) = ((x >> 32) as usize, x as u32);
             if low < table[i].threshold || table[i].threshold == u32::MAX { i } else { table[i].alias as usize }

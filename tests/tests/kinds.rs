@@ -1,7 +1,7 @@
 //! What files, documents and the host say of kinds of materials and lights is what the blob's tables say.
 
-use croupier::scene::Scene;
-use croupier::scene::blob::*;
+use croupier::unstable::scene::Scene;
+use croupier::unstable::scene::blob::*;
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::description::*;
 use croupier_host::load::load;

@@ -1,10 +1,10 @@
 //! The factors of EARS are those of least variance x cost: on the paper's two-dimensional example (section 4.1, figure
-//! 2) against a numerical minimum, and in the machine, where they settle.
+//! 2) against a numerical minimum, and in renders, where they converge.
 
 use croupier::Settings;
-use croupier::learn::Learning;
-use croupier::rrs::{Learned8, Local8, MAX_FACTOR, MIN_FACTOR, Norm, Strategy, Vertices8};
-use croupier::simd::{F32x8, U32x8, Vec3x8};
+use croupier::unstable::learn::Learning;
+use croupier::unstable::rrs::{Learned8, Local8, MAX_FACTOR, MIN_FACTOR, Norm, Strategy, Vertices8};
+use croupier::unstable::simd::{F32x8, U32x8, Vec3x8};
 use croupier_tests::minimum::minimise;
 use croupier_tests::runner::{Learned, Schedule, learning, settings};
 use croupier_tests::scenes::{blob, cornell};
@@ -128,11 +128,11 @@ fn the_fixed_point_is_the_numerical_minimum() {
     assert!(killed > 100 && split > 50 && left > 20);
 }
 
-/// In the machine, with iterations of one length and nothing carried over, cost, variance and efficiency settle. Killed
+/// In renders, with iterations of equal length and decay 0, cost, variance and efficiency converge. Killed
 /// by: statistics that drift because samples are logged with the factors of the iteration before, a picture's variance
 /// that grows with the number of iterations.
 #[test]
-fn factors_settle_in_the_machine() {
+fn factors_converge_in_renders() {
     let scene = blob(&cornell([24, 24]));
     let s = settings(&scene, "ears:plain");
     let learning_ = Learning { decay: 0.0, cache_bytes: 1 << 20, subdivide_count: 4000.0, samples: 48, ..s.learning };

@@ -1,9 +1,9 @@
-//! What the machine logs is what a recursive oracle finds with the same random numbers, and a ledger that is too small
-//! spoils nothing.
+//! Samples that the tracer logs equal those of a recursive oracle with the same random numbers, and a ledger that is
+//! too small biases nothing.
 
-use croupier::accel::WideBvh;
-use croupier::learn::cache::{Cache, CacheSize, VertexKind};
-use croupier::learn::{Learning, Objective, PixelEstimator};
+use croupier::unstable::accel::WideBvh;
+use croupier::unstable::learn::cache::{Cache, CacheSize, VertexKind};
+use croupier::unstable::learn::{Learning, Objective, PixelEstimator};
 use croupier::{Counters, Scene, Settings};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::description::{Model, Reflectance, SceneDescription};
@@ -34,13 +34,13 @@ fn bins(l: &dyn Learned) -> Vec<Sums> {
     Oracle::new(&l.saved().unwrap()).leaves.into_iter().flatten().collect()
 }
 
-/// One more iteration of `spp` samples by the machine after `before`, and by the oracle: sums that were added, pixels.
+/// One more iteration of `spp` samples by the tracer after `before`, and by the oracle: sums that were added, pixels.
 struct Both {
     machine: Vec<Sums>,
     oracle: Vec<Sums>,
-    /// Rays and samples of vertices, machine and oracle.
+    /// Rays and samples of vertices, tracer and oracle.
     counted: [[u64; 2]; 2],
-    /// Radiance of the pixels, machine and oracle.
+    /// Radiance of the pixels, tracer and oracle.
     pixels: Vec<[[f64; 3]; 2]>,
     pairs: f64,
     /// Were light samples learned from?
@@ -54,7 +54,7 @@ const GREEDY: Sums = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1e12, 1e12, 1e12, 0.0, 0.0, 
 fn both(description: &SceneDescription, max_depth: u32, iterations: &[u32]) -> Both {
     let bytes = blob(description);
     let greedy = iterations.len() > 1;
-    // light samples are learned from if they play; in the first iteration all are drawn and traced
+    // next event estimation is learned if it plays roulette; the first iteration always uses it and traces all its rays
     let s = Settings { shadow_roulette: !greedy, ..whole_leaves(&bytes, max_depth) };
     let scene = Scene::from_bytes(&bytes).unwrap();
     let mut states = Vec::new();
@@ -106,7 +106,7 @@ fn both(description: &SceneDescription, max_depth: u32, iterations: &[u32]) -> B
         pixels.push([found, expected]);
     }
     if greedy {
-        // what is carried over is the same part of everything
+        // the decay is the same for all sums
         let carried = machine[0][0] - replay.sums[0][0];
         assert!((0.0..=1.0).contains(&carried), "{carried} of the old samples");
         for b in &mut machine {
@@ -146,7 +146,7 @@ fn check(what: &str, b: &Both) {
 /// weight of the path before them, emission without its MIS weight, the first camera ray charged to a sample.
 #[test]
 fn single_samples_are_logged_as_recursion_has_them() {
-    for (name, scene) in [("lamp", lamp_box()), ("mirror and glass", mirror_and_glass())] {
+    for (name, scene) in [("lamp", box_with_emitter()), ("mirror and glass", mirror_and_glass())] {
         for max_depth in [2, 3, 5] {
             let b = both(&scene, max_depth, &[200]);
             let used = b.oracle.iter().filter(|s| s[0] > 0.0).count();
@@ -161,7 +161,7 @@ fn single_samples_are_logged_as_recursion_has_them() {
 /// vertex whose cost is counted once, a sum that is folded into the parent before it is complete.
 #[test]
 fn nested_splits_are_logged_as_recursion_has_them() {
-    for (name, scene) in [("lamp", lamp_box()), ("mirror and glass", mirror_and_glass())] {
+    for (name, scene) in [("lamp", box_with_emitter()), ("mirror and glass", mirror_and_glass())] {
         for (max_depth, spp) in [(2, 12), (3, 8), (4, 1)] {
             let b = both(&scene, max_depth, &[4, spp]);
             println!(
@@ -175,12 +175,12 @@ fn nested_splits_are_logged_as_recursion_has_them() {
     }
 }
 
-/// Two faces of a matte edge and a mirror beside it, all in one cell and seen in one picture: each has bins of its own,
-/// with its own radiance, or with that over its pixels where errors are relative. Killed by: bins by the direction of
-/// the viewer alone, a mirror among the matte surfaces, first vertices in other units.
+/// Two faces of a diffuse edge and a mirror beside it, all in one cell and seen in one picture: each has bins of its
+/// own, with its own radiance, or with that over its pixels where errors are relative. Killed by: bins by the direction
+/// of the viewer alone, a mirror among the diffuse surfaces, first vertices in other units.
 #[test]
 fn faces_and_materials_in_one_cell_stay_apart() {
-    let mut s = under_white_sky(camera([0.0, 1.0, 1.0], [0.0; 3], 20.0, [16, 16]));
+    let mut s = in_white_environment(camera([0.0, 1.0, 1.0], [0.0; 3], 20.0, [16, 16]));
     let mirror = Model::Mirror { reflectance: Reflectance::Constant([0.5; 3]) };
     let [top, front, mirror] = [grey(0.8), grey(0.2), mirror].map(|m| s.add_material("face", m));
     let lying = |x: f32| [[x, 0.0, 0.0], [x + 1.0, 0.0, 0.0], [x + 1.0, 0.0, -1.0], [x, 0.0, -1.0]];
@@ -205,8 +205,8 @@ fn faces_and_materials_in_one_cell_stay_apart() {
         let close = |found: &[f64], expected: &[f64]| {
             found.len() == expected.len() && found.iter().zip(expected).all(|(f, e)| (f / e - 1.0).abs() < 0.05)
         };
-        let (matte, shiny) = (of(VertexKind::FirstDiffuse), of(VertexKind::FirstGlossy));
-        assert!(close(&matte, &faces) && close(&shiny, &shown), "{objective}: {matte:?} and {shiny:?}");
+        let (diffuse, glossy) = (of(VertexKind::FirstDiffuse), of(VertexKind::FirstGlossy));
+        assert!(close(&diffuse, &faces) && close(&glossy, &shown), "{objective}: {diffuse:?} and {glossy:?}");
         assert!(of(VertexKind::Diffuse).is_empty() && of(VertexKind::Glossy).is_empty(), "paths have one vertex");
     }
 }
@@ -216,7 +216,7 @@ fn faces_and_materials_in_one_cell_stay_apart() {
 /// its record, a sample that is logged without what its children would have added.
 #[test]
 fn a_full_ledger_changes_no_picture() {
-    for scene in [blob(&lamp_box()), blob(&mirror_and_glass())] {
+    for scene in [blob(&box_with_emitter()), blob(&mirror_and_glass())] {
         for shards in [1, 3] {
             let mut s = Settings { shards, size: [16, 16], ..whole_leaves(&scene, 5) };
             s.learning.cache_bytes = 1 << 16;
@@ -241,8 +241,8 @@ fn a_full_ledger_changes_no_picture() {
     }
 }
 
-/// Light samples that play roulette leave the means of what is logged alone, within 1 %. Killed by: contributions that
-/// are divided by one of their chances in the picture only.
+/// Roulette for next event estimation does not change the means of what is logged, within 1 %. Killed by: contributions
+/// that are divided by one of their probabilities in the picture only.
 #[test]
 fn shadow_roulette_does_not_change_what_is_logged() {
     let scene = blob(&cornell([16, 16]));
@@ -264,14 +264,15 @@ fn shadow_roulette_does_not_change_what_is_logged() {
     assert!((with / without - 1.0).abs() < 0.01, "{with} for {without}");
 }
 
-/// What is known of light samples is the same whether all are drawn or one of twenty, within 5 %: the rays of a tenth
-/// are spared, which adds a little. Killed by: a chance to be drawn that counts twice or not at all.
+/// Statistics of next event estimation are the same whether all samples use it or one of twenty, within 5 %: roulette
+/// terminates a tenth of the shadow rays, which adds a little. Killed by: a probability that counts twice or not at
+/// all.
 #[test]
-fn spared_light_samples_are_made_up_for() {
-    let scene = blob(&lamp_box());
+fn nee_statistics_do_not_depend_on_its_probability() {
+    let scene = blob(&box_with_emitter());
     let mut s = Settings { size: [16, 16], shadow_roulette: true, ..whole_leaves(&scene, 3) };
     (s.learning.decay, s.learning.factors) = (0.0, [1.0, 1.0]);
-    // squares a sample in the iteration of 2,048 samples, which all draw in the first one
+    // squares per sample in the iteration of 2,048 samples, which all use it in the first one
     let squares = |iterations: &[u32]| {
         let (mut sums, mut counters) = ([0.0; FIELDS], Vec::new());
         learning(&scene, &s, iterations, IN_ORDER, &mut |i, l: &mut dyn Learned| {
@@ -304,11 +305,11 @@ fn spared_light_samples_are_made_up_for() {
 }
 
 /// Complete samples only: with a small ledger a bin's samples cost at least what any sample costs, and where paths have
-/// one bounce left the means are those of a large one. Killed by: a spoiled sample that is logged all the same (too
+/// one bounce left the means are those of a large one. Killed by: an incomplete sample that is logged all the same (too
 /// cheap and too dark).
 #[test]
 fn only_complete_samples_are_logged() {
-    let scene = blob(&lamp_box());
+    let scene = blob(&box_with_emitter());
     let means = |ledger: u32, max_depth: u32| {
         let mut s = Settings { size: [16, 16], ..whole_leaves(&scene, max_depth) };
         s.learning.ledger = ledger;
@@ -320,7 +321,7 @@ fn only_complete_samples_are_logged() {
         });
         (sums[0], sums[2] / sums[0], sums[3] / sums[0])
     };
-    // depth 2: a sample is a light ray and a bounce that ends; which of them finds a record hangs on nothing
+    // depth 2: a sample is a light ray and a bounce that ends; which of them finds a record is arbitrary
     let (all, cost, value) = means(1 << 14, 2);
     let (few, small_cost, small_value) = means(12, 2);
     println!("{few} of {all} samples: {small_cost} for {cost} rays, {small_value} for {value}");

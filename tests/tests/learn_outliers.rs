@@ -2,23 +2,23 @@
 //! decide all factors.
 
 use croupier::Settings;
-use croupier::film::PixelStats;
-use croupier::learn::{Learning, PictureStatistics};
+use croupier::unstable::film::PixelStats;
+use croupier::unstable::learn::{Learning, PictureStatistics};
 use croupier_host::description::*;
 use croupier_tests::cache::{FIELDS, Oracle};
 use croupier_tests::runner::{Learned, Schedule, learning, settings};
 use croupier_tests::scenes::*;
 
 const IN_ORDER: Schedule = Schedule::InOrder(1 << 20);
-/// Index of the octree of matte vertices that the camera sees.
+/// Number of the octree of diffuse first vertices.
 const FIRST_MATTE: u32 = 2;
 
-/// A picture of a sky of radiance 1 with lamps of 1e4 that cover a quarter of a pixel each.
+/// Picture of an environment of radiance 1 with emitters of 1e4 that cover a quarter of a pixel each.
 fn starry(stars: usize) -> SceneDescription {
-    let mut s = under_white_sky(camera([0.0; 3], [0.0, 0.0, -1.0], 90.0, [64, 64]));
+    let mut s = in_white_environment(camera([0.0; 3], [0.0, 0.0, -1.0], 90.0, [64, 64]));
     let lamp = s.add_material("lamp", grey(0.0));
     for star in 0..stars {
-        // pixels are 1/32 wide where the lamps are
+        // pixels are 1/32 wide where the emitters are
         let centre = [3 + 7 * (star % 8), 3 + 7 * (star / 8)].map(|i| (i as f32 + 0.5) / 32.0 - 1.0);
         let corners = facing_z(1.0 / 128.0, -1.0, 1.0).map(|[x, y, z]| [x + centre[0], y + centre[1], z]);
         add_quad(&mut s, "lamp", lamp, corners);
@@ -37,7 +37,7 @@ fn the_worst_thousandth_is_kept_apart() {
         let mut found = None;
         learning(&scene, &s, &[64, 1024, 0], IN_ORDER, &mut |i, l: &mut dyn Learned| {
             if i == 0 {
-                // stars are no part of what is expected, so that each is an outlier, and nothing else is
+                // the emitters are not in the estimate, so that each is an outlier, and nothing else is
                 l.give(&[[1.0; 3]; 64 * 64]).unwrap();
             }
             found = Some(l.statistics()[0]);
@@ -45,7 +45,7 @@ fn the_worst_thousandth_is_kept_apart() {
         found.unwrap()
     };
     let error = |p: &PictureStatistics| p.variance + p.outliers;
-    // a lamp in a quarter of the pixel: mean squared error 0.25 (1e4 - 1)^2 over 1.01
+    // an emitter in a quarter of the pixel: mean squared error 0.25 (1e4 - 1)^2 over 1.01
     let one = 0.25 * 9999.0f64.powi(2) / 1.01 / 4096.0;
     for stars in [1, 4, 5] {
         let p = measured(stars);
@@ -61,9 +61,9 @@ fn the_worst_thousandth_is_kept_apart() {
     assert!(share > 5.0 / 40.0 && share < 10.0 / 40.0, "{share}: 5 of 40 stars, the brightest");
 }
 
-/// Light samples of a floor of which one in 20,000 is 20,000 times as bright as the others: in the moments of its cells
-/// it counts no more than the limit. Killed by: contributions that are logged as they are, a limit in other units than
-/// those of the error, a clip that reaches the picture.
+/// Next event estimation on a floor where one light sample in 20,000 is 20,000 times as bright as the others: in the
+/// moments of its cells it counts no more than the limit. Killed by: contributions that are logged as they are, a limit
+/// in other units than those of the error, a clip that reaches the picture.
 #[test]
 fn moments_leave_fireflies_out() {
     let mut s = SceneDescription {
@@ -100,17 +100,17 @@ fn moments_leave_fireflies_out() {
     let seen = image.pixels.iter().map(moment).sum::<f64>() / image.pixels.len() as f64 / sun;
     let logged = sums[6] / sums[0];
     assert!(seen > 1000.0, "{seen}: no firefly was met, so nothing is tested");
-    // sun and sky, two lights of about equal light and chance, have the square of their sum as second moment: between
-    // 0.44 and 1 of the pixel's square, as the pixel's estimate knows of the fireflies or not
+    // sun and environment, two lights of about equal power and probability, have the square of their sum as second
+    // moment: between 0.44 and 1 of the pixel's square, as the pixel's estimate knows of the fireflies or not
     assert!(sums[0] > 1e5 && (0.3..3.0).contains(&logged), "{logged} in units of the pixel's square, {seen} seen");
 }
 
-/// Values at vertices that the camera sees are in units of their pixel: a bright and a dim picture of the same thing
-/// teach the same. Killed by: radiance, or radiance over albedo, in their place; a unit that is not that of the error.
+/// Values at first vertices are in units of their pixel: a bright and a dim picture of the same thing give the same
+/// statistics. Killed by: radiance, or radiance over albedo, in their place; a unit that is not that of the error.
 #[test]
 fn first_vertices_count_in_pixels() {
     for radiance in [0.1f32, 100.0] {
-        let mut s = under_white_sky(camera([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], 40.0, [16, 16]));
+        let mut s = in_white_environment(camera([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], 40.0, [16, 16]));
         s.environment = Some(Environment::Constant { radiance: [radiance; 3] });
         let floor = s.add_material("floor", grey(0.5));
         add_quad(&mut s, "floor", floor, facing_y(1.0, 0.0, 1.0));

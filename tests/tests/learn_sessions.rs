@@ -1,10 +1,10 @@
-//! What was learned as part of a session: saved and loaded, carried over, counted, of another scene, in little memory,
-//! and in the face of numbers that are none.
+//! Learned statistics as part of a session: saved and loaded, decayed, counted, of another scene, in little memory, and
+//! with numbers that are not finite.
 
-use croupier::film::PixelStats;
-use croupier::learn::cache::{BIN_LIMIT, CacheError, CacheSize};
-use croupier::learn::{ControlVariate, Learning, Objective, PixelEstimator};
-use croupier::rrs::Norm;
+use croupier::unstable::film::PixelStats;
+use croupier::unstable::learn::cache::{BIN_LIMIT, CacheError, CacheSize};
+use croupier::unstable::learn::{ControlVariate, Learning, Objective, PixelEstimator};
+use croupier::unstable::rrs::Norm;
 use croupier::{Counters, Plan, Settings, SettingsError, Strategy};
 use croupier_host::description::*;
 use croupier_tests::cache::{FIELDS, Oracle, Sums, overwrite};
@@ -20,7 +20,7 @@ fn learns(scene: &[u8], strategy: &str, max_depth: u32) -> Settings {
     Settings { max_depth, learning, ..s }
 }
 
-/// Bytes of what a few iterations teach.
+/// Bytes of the statistics of a few iterations.
 fn taught(scene: &[u8], s: &Settings, iterations: &[u32]) -> Vec<u8> {
     let mut bytes = None;
     let iterations = [iterations, &[0]].concat();
@@ -29,8 +29,8 @@ fn taught(scene: &[u8], s: &Settings, iterations: &[u32]) -> Vec<u8> {
 }
 
 /// A cache that is saved and loaded between two iterations gives the same factors: the picture has the same bits.
-/// Killed by: a sum that is not saved, shares of divided leaves that are dealt out again, look-ups that hang on the
-/// numbers of leaves.
+/// Killed by: a sum that is not saved, sums of subdivided leaves that are distributed again, look-ups that depend on
+/// the numbers of leaves.
 #[test]
 fn loading_what_was_saved_changes_nothing() {
     for scene in [blob(&cornell([24, 16])), blob(&everything([24, 16]))] {
@@ -73,8 +73,8 @@ fn loaded_statistics_are_used() {
     assert!(without.bits() != with.bits());
 }
 
-/// Counts of the cache are those of the counters, and an iteration hands on what `decay` says. Killed by: samples that
-/// are counted and not logged, shards left out, statistics that decay once per shard.
+/// Counts of the cache are those of the counters, and the part that an iteration keeps is `decay`. Killed by: samples
+/// that are counted and not logged, shards left out, statistics that decay once per shard.
 #[test]
 fn counts_agree_and_decay() {
     let scene = blob(&cornell([16, 16]));
@@ -106,7 +106,7 @@ fn full_bins_refuse_and_count() {
     let scene = blob(&cornell([16, 16]));
     let mut s = learns(&scene, "ears", 3);
     s.learning.cache_bytes = 16_000;
-    // so that the vertices that the camera sees are logged in the first iteration
+    // so that first vertices are logged in the first iteration
     s.learning.objective = Objective::Absolute;
     s.learning.samples = u32::MAX;
     let limit = f64::from(BIN_LIMIT);
@@ -121,8 +121,9 @@ fn full_bins_refuse_and_count() {
     assert_eq!(counts.iter().sum::<f64>(), (c.samples_logged - c.samples_refused) as f64);
 }
 
-/// Of 16 samples of a pixel the first 3 teach what 3 samples do, and all of them make the picture. Killed by: a limit
-/// that is not looked at, one too many or too few, the last samples instead of the first, pictures without the others.
+/// Of 16 samples of a pixel the first 3 give the statistics of 3 samples, and all of them make the picture. Killed by:
+/// a limit that is not looked at, one too many or too few, the last samples instead of the first, pictures without the
+/// others.
 #[test]
 fn the_first_samples_of_a_pixel_are_learned_from() {
     let scene = blob(&cornell([16, 16]));
@@ -152,12 +153,13 @@ fn the_first_samples_of_a_pixel_are_learned_from() {
     assert_eq!(paths, all);
 }
 
-/// A bright lamp behind a wall, and one before the open side of the box: where light samples never arrive, most shadow
-/// rays are spared after the first iteration, and few where they do. Both pictures agree with those of full light
-/// sampling. Killed by: visibility that is not learned, that is learned of the vertices' own directions, that counts
-/// spared rays as hidden, that is not used; light samples that are drawn whatever they are worth.
+/// A bright emitter behind a wall, and one before the open side of the box: roulette terminates most shadow rays after
+/// the first iteration where they are always occluded, and few where they are not. Both pictures agree with those
+/// without this roulette. Killed by: visibility that is not learned, that is learned for the vertices' own directions,
+/// that counts terminated rays as occluded, that is not used; next event estimation that is used whatever it
+/// contributes.
 #[test]
-fn lamps_behind_walls_get_few_shadow_rays() {
+fn occluded_lights_get_few_shadow_rays() {
     // the box is open in front
     let [hidden, open] = [[3.0, 0.0, 0.0], [0.0, 0.0, 3.0]].map(|position| {
         let mut s = cornell([16, 16]);
@@ -180,11 +182,11 @@ fn lamps_behind_walls_get_few_shadow_rays() {
     assert!(hidden[0] < 0.4 && open[0] > 0.8 && hidden[1] > 0.2 && open[1] < 0.1, "{hidden:?} {open:?}");
 }
 
-/// A cache that was taught while all light samples were drawn, most of them for a hidden lamp, knows what they are worth:
-/// roulette spares as many as with one that was taught while they played. Killed by: light samples that are learned from
-/// only if they play.
+/// A cache from renders without roulette for next event estimation, most of it towards an occluded emitter, holds what
+/// it contributes: roulette skips as much as with a cache from renders with it. Killed by: next event estimation that
+/// is learned only if it plays roulette.
 #[test]
-fn light_samples_are_learned_from_in_any_case() {
+fn nee_is_learned_with_and_without_its_roulette() {
     let mut s = cornell([16, 16]);
     s.emitters.push(Emitter::Point { position: [3.0, 0.0, 0.0], intensity: [300.0; 3] });
     let scene = blob(&s);
@@ -206,9 +208,9 @@ fn light_samples_are_learned_from_in_any_case() {
     assert!(on > 0.1 && (off / on - 1.0).abs() < 0.2, "{off} {on}");
 }
 
-/// Statistics of other bounds are refused with what differs, and nothing has changed. Of other things within the same
-/// bounds they are taken: they change the noise, no mean (`learn_unbiased.rs` loads random ones). Killed by: bounds
-/// that are not looked at, a cache that is emptied before the bytes are checked.
+/// Statistics of other bounds are refused with the number that differs, and nothing has changed. Statistics of another
+/// scene with the same bounds are taken: they change the noise, no mean (`learn_unbiased.rs` loads random ones). Killed
+/// by: bounds that are not looked at, a cache that is emptied before the bytes are checked.
 #[test]
 fn statistics_of_another_scene_are_refused() {
     let scene = blob(&cornell([16, 16]));
@@ -230,8 +232,8 @@ fn statistics_of_another_scene_are_refused() {
     assert!(run(true).bits() == run(false).bits());
 }
 
-/// Values of first vertices are in units of their pixel or not, as the objective wants: statistics say which, and a
-/// session with the other refuses them. What else differs is no reason to. Killed by: a cache that is told a fixed
+/// Values of first vertices are in units of their pixel or not, as the objective requires: statistics state which, and
+/// a session with the other refuses them. What else differs is no reason to. Killed by: a cache that is told a fixed
 /// objective.
 #[test]
 fn statistics_of_another_objective_are_refused() {
@@ -353,8 +355,9 @@ fn everything_fits_in_little_memory() {
     assert!(image.counters.samples_logged > 100_000);
 }
 
-/// Adaptive sampling deals out what was asked for, in pictures whose tiles differ in size and much in error. Killed by:
-/// shares that are bounded after they were made to add up, a least sample of each pixel that comes on top.
+/// Adaptive sampling allocates as many samples as were asked for, in pictures whose tiles differ in size and much in
+/// error. Killed by: shares that are bounded after they were made to add up, a least sample of each pixel that comes on
+/// top.
 #[test]
 fn adaptive_samples_are_as_many_as_were_asked_for() {
     let mut scene = mirror_and_glass();
@@ -411,7 +414,7 @@ fn choices_that_make_no_sense_are_refused() {
             out_of_range(strategy, &|s| s.learning = learning, name);
         }
     }
-    let nobody = Strategy::Fixed(croupier::rrs::Fixed { factor: f32::NAN });
+    let nobody = Strategy::Fixed(croupier::unstable::rrs::Fixed { factor: f32::NAN });
     out_of_range("classic", &|s| s.strategy = nobody, "rrs");
     let needed = CacheSize::SMALLEST.bytes(1).unwrap();
     let few = SettingsError::Cache { needed, given: needed - 1 };

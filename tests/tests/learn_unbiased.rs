@@ -1,14 +1,14 @@
-//! Whatever was learned, and however, the mean stays: equivalence tests (TOST) of strategies that learn, of their
-//! settings and of statistics that are nonsense, against renders without roulette and against known radiance.
+//! Learning does not bias: equivalence tests (TOST) of strategies that learn, of their settings and of arbitrary
+//! statistics, against renders without roulette and against known radiance.
 //!
 //! As in `unbiased.rs`: equal is a difference within 0.2 % of the mean with 95 % confidence from both sides, standard
 //! errors are asserted to be below 0.06 %. A bias of 0.2 % passes with a probability of 5 %, one of 0.3 % with less
 //! than 1e-4. Here the iterations of a render are not independent; where that may matter the error comes from renders
 //! with different seeds.
 
-use croupier::film::{PixelAov, PixelStats};
-use croupier::learn::{ControlVariate, Learning, Objective, PixelEstimator};
-use croupier::rrs::Norm;
+use croupier::unstable::film::{PixelAov, PixelStats};
+use croupier::unstable::learn::{ControlVariate, Learning, Objective, PixelEstimator};
+use croupier::unstable::rrs::Norm;
 use croupier::{Settings, Strategy};
 use croupier_host::builtin;
 use croupier_host::description::*;
@@ -117,7 +117,7 @@ fn closed_boxes_have_their_radiance() {
     }
 }
 
-/// Killed by: factors that hang on the sample's own future, statistics that change within an iteration.
+/// Killed by: factors that depend on the sample's own future, statistics that change within an iteration.
 #[test]
 fn strategies_that_learn_agree_with_none() {
     let scene = blob(&cornell([16, 16]));
@@ -139,8 +139,9 @@ fn strategies_that_learn_agree_with_none() {
     }
 }
 
-/// All materials under a soft sky, for strategies that key statistics by material and direction. Killed by: a value
-/// that is scaled by the albedo and not scaled back in the pixel, a class of vertices whose record is closed twice.
+/// All materials under a smooth environment, for strategies that key statistics by material and direction. Killed by: a
+/// value that is scaled by the albedo and not scaled back in the pixel, a class of vertices whose record is closed
+/// twice.
 #[test]
 fn strategies_that_learn_agree_on_all_materials() {
     let scene = blob(&soft(everything([16, 12])));
@@ -151,14 +152,15 @@ fn strategies_that_learn_agree_on_all_materials() {
     }
 }
 
-/// A floor under a point light, between two mirrors or panes of glass that show nothing but a dim sky: all vertices of
-/// depth 2 are on a surface whose lobes are deltas, and paths end at depth 3. What is learned kills most of them; the
-/// mean stays. Killed by: a delta surface that always goes on (factor 1), a death there that nothing makes up for.
+/// A floor under a point light, between two mirrors or panes of glass that show nothing but a dim environment: all
+/// vertices of depth 2 are on a surface whose lobes are deltas, and paths end at depth 3. Learned roulette terminates
+/// most of them; the mean stays. Killed by: delta surfaces with a factor of 1 always, termination there without a
+/// weight.
 #[test]
 fn mirrors_and_glass_play_learned_roulette() {
     let mirror = Model::Mirror { reflectance: Reflectance::Constant([1.0; 3]) };
     for (what, model) in [("mirror", mirror), ("glass", Model::Dielectric { int_ior: 1.5, ext_ior: 1.0 })] {
-        let mut s = under_white_sky(camera([0.0, 0.6, 0.8], [0.0; 3], 5.0, [16, 16]));
+        let mut s = in_white_environment(camera([0.0, 0.6, 0.8], [0.0; 3], 5.0, [16, 16]));
         s.environment = Some(Environment::Constant { radiance: [0.03; 3] });
         let [floor, side] = [grey(0.8), model].map(|m| s.add_material(what, m));
         add_quad(&mut s, "floor", floor, facing_y(0.3, 0.0, 1.0));
@@ -166,7 +168,7 @@ fn mirrors_and_glass_play_learned_roulette() {
             let z = 1.0f32.copysign(x);
             add_quad(&mut s, "side", side, [[x, -0.3, -z], [x, -0.3, z], [x, 0.3, z], [x, 0.3, -z]]);
         }
-        // the lower one is chosen in vain: noise beside which the sides are of no account
+        // the lower one contributes nothing: noise beside which the sides do not matter
         for (y, intensity) in [(1.0, 1.0), (-1.0, 0.25)] {
             s.emitters.push(Emitter::Point { position: [0.0, y, 0.0], intensity: [intensity; 3] });
         }
@@ -240,8 +242,8 @@ fn choices_do_not_bias() {
     check("all carried", "ears", &|s| s.learning.decay = 1.0);
 }
 
-/// Renders of a few samples in several iterations, many of them with different seeds: what hangs on an iteration's own
-/// noise shows here and not in long renders. Killed by: adaptive counts from the samples that they weigh.
+/// Renders of a few samples in several iterations, many of them with different seeds: what depends on an iteration's
+/// own noise shows here and not in long renders. Killed by: adaptive counts from the samples that they weigh.
 #[test]
 fn short_renders_are_unbiased() {
     let scene = blob(&cornell([16, 16]));
@@ -258,8 +260,8 @@ fn short_renders_are_unbiased() {
 
 /// Sixteen pixels with caustics: an iteration that finds one is brighter and noisier than the others. The picture is
 /// the mean of the iterations by weight; it must not differ from their mean by number. Killed by: an iteration that is
-/// weighted by its own variance (0.9 % too dark here), an adaptive pixel whose later samples outvote those that called
-/// for them.
+/// weighted by its own variance (0.9 % too dark here), an adaptive pixel whose later samples have more weight than
+/// those that caused them.
 #[test]
 fn weights_of_iterations_do_not_follow_their_light() {
     let scene = blob(&mirror_and_glass());
@@ -330,10 +332,10 @@ fn random_statistics_do_not_bias() {
     }
 }
 
-/// As above, of light samples alone, by their visibilities and shares: the other factors stay 1. Killed by: a light
-/// sample or its ray that is divided by another chance than it had, or by none, a chance of 0.
+/// Random roulette of next event estimation alone, by visibilities and shares: the other factors stay 1. Killed by: a
+/// light sample or its shadow ray that is divided by another probability than it had, or by none, a probability of 0.
 #[test]
-fn random_roulette_of_light_samples_does_not_bias() {
+fn random_nee_roulette_does_not_bias() {
     let scene = blob(&cornell([16, 16]));
     let none = Known::of(&render(&scene, &Settings { seed: 8, ..learns(&scene, "none", 3) }, 60_000));
     let (mut samples, mut light_samples_skipped, mut rays, mut kills) = (0, 0, 0, 0);
@@ -358,7 +360,7 @@ fn random_roulette_of_light_samples_does_not_bias() {
     assert_equivalent("random roulette of light samples", known, none);
 }
 
-/// A random estimate of the pixels from the host. Killed by: an estimate that finds its way into the film.
+/// A random estimate of the pixels from the host. Killed by: an estimate that gets into the film.
 #[test]
 fn random_estimates_do_not_bias() {
     let scene = blob(&cornell([16, 16]));

@@ -1,10 +1,10 @@
-//! Renders that learn: saved statistics, denoised pictures, figures.
+//! Input and output of renders that learn: saved statistics, denoised pictures, figures.
 
-use croupier::cost::COST_SHADOW;
-use croupier::denoise::{Planes, scratch_len};
-use croupier::learn::cache::CacheSize;
-use croupier::learn::{ControlVariate, Learning, Objective};
-use croupier::rrs::Norm;
+use croupier::unstable::cost::COST_SHADOW;
+use croupier::unstable::denoise::{Planes, scratch_len};
+use croupier::unstable::learn::cache::CacheSize;
+use croupier::unstable::learn::{ControlVariate, Learning, Objective};
+use croupier::unstable::rrs::Norm;
 use croupier::{Scene, Settings, Strategy};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::builtin;
@@ -37,7 +37,7 @@ fn with(mut options: RenderOptions, change: impl Fn(&mut Settings)) -> RenderOpt
     options
 }
 
-/// Bytes of a cache that cannot split.
+/// Size of a cache that cannot subdivide, bytes.
 fn smallest() -> usize {
     CacheSize::SMALLEST.bytes(2).unwrap()
 }

@@ -1,7 +1,7 @@
 //! Environment maps and the constant environment against the f64 oracle.
 
-use croupier::light::{LightSample8, PowerSelector, environment_pdf, environment_radiance, sample};
-use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::light::{LightSample8, PowerSelector, environment_pdf, environment_radiance, sample};
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_tests::light_oracle::{Map, V, dot, length, luminance, wide};
 use croupier_tests::light_scene::{IDENTITY, LightScene};
 use croupier_tests::stats::{SplitMix, chi_square_in_order};
@@ -31,7 +31,7 @@ impl Case {
         let map = Map::new(&texels, w, h);
         // Another light, so that the selection probability is not 1.
         let owner = LightScene::default()
-            .delta(croupier::scene::blob::LightKind::Point, [5.0, 0.0, 0.0], [1.0; 3])
+            .delta(croupier::unstable::scene::blob::LightKind::Point, [5.0, 0.0, 0.0], [1.0; 3])
             .map(texels, [w as u32, h as u32], SCALE, to_local)
             .select_by(&[1.0, 3.0]);
         Self { name, owner, map, to_local }

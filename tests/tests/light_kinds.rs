@@ -1,10 +1,10 @@
 //! Every kind of light under one contract: what its samples add up to is the irradiance by an independent formula, and
 //! they say of themselves what the table of kinds says. A kind without an example does not compile.
 
-use croupier::light::{LightSample8, PowerSelector, sample};
-use croupier::scene::Effects;
-use croupier::scene::blob::{EnvironmentKind, LightKind};
-use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::light::{LightSample8, PowerSelector, sample};
+use croupier::unstable::scene::Effects;
+use croupier::unstable::scene::blob::{EnvironmentKind, LightKind};
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_tests::light_oracle::{V, cross, dot, length, sub, wide};
 use croupier_tests::light_scene::{IDENTITY, LightScene};
 use croupier_tests::stats::{Mean, SplitMix};
@@ -103,7 +103,7 @@ fn samples_agree_with_the_table() {
         let view = scene.scene();
         for (profile, wanted) in [(Effects::of_light(*kind), true), (Effects(!Effects::of_light(*kind).0), false)] {
             let words = [U32x8::splat(0x5555_5555); 4];
-            let s = croupier::light::sample_of(
+            let s = croupier::unstable::light::sample_of(
                 profile,
                 &view,
                 &PowerSelector(view),

@@ -1,9 +1,9 @@
 //! Alias tables and light powers: what sampling does is what the tables state.
 
 use bytemuck::Zeroable;
-use croupier::light::{LightSelector, PowerSelector};
-use croupier::scene::blob::*;
-use croupier::simd::{Mask8, U32x8, Vec3x8};
+use croupier::unstable::light::{LightSelector, PowerSelector};
+use croupier::unstable::scene::blob::*;
+use croupier::unstable::simd::{Mask8, U32x8, Vec3x8};
 use croupier_host::{alias, environment};
 use croupier_tests::light_oracle::{Map, luminance, wide};
 use croupier_tests::light_scene::{IDENTITY, LightScene};

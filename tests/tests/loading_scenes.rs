@@ -1,7 +1,7 @@
 //! The scenes beside the repository load and bake whole. A clone without them skips these tests, and says so.
 
 use croupier::Scene;
-use croupier::scene::blob::MaterialKind;
+use croupier::unstable::scene::blob::MaterialKind;
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::load::{LoadError, load};
 use serde_json::Value;

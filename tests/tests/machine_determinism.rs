@@ -2,8 +2,8 @@
 //! which shards are stepped do not matter, nor, in `reproducible` arithmetic, does the instruction set.
 
 use croupier::Settings;
-use croupier::learn::ControlVariate;
-use croupier::scene::blob::content_hash;
+use croupier::unstable::learn::ControlVariate;
+use croupier::unstable::scene::blob::content_hash;
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::builtin;
 use croupier_tests::runner::{Image, Learned, Schedule, learning, render, scheduled, settings};
@@ -44,9 +44,9 @@ fn schedules_do_not_change_a_bit() {
     }
 }
 
-/// What is learned, and everything that hangs on it, is as indifferent to schedules as the rest. Killed by: statistics
-/// that are absorbed in the order of completion, a cache that changes within an iteration, an estimate of the picture
-/// summed per thread, adaptive counts that a shard makes for itself.
+/// What is learned, and everything that depends on it, is as indifferent to schedules as the rest. Killed by:
+/// statistics that are absorbed in the order of completion, a cache that changes within an iteration, an estimate of
+/// the picture summed per thread, adaptive counts that a shard makes for itself.
 #[test]
 fn schedules_do_not_change_what_is_learned() {
     for (name, scene) in [("cornell", cornell([24, 20])), ("everything", everything([24, 20]))] {
@@ -178,7 +178,7 @@ fn the_driver_does_not_depend_on_threads() {
 /// reduction whose order depends on the instruction set.
 #[test]
 fn pictures_have_the_same_bits_on_every_target() {
-    if !croupier::simd::REPRODUCIBLE {
+    if !croupier::unstable::simd::REPRODUCIBLE {
         println!("skipped: `fast` arithmetic does not promise the same bits everywhere");
         return;
     }

@@ -1,13 +1,14 @@
 //! Numbers that must not do harm: bad ones are counted and stay out of the film, large, small and far away scenes look
 //! like others, bounds of steps and counters hold.
 
-use croupier::accel::{Intersector, WideBvh};
-use croupier::film::{PixelAov, PixelStats};
-use croupier::geometry::{Hit8, Ray8};
-use croupier::profile::Full;
-use croupier::scene::blob::NONE;
-use croupier::simd::{F32x8, Mask8, U32x8};
-use croupier::{Budget, Counters, MAX_PATH_LENGTH, Plan, Scene, Session, Settings, Shard, StepResult};
+use croupier::unstable::MAX_PATH_LENGTH;
+use croupier::unstable::accel::{Intersector, WideBvh};
+use croupier::unstable::film::{PixelAov, PixelStats};
+use croupier::unstable::geometry::{Hit8, Ray8};
+use croupier::unstable::profile::Full;
+use croupier::unstable::scene::blob::NONE;
+use croupier::unstable::simd::{F32x8, Mask8, U32x8};
+use croupier::{Budget, Counters, Plan, Scene, Session, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::description::*;
 use croupier_tests::runner::{Image, Schedule, render, render_with, scheduled, settings};
@@ -137,7 +138,7 @@ fn overflowing_radiance_is_counted_and_left_out() {
 
 /// Emission as strong as the format allows gives the picture of weak emission, scaled. Killed by: squares in f32.
 #[test]
-fn the_strongest_lamps_do_not_overflow() {
+fn the_strongest_emitters_do_not_overflow() {
     let image = |scale: f32| {
         let mut s = cornell([8, 8]);
         let Emitter::Area { radiance, .. } = &mut s.emitters[0] else { unreachable!() };
@@ -222,12 +223,12 @@ fn far_scenes_look_the_same() {
     }
 }
 
-/// Surfaces of needles look like surfaces: a strip of 1e6 : 1, seen across, under sun and sky. Killed by: a hit point
-/// or normal from weights that a needle makes uncertain, self-hits along it.
+/// Surfaces of needles look like surfaces: a strip of 1e6 : 1, seen across, under a sun and an environment. Killed by:
+/// a hit point or normal from weights that a needle makes uncertain, self-hits along it.
 #[test]
 fn strips_of_needles_are_plain_surfaces() {
     for turn in [0.0f64, 0.6] {
-        let mut s = under_white_sky(camera([0.0, 0.001, 0.0], [0.0; 3], 20.0, [8, 8]));
+        let mut s = in_white_environment(camera([0.0, 0.001, 0.0], [0.0; 3], 20.0, [8, 8]));
         s.environment = Some(Environment::Constant { radiance: [0.5; 3] });
         let strip = s.add_material("strip", grey(0.8));
         // 1000 long, cut lengthwise into needles a thousandth wide

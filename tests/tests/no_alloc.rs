@@ -1,8 +1,8 @@
 //! Stepping allocates nothing: an allocator that reports every call while it is forbidden. Alone in its binary, because
 //! the allocator is global.
 
-use croupier::accel::WideBvh;
-use croupier::profile::{Full, Profile};
+use croupier::unstable::accel::WideBvh;
+use croupier::unstable::profile::{Full, Profile};
 use croupier::{Budget, Plan, Scene, Session, Settings, Shard, StepResult, Strategy};
 use croupier_host::blob::AlignedBytes;
 use croupier_tests::scenes::{blob, cornell, everything};

@@ -1,7 +1,7 @@
 //! Factors, their rounding and their bounds.
 
-use croupier::rrs::{COMB_ONE, Learned8, Local8, MAX_FACTOR, MIN_FACTOR, Norm, Strategy, Vertices8, comb};
-use croupier::simd::{F32x8, U32x8, Vec3x8};
+use croupier::unstable::rrs::{COMB_ONE, Learned8, Local8, MAX_FACTOR, MIN_FACTOR, Norm, Strategy, Vertices8, comb};
+use croupier::unstable::simd::{F32x8, U32x8, Vec3x8};
 use croupier_tests::stats::SplitMix;
 
 /// Mean of n over all u on a grid of `m` equally spaced values that includes 0: exact for a comb in fixed point whose
@@ -108,7 +108,7 @@ fn winners_follow_their_rule() {
         let v = Vertices8 { shininess: F32x8::splat(shininess), ..vertices(beta, 0.5, 1) };
         Strategy::parse(&format!("winners{options}")).unwrap().factor(&v).lane(0)
     };
-    // a matte surface: sqrt(1 + 3) = 2
+    // a diffuse surface: sqrt(1 + 3) = 2
     assert_eq!(winners("", 0.5, 0.0), 0.5);
     assert_eq!(winners("", 2.0, 0.0), 2.0);
     // (1 + 1)^2 = 4: sqrt(1 + 3 / 4)
@@ -233,8 +233,8 @@ fn factors_are_the_most_efficient_ones() {
     assert!((by(Norm::Luminance) - (0.25 * (0.2126f32 + 8.0 * 0.7152)).sqrt()).abs() < 1e-4);
 }
 
-/// Nothing known is `classic`, much known is the rule itself. Killed by: an empty bin that kills (STA-5), ignorance of
-/// the picture taken for a picture without variance, confidence that shrinks with the samples.
+/// Nothing known is `classic`, much known is the rule itself. Killed by: an empty bin that terminates paths (STA-5),
+/// ignorance of the picture taken for a picture without variance, confidence that shrinks with the samples.
 #[test]
 fn ignorance_is_classic() {
     for strategy in ["ear", "ears", "ear:plain", "ears:plain", "bolin-meyer", "bolin-meyer:plain"] {
@@ -266,8 +266,8 @@ fn ignorance_is_classic() {
     assert!(few[0] < 1.0 && few.is_sorted_by(|a, b| a > b) && few[3] > 0.05, "{few:?}");
 }
 
-/// However little is expected, what roulette leaves alive has a throughput of 10 at most; what had more is not split
-/// for it. Killed by: a limit that is left out, that forgets the albedo, that raises factors above 1.
+/// However little is expected, paths that survive roulette have a throughput of 10 at most; paths that had more before
+/// are not split for it. Killed by: a limit that is left out, that forgets the albedo, that raises factors above 1.
 #[test]
 fn roulette_does_not_raise_throughput_above_ten() {
     for strategy in ["ear", "ears", "bolin-meyer"] {
@@ -280,10 +280,11 @@ fn roulette_does_not_raise_throughput_above_ten() {
     }
 }
 
-/// The chances of light samples are those of eq. 32 for what they give and the cost of a shadow ray, against f64.
-/// Killed by: a share or visibility that is squared or left out, weights that are not, the cost of whole samples.
+/// Probabilities of next event estimation and its shadow rays are those of eq. 32 for their contribution and the cost
+/// of a shadow ray, against f64. Killed by: a share or visibility that is squared or left out, weights that are not,
+/// the cost of whole samples.
 #[test]
-fn light_samples_play_by_the_rule() {
+fn nee_probabilities_are_the_most_efficient_ones() {
     let mut rng = SplitMix(3);
     let (mut kept, mut sure, mut least) = (0, 0, 0);
     for _ in 0..2000 {
@@ -316,11 +317,11 @@ fn light_samples_play_by_the_rule() {
     assert!(kept > 500 && sure > 20 && least > 500, "{kept} {sure} {least}");
 }
 
-/// Where nothing is known all light samples are drawn and traced; few samples are trusted little; what is worth little
-/// still keeps the throughput below 10. Killed by: an empty bin that spares its light samples, a limit left out, a NaN
-/// that becomes the least chance.
+/// Where nothing is known all samples use next event estimation and trace its rays; few samples have little weight;
+/// small contributions still keep the throughput below 10. Killed by: an empty bin that skips light samples, a limit
+/// left out, a NaN that becomes the smallest probability.
 #[test]
-fn light_samples_are_drawn_where_nothing_is_known() {
+fn nee_is_used_where_nothing_is_known() {
     let grey = |x: f32| Vec3x8::splat(x, x, x);
     let with = |beta: f32, f: &dyn Fn(&mut Learned8)| {
         let mut l = learned(0.5, 1e-6, 1e-6, 1.0).learned;
@@ -349,7 +350,7 @@ fn light_samples_are_drawn_where_nothing_is_known() {
 /// Expected contributions are brought into [1/3, 5/3] of the pixel. Killed by: a factor that aims at the middle of the
 /// window, a pixel that multiplies.
 #[test]
-fn the_window_is_left_alone() {
+fn factors_in_the_window_are_one() {
     for (mean, error_weight, adrrs, adrr) in [
         (1.0, 1.0, 1.0, 1.0),
         (0.34, 1.0, 1.0, 1.0),

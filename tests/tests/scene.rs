@@ -1,14 +1,19 @@
 //! The one door from bytes to a scene: what is valid passes, each fault has its error, no bytes do harm.
 
 use croupier::Scene;
-use croupier::scene::blob::*;
-use croupier::scene::{ChildFault, Effects, Field, SceneError, SectionFault, SlotFault};
+use croupier::unstable::scene::blob::*;
+use croupier::unstable::scene::{ChildFault, Effects, Field, SceneError, SectionFault, SlotFault};
 use croupier_tests::blob::{Blob, Parts, alias, widths};
 use croupier_tests::walk;
 use proptest::prelude::*;
 
 const INF: f32 = f32::INFINITY;
 const NAN: f32 = f32::NAN;
+
+/// Kinds of materials; the tiny scene has one of each.
+const KINDS: u32 = MaterialKind::ALL.len() as u32;
+/// Kinds of lights.
+const LIGHTS: u32 = LightKind::ALL.len() as u32;
 
 fn error(blob: &Blob) -> Option<SceneError> {
     Scene::from_bytes(blob.bytes()).err()
@@ -22,7 +27,7 @@ fn valid_scenes_pass() {
     let scene = Scene::from_bytes(blob.bytes()).unwrap();
     assert_eq!((scene.nodes.len(), scene.leaves.len(), scene.triangles.len()), (2, 3, 4));
     assert_eq!(scene.material_name(4), "dielectric");
-    assert_eq!(scene.material_name(10), "");
+    assert_eq!(scene.material_name(KINDS), "");
     assert!(walk::everything(&scene) > 0);
     for (name, parts) in
         [("empty", Parts::empty()), ("one quad of quads", Parts::sheet(1)), ("sheet", Parts::sheet(40))]
@@ -169,7 +174,7 @@ fn every_fault_of_the_records_has_its_error() {
     ];
     let geometry: &[Corruption] = &[
         (|p| p.triangles[1].vertex[2] = 8, reference(S::Triangles, 1, S::Vertices, 8, 8)),
-        (|p| p.triangles[3].material = 10, reference(S::Triangles, 3, S::Materials, 10, 10)),
+        (|p| p.triangles[3].material = KINDS, reference(S::Triangles, 3, S::Materials, KINDS, KINDS)),
         (|p| p.triangles[0].light = 5, reference(S::Triangles, 0, S::Lights, 5, 5)),
         (|p| p.triangles[0].light = 1, reference(S::Triangles, 0, S::Lights, 1, 5)),
         (|p| p.triangles[0].light = 3, reference(S::Triangles, 0, S::Lights, 3, 5)),
@@ -185,7 +190,7 @@ fn every_fault_of_the_records_has_its_error() {
         (|p| p.info[0].bounds_min[0] = 5.0, number(S::Info, 0, Field::Bounds, 5.0)),
     ];
     let materials: &[Corruption] = &[
-        (|p| p.materials[3].kind = 10, SceneError::Kind { of: S::Materials, index: 3, found: 10 }),
+        (|p| p.materials[3].kind = KINDS, SceneError::Kind { of: S::Materials, index: 3, found: KINDS }),
         (|p| p.materials[3].flags = 2, SceneError::Reserved { of: S::Materials, index: 3 }),
         (|p| p.materials[3].reserved = NAN, SceneError::Reserved { of: S::Materials, index: 3 }),
         (|p| p.materials[3].texture = 1, reference(S::Materials, 3, S::Textures, 1, 1)),
@@ -214,12 +219,12 @@ fn every_fault_of_the_records_has_its_error() {
         (|p| p.textures[0].height = 4, reference(S::Textures, 0, S::Texels, 1, 7)),
         (|p| p.textures[0].first = NONE, reference(S::Textures, 0, S::Texels, NONE, 7)),
         (|p| p.textures[0].reserved = 1, SceneError::Reserved { of: S::Textures, index: 0 }),
-        (|p| p.names[0] = 0xff, SceneError::Names { lines: 10, materials: 10 }),
-        (|p| p.names.extend(b"eleven\n"), SceneError::Names { lines: 11, materials: 10 }),
-        (|p| _ = p.names.pop(), SceneError::Names { lines: 9, materials: 10 }),
+        (|p| p.names[0] = 0xff, SceneError::Names { lines: u64::from(KINDS), materials: KINDS }),
+        (|p| p.names.extend(b"more\n"), SceneError::Names { lines: u64::from(KINDS) + 1, materials: KINDS }),
+        (|p| _ = p.names.pop(), SceneError::Names { lines: u64::from(KINDS) - 1, materials: KINDS }),
     ];
     let lights: &[Corruption] = &[
-        (|p| p.lights[3].kind = 4, SceneError::Kind { of: S::Lights, index: 3, found: 4 }),
+        (|p| p.lights[3].kind = LIGHTS, SceneError::Kind { of: S::Lights, index: 3, found: LIGHTS }),
         (|p| p.lights[3].reserved = 1, SceneError::Reserved { of: S::Lights, index: 3 }),
         (|p| p.lights[3].params[5] = 1.0, SceneError::Reserved { of: S::Lights, index: 3 }),
         (|p| p.lights[4].params[0] = -0.0, SceneError::Reserved { of: S::Lights, index: 4 }),
@@ -246,7 +251,7 @@ fn every_fault_of_the_records_has_its_error() {
         (|p| p.light_alias[3].probability = 0.0, number(S::LightAlias, 3, Field::Probability, 0.0)),
     ];
     let environment: &[Corruption] = &[
-        (|p| p.environment[0].kind = 2, count(S::EnvTexels, 16)),
+        (|p| p.environment[0].kind = 9, count(S::EnvTexels, 16)),
         (|p| p.environment[0].light = 5, reference(S::Lights, 2, S::Environment, 0, 1)),
         (|p| p.environment.push(p.environment[0]), count(S::Environment, 2)),
         (|p| p.environment[0].radiance[0] = -1.0, number(S::Environment, 0, Field::Emission, -1.0)),
@@ -301,8 +306,8 @@ fn every_fault_of_the_records_has_its_error() {
     }
     // Faults that need another scene than `tiny`.
     let mut parts = Parts::sheet(1);
-    parts.environment[0].kind = 2;
-    expect("environment kind", &parts.blob(), SceneError::Kind { of: S::Environment, index: 0, found: 2 });
+    parts.environment[0].kind = 9;
+    expect("environment kind", &parts.blob(), SceneError::Kind { of: S::Environment, index: 0, found: 9 });
     let mut parts = Parts::sheet(1);
     parts.env_alias = alias(&[1]);
     expect("tables without a map", &parts.blob(), count(S::EnvAlias, 1));

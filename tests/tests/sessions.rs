@@ -1,11 +1,12 @@
 //! Memory, settings and the order of calls: what is wrong is an error with its number, and what was rendered stays.
 
-use croupier::accel::WideBvh;
-use croupier::learn::Learning;
-use croupier::profile::{DiffuseOnly, Profile};
+use croupier::unstable::Effects;
+use croupier::unstable::accel::WideBvh;
+use croupier::unstable::learn::Learning;
+use croupier::unstable::profile::{DiffuseOnly, Profile};
 use croupier::{
-    BLOCK_ALIGN, Budget, Effects, MemoryError, Plan, Scene, Session, SessionError, Settings, SettingsError, Shard,
-    ShardError, StepResult,
+    BLOCK_ALIGN, Budget, MemoryError, Plan, Scene, Session, SessionError, Settings, SettingsError, Shard, ShardError,
+    StepResult,
 };
 use croupier_host::blob::AlignedBytes;
 use croupier_host::description::{Emitter, Model};

@@ -1,8 +1,9 @@
 //! The table of settings: every row is readable, writable, checked and described.
 
-use croupier::learn::{ControlVariate, Learning, Objective, PixelEstimator};
-use croupier::rrs::{Norm, ParseError};
-use croupier::{Plan, Scene, SettingError, SettingRange, SettingValue, Settings, SettingsError, Strategy};
+use croupier::unstable::learn::{ControlVariate, Learning, Objective, PixelEstimator};
+use croupier::unstable::rrs::{Norm, ParseError};
+use croupier::unstable::{SettingRange, SettingValue};
+use croupier::{Plan, Scene, SettingError, Settings, SettingsError, Strategy};
 use croupier_tests::scenes::{blob, cornell};
 
 fn of_a_scene() -> Settings {

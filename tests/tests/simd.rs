@@ -1,6 +1,6 @@
 //! The eight-lane types: masks, selection, minima, rounding, integers, reductions, frames, normalisation.
 
-use croupier::simd::{F32x8, Frame8, I32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::simd::{F32x8, Frame8, I32x8, Mask8, U32x8, Vec3x8};
 use croupier_tests::math::{Random, canonical_bits};
 
 /// Zeros, subnormal and normal limits, 1 and neighbours, halves, integer limits, largest, infinity, NaN; both signs.
@@ -257,10 +257,10 @@ fn vectors_work_lane_by_lane() {
             std::array::from_fn(|_| std::array::from_fn(|_| r.between(-2.0, 2.0) as f32))
         };
         let (a, b) = (draw(&mut r), draw(&mut r));
-        let spoil = |v: [[f32; 3]; 8]| {
+        let corrupt = |v: [[f32; 3]; 8]| {
             Vec3x8::from_fn(|i| if live >> i & 1 == 1 { v[i] } else { [f32::NAN, f32::INFINITY, -0.0] })
         };
-        let (x, y) = (spoil(a), spoil(b));
+        let (x, y) = (corrupt(a), corrupt(b));
         let (d, c, n) = (x.dot(y), x.cross(y), x.normalize());
         let frame = Frame8::from_normal(n);
         let clean = Frame8::from_normal(Vec3x8::from_fn(|i| a[i]).normalize());
@@ -271,7 +271,7 @@ fn vectors_work_lane_by_lane() {
                 assert_eq!(kept.lane(i).map(f32::to_bits), [0; 3]);
                 continue;
             }
-            if croupier::simd::REPRODUCIBLE {
+            if croupier::unstable::simd::REPRODUCIBLE {
                 assert_eq!(d.lane(i), p[2] * q[2] + (p[1] * q[1] + p[0] * q[0]));
             }
             let want = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];

@@ -3,7 +3,7 @@
 //! 67 million arguments per function: every bit pattern class, eight neighbours at a time; the exhaustive sweep is
 //! the program `ulp` of the package `croupier-benches`.
 
-use croupier::simd::{F32x8, REPRODUCIBLE};
+use croupier::unstable::simd::{F32x8, REPRODUCIBLE};
 use croupier_tests::math::{
     BINARY, Random, STRIDE, UNARY, Unary, canonical_bits, error_ulp, hash_pairs, sweep, sweep_pairs,
 };

@@ -1,7 +1,7 @@
 //! Texture look-up against the f64 oracle.
 
-use croupier::simd::{F32x8, Mask8, U32x8};
-use croupier::texture::{SRGB_TO_LINEAR, lookup};
+use croupier::unstable::simd::{F32x8, Mask8, U32x8};
+use croupier::unstable::texture::{SRGB_TO_LINEAR, lookup};
 use croupier_tests::light_scene::LightScene;
 use croupier_tests::stats::SplitMix;
 use croupier_tests::texture_oracle as oracle;
@@ -15,7 +15,7 @@ fn scene() -> (LightScene, Vec<Vec<[u8; 3]>>) {
     for [width, height] in SIZES {
         let texels: Vec<[u8; 3]> = (0..width * height).map(|_| std::array::from_fn(|_| rng.word() as u8)).collect();
         let first = scene.texels.len() as u32;
-        scene.textures.push(croupier::scene::blob::Texture { first, width, height, reserved: 0 });
+        scene.textures.push(croupier::unstable::scene::blob::Texture { first, width, height, reserved: 0 });
         scene.texels.extend(texels.iter().map(|t| u32::from_le_bytes([t[0], t[1], t[2], 77])));
         plain.push(texels);
     }

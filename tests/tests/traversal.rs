@@ -1,9 +1,9 @@
 //! Closest and any hit against an f64 oracle, aimed rays, and every way a ray can be odd.
 
-use croupier::accel::{Intersector, WideBvh};
-use croupier::geometry::{Hit8, Ray8};
-use croupier::scene::blob::NONE;
-use croupier::simd::{F32x8, Mask8, Vec3x8};
+use croupier::unstable::accel::{Intersector, WideBvh};
+use croupier::unstable::geometry::{Hit8, Ray8};
+use croupier::unstable::scene::blob::NONE;
+use croupier::unstable::simd::{F32x8, Mask8, Vec3x8};
 use croupier_host::bvh::{Effort, build};
 use croupier_tests::geometry::{Mesh, Ray, Rng, Tri, Verdict, judge, packet, soup, star, sub};
 
@@ -374,5 +374,5 @@ fn hits_have_the_same_bits_on_every_target() {
             hash = (hash ^ u64::from(x)).wrapping_mul(0x0000_0100_0000_01b3);
         }
     }
-    assert!(!croupier::simd::REPRODUCIBLE || hash == 0xaaee_4c40_f3be_465a, "{hash:016x}");
+    assert!(!croupier::unstable::simd::REPRODUCIBLE || hash == 0xaaee_4c40_f3be_465a, "{hash:016x}");
 }

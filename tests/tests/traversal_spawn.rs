@@ -1,8 +1,8 @@
-//! Rays that leave surfaces: never onto the surface they left, never past a close neighbour.
+//! Secondary rays: they neither hit the surface they left nor miss a close neighbour.
 
-use croupier::accel::{Intersector, WideBvh};
-use croupier::geometry::{Ray8, offset, shadow_ray};
-use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::accel::{Intersector, WideBvh};
+use croupier::unstable::geometry::{Ray8, offset, shadow_ray};
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_tests::geometry::{Mesh, Rng, Tri};
 use croupier_tests::hit::surface_point;
 

@@ -1,9 +1,9 @@
 //! The host's trees: every triangle once, every vertex in every box above it, bounded depth, the promised numbering.
 
-use croupier::accel::{Intersector, WideBvh};
-use croupier::geometry::Ray8;
-use croupier::scene::blob::{CHILD_INDEX, LEAF_BIT, Leaf, MAX_TREE_DEPTH, NONE, Node};
-use croupier::simd::{F32x8, Mask8, Vec3x8};
+use croupier::unstable::accel::{Intersector, WideBvh};
+use croupier::unstable::geometry::Ray8;
+use croupier::unstable::scene::blob::{CHILD_INDEX, LEAF_BIT, Leaf, MAX_TREE_DEPTH, NONE, Node};
+use croupier::unstable::simd::{F32x8, Mask8, Vec3x8};
 use croupier_host::bvh::{Effort, Tree, build};
 use croupier_tests::geometry::{Rng, Tri, soup, star};
 

@@ -1,4 +1,4 @@
-//! Roulette and splitting leave the mean alone: equivalence tests (two one-sided tests, TOST) against renders without
+//! Roulette and splitting do not bias: equivalence tests (two one-sided tests, TOST) against renders without
 //! them.
 //!
 //! Two means count as equal if their difference is within 0.2 % of the mean with 95 % confidence from both sides: a
@@ -6,9 +6,9 @@
 //! difference is asserted to be below 0.06 %, so that equal means pass. The pictures are small and their light is soft,
 //! because noise costs time and bias does not depend on size.
 
-use croupier::accel::WideBvh;
-use croupier::light::LightSelector;
-use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::accel::WideBvh;
+use croupier::unstable::light::LightSelector;
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier::{Budget, Plan, Scene, Session, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin;
@@ -57,7 +57,7 @@ impl Case<'_> {
 }
 
 /// Killed by: weights divided by n instead of s, a factor that is lowered after the weight was computed, a sample of a
-/// split vertex that is lost or taken twice, light samples that are not split along.
+/// split vertex that is lost or taken twice, next event estimation that is not split along.
 #[test]
 fn fixed_factors_agree_on_the_box() {
     let scene = blob(&cornell([16, 16]));
@@ -132,9 +132,9 @@ fn strategies_agree_with_none() {
     assert!(equivalent(d, error, 0.01, 0.05), "albedo:product: {d} +- {error}");
 }
 
-/// The same test finds what is biased. Killed by: a test that cannot fail.
+/// The same test detects a biased strategy. Killed by: a test that cannot fail.
 #[test]
-fn cut_paths_are_found_out() {
+fn biased_strategies_are_detected() {
     let scene = blob(&cornell([16, 16]));
     let none = Case::new(&scene, 40).render("none", 31, 1000, |_| ());
     let cut = Case::new(&scene, 40).render("threshold:0.3", 32, 1000, |_| ());
@@ -188,7 +188,7 @@ fn chosen_uniformly(scene: &[u8], s: &Settings, spp: u32, stated: f32) -> Image 
     }
 }
 
-/// A host that chooses lights in its own way, of a lamp and a point light of quite different powers, gets the same
+/// A host that chooses lights in its own way, of an emitter and a point light of quite different powers, gets the same
 /// picture with other noise. Killed by: a session that uses its own choice for light samples or for what scattered rays
 /// find.
 #[test]
@@ -206,9 +206,9 @@ fn hosts_may_choose_the_lights() {
     assert!(bits(51) != case.render("none", 51, 4, |_| ()).bits());
 }
 
-/// All materials but `null`, textures and shading normals, with a soft sky in place of the scene's small sun (whose
-/// reflections would take hours to average) and without the lens. Skipped where the shared scenes are not at hand.
-/// Killed by: a kernel whose samples depend on their number, a class of material that is not split.
+/// All materials but `null`, textures and shading normals, with a smooth environment in place of the scene's small sun
+/// (whose reflections would take hours to average) and without the lens. Skipped where the shared scenes are not at
+/// hand. Killed by: a kernel whose samples depend on their number, a class of material that is not split.
 #[test]
 fn fixed_factors_agree_on_the_materials() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/scenes/material_spheres");

@@ -5,8 +5,8 @@
 //! `benches/results/cache.md`.
 
 use clap::Parser;
-use croupier::learn::cache::{Cache, Training, VertexKind, VertexKind8};
-use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::learn::cache::{Cache, Training, VertexKind, VertexKind8};
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_benches::results::{Results, Table};
 use croupier_tests::cache::{BOUNDS, Blocks, iterate, vertex};
 use croupier_tests::stats::SplitMix;

@@ -22,8 +22,9 @@
 //! should be, or the scenes are not there; 1 otherwise.
 
 use clap::Parser;
-use croupier::learn::{ControlVariate, Learning, PixelEstimator};
-use croupier::{Counters, MIN_RING, Settings, Strategy};
+use croupier::unstable::MIN_RING;
+use croupier::unstable::learn::{ControlVariate, Learning, PixelEstimator};
+use croupier::{Counters, Settings, Strategy};
 use croupier_benches::results::{Results, Table};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
@@ -41,8 +42,8 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 const NAME: &str = "equivalence";
-const COLUMNS: &str = "scene, strategy, max depth, seeds, difference, standard error, Mrays, splits, terminated, limited, \
-                       verdict";
+const COLUMNS: &str =
+    "scene, strategy, max depth, seeds, difference, standard error, Mrays, splits, terminated, limited, verdict";
 
 /// Half-width of what counts as equal, relative to the mean.
 const DELTA: f64 = 0.002;

@@ -3,8 +3,8 @@
 //! Every row is a small render on one thread, made by this program under valgrind. Two parts are counted, and nothing
 //! else: stepping the shards (paths, rays, learning's records), and ending iterations (merging, denoising, learning).
 //! The same build gives the same counts; another compiler may give others, and so may another C library, whose `memcpy`
-//! chooses its instructions when it runs. `--check` compares with `benches/results/instructions.md` and fails when a row
-//! has risen.
+//! chooses its instructions when it runs. `--check` compares with `benches/results/instructions.md` and fails when a
+//! figure has risen.
 //!
 //! Not made with gungraun (once iai-callgrind): it compares with runs that it keeps below `target/`, where this needs a
 //! committed table and figures per ray, and it needs a runner of its own version installed beside cargo.

@@ -6,7 +6,8 @@
 //! thread; runs of all rows take turns, and a run's time is the CPU time of this thread where the system tells it.
 
 use clap::Parser;
-use croupier::{BYTES_PER_PATH, Counters, Plan, Scene, Settings, Strategy};
+use croupier::unstable::BYTES_PER_PATH;
+use croupier::{Counters, Plan, Scene, Settings, Strategy};
 use croupier_benches::results::{Results, Table};
 use croupier_benches::serial;
 use croupier_host::bake::{BakeOptions, Baked, bake};
@@ -27,7 +28,8 @@ struct Args {
     /// Runs of each row for its speed; 0 leaves the speed out.
     #[arg(long, default_value_t = 5)]
     rounds: usize,
-    /// Compare the deterministic columns of the built-in scene with benches/results/machine.md; exit status 1 if they differ.
+    /// Compare the deterministic columns of the built-in scene with benches/results/machine.md; exit status 1 if they
+    /// differ.
     #[arg(long)]
     check: bool,
     /// Write benches/results/machine.md; needs all three scenes.
@@ -164,7 +166,7 @@ fn check(rows: &[Row<'_>]) -> Result<usize, Box<dyn Error>> {
 }
 
 fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
-    if args.check && !croupier::simd::REPRODUCIBLE {
+    if args.check && !croupier::unstable::simd::REPRODUCIBLE {
         println!("skipped: the snapshot holds for reproducible arithmetic only");
         return Ok(true);
     }

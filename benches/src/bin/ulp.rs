@@ -20,7 +20,7 @@ struct Args {
     write: bool,
 }
 
-const NAME: &str = if croupier::simd::REPRODUCIBLE { "ulp" } else { "ulp-fast" };
+const NAME: &str = if croupier::unstable::simd::REPRODUCIBLE { "ulp" } else { "ulp-fast" };
 const PARTS: u64 = 64;
 
 fn exhaustive(f: &'static Unary) -> Sweep {
@@ -61,7 +61,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     results.tables.push(table);
 
-    let columns = "function, max ULP where abs(y ln x) <= 8, max ULP, worst at, largest part of the promise, largest at, mean ULP";
+    let columns = "function, max ULP where abs(y ln x) <= 8, max ULP, worst at, largest part of the promise, \
+                   largest at, mean ULP";
     let mut table = Table::new("Two arguments", columns);
     print!("\n{}", table.head());
     for f in BINARY.iter().filter(|f| wanted(f.name)) {

@@ -19,7 +19,7 @@ pub use wide::WideBvh;
 use crate::geometry::{Hit8, Ray8};
 use croupier_simd::Mask8;
 
-/// What finds hits. The built-in one walks the scene's tree; hosts may bring their own.
+/// Intersection of rays with the scene. The built-in one traverses the scene's tree; hosts may bring their own.
 ///
 /// Contract: lanes outside `active` and lanes with a non-finite or zero direction or a non-finite origin report no hit
 /// and cost nothing; results of a lane never depend on other lanes.

@@ -1,8 +1,8 @@
-//! Up to eight rays of one octant and one major axis together.
+//! Traversal of the tree by packets: up to eight rays of one octant and one major axis.
 //!
 //! ```text
 //! packet(node):
-//!     few rays left in it: each goes on alone
+//!     few rays left in it: each goes on as a single ray
 //!     for each child that the interval of all rays meets, nearest first:
 //!         the rays that enter it before their closest hits, if any: packet(child)
 //! ```
@@ -49,8 +49,7 @@ impl Best {
         Hit1 { t: self.t.lane(i), triangle: self.triangle.lane(i), u: self.u.lane(i), v: self.v.lane(i) }
     }
 
-    /// Sets lane `i`. By selection: eight lanes read back right after one of them was written alone stall the
-    /// processor.
+    /// Sets lane `i`, by selection: a read of eight lanes right after a write of one stalls the processor.
     #[inline(always)]
     fn set(&mut self, i: usize, h: &Hit1) {
         let lane = one(i);
@@ -60,14 +59,14 @@ impl Best {
         self.v = lane.select(F32x8::splat(h.v), self.v);
     }
 
-    /// Lane `i` looks for nothing more.
+    /// Ends the search of lane `i`.
     #[inline(always)]
     fn finish(&mut self, i: usize) {
         self.t = one(i).select(F32x8::splat(f32::NEG_INFINITY), self.t);
     }
 }
 
-/// Lane `i`.
+/// Mask of lane `i`.
 #[inline(always)]
 fn one(i: usize) -> Mask8 {
     U32x8::splat(i as u32).eq(U32x8::new([0, 1, 2, 3, 4, 5, 6, 7]))
@@ -175,7 +174,7 @@ pub(super) fn walk_packet<const ANY: bool>(
                 for i in 0..triangles as usize {
                     let p = each(|v| each(|k| F32x8::splat(leaf.p[3 * v + axes[k]][i])));
                     let Some(c) = intersect::<ANY, true>(&p, &line, b.t) else { continue };
-                    // rays that miss the leaf's box miss its triangles, also when they go alone
+                    // rays that miss the leaf's box miss its triangles, also when they go on as single rays
                     let mask = c.mask & inside;
                     if ANY {
                         occluded |= mask.bits();

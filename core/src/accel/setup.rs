@@ -32,11 +32,11 @@ pub(super) struct Setup {
     pub near: [[f32; 8]; 3],
     /// Origins moved for far planes.
     pub far: [[f32; 8]; 3],
-    /// `-1/d`.
+    /// Negative inverse directions, `-1/d`.
     pub ninv: [[f32; 8]; 3],
-    /// `d[kx]/d[kz]`, `d[ky]/d[kz]`, `1/d[kz]` with the axes of [`Setup::axes`].
+    /// Shear constants `d[kx]/d[kz]`, `d[ky]/d[kz]`, `1/d[kz]` with the axes of [`Setup::axes`].
     pub shear: [[f32; 8]; 3],
-    /// `max(tmin, 0)`.
+    /// Smallest parameter: `max(tmin, 0)`.
     pub tmin: [f32; 8],
     /// Largest float below `tmax`: inside the traversal limits are inclusive.
     pub limit: [f32; 8],
@@ -49,9 +49,9 @@ pub(super) struct Setup {
 }
 
 impl Setup {
-    /// `extent`: largest |coordinate| of the tree.
+    /// Constants of eight rays; `extent` is the largest |coordinate| of the tree.
     #[inline(always)]
-    pub fn new(rays: &Ray8, active: Mask8, extent: f32) -> Self {
+    pub(super) fn new(rays: &Ray8, active: Mask8, extent: f32) -> Self {
         let a = rays.d.abs();
         let m = a.max_component();
         let tmin = F32x8::ZERO.max(rays.tmin);
@@ -91,10 +91,10 @@ impl Setup {
         }
     }
 
-    /// The axes of lane `i`, cyclic so that the shear keeps orientation; the last is the major one. From a table: the
+    /// Axes of lane `i`, cyclic so that the shear keeps orientation; the last is the major one. From a table: the
     /// next ray's axes cannot be predicted from this one's.
     #[inline(always)]
-    pub fn axes(&self, i: usize) -> [usize; 3] {
+    pub(super) fn axes(&self, i: usize) -> [usize; 3] {
         const TABLE: [[usize; 3]; 4] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 1, 2]];
         // `min` shows the compiler that they index three rows
         TABLE[(self.major[0] >> i & 1 | (self.major[1] >> i & 1) << 1) as usize].map(|k| k.min(2))
@@ -102,13 +102,13 @@ impl Setup {
 
     /// Rows of a node that hold the near planes of lane `i`; the far ones are at `3 - x`, `5 - y`, `7 - z`.
     #[inline(always)]
-    pub fn rows(&self, i: usize) -> [usize; 3] {
+    pub(super) fn rows(&self, i: usize) -> [usize; 3] {
         each(|k| if self.negative[k] >> i & 1 == 1 { k + 3 } else { k })
     }
 
-    /// The lanes among `of` with the octant and the major axis of lane `i`.
+    /// Lanes among `of` with the octant and the major axis of lane `i`.
     #[inline(always)]
-    pub fn alike(&self, i: usize, of: u32) -> u32 {
+    pub(super) fn alike(&self, i: usize, of: u32) -> u32 {
         let same = |bits: u32| bits ^ (bits >> i & 1).wrapping_sub(1);
         let octant = same(self.negative[0]) & same(self.negative[1]) & same(self.negative[2]);
         of & octant & same(self.major[0]) & same(self.major[1])

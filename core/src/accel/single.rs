@@ -1,4 +1,4 @@
-//! Single rays against the tree, eight boxes or eight triangles at a time, several rays taking turns.
+//! Traversal of the tree by single rays, eight boxes or eight triangles at a time, several rays in turn.
 //!
 //! ```text
 //! for each ray in turn, until all are done:
@@ -27,7 +27,7 @@ use crate::scene::blob::{CHILD_INDEX, LEAF_BIT, Leaf, NONE, Node};
 use croupier_simd::{F32x8, Mask8, U32x8};
 
 /// Entries of the traversal stack: 7 siblings per level of a tree of
-/// [`MAX_TREE_DEPTH`](crate::scene::blob::MAX_TREE_DEPTH) levels fit, and one that is written in vain.
+/// [`MAX_TREE_DEPTH`](crate::scene::blob::MAX_TREE_DEPTH) levels fit, and one that is written but not kept.
 pub(super) const STACK: usize = 256;
 
 /// Entry distance (upper half, float bits) and child reference of the subtrees to visit.
@@ -51,9 +51,9 @@ pub(super) struct Hits {
 }
 
 impl Hits {
-    /// No hits up to and including `limit`.
+    /// Hits of rays that have not hit anything yet: limits up to and including `limit`.
     #[inline(always)]
-    pub fn none(limit: [f32; 8]) -> Self {
+    pub(super) fn none(limit: [f32; 8]) -> Self {
         Self { t: limit, triangle: [NONE; 8], u: [0.0; 8], v: [0.0; 8] }
     }
 

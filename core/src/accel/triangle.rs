@@ -16,8 +16,8 @@
 //!    ray has just left can be hit again. If t is within its error bound of 0 (pbrt-v4's bound for this test, section
 //!    6.8.8) the side of the plane decides, in f64. This rejects hits of the own surface without opening gaps: a
 //!    triangle that lies in front is never rejected.
-//! 4. The same at the other end of a shadow ray: a needle of a lamp (1000 : 1 and thinner) may seem to stand before its
-//!    own sample. If t is within its error bound of the limit, the plane decides as well. Closest hits need no such
+//! 4. The same at the other end of a shadow ray: a needle of an emitter (1000 : 1 and thinner) may seem to stand before
+//!    its own sample. If t is within its error bound of the limit, the plane decides as well. Closest hits need no such
 //!    care: nothing ends just before their limit.
 
 use super::setup::Setup;
@@ -46,11 +46,11 @@ pub(super) struct Line<'a> {
     pub o: [F32x8; 3],
     pub shear: [F32x8; 3],
     pub tmin: F32x8,
-    /// Where the rays come from; read in doubtful cases only.
+    /// Rays that the constants come from; read in doubtful cases only.
     pub setup: &'a Setup,
-    /// The permutation.
+    /// Permutation of the axes.
     pub axes: [usize; 3],
-    /// The lane of `setup` that all lanes here hold; eight rays have `None`.
+    /// Lane of `setup` that all lanes hold; `None` for eight rays.
     pub lane: Option<usize>,
 }
 
@@ -124,7 +124,7 @@ fn error(a: &[F32x8; 3], b: &[F32x8; 3], c: &[F32x8; 3], e: [F32x8; 3], scale: F
     (e * z * (3.0 * U) + de * z + dz * e) * 3.0 * (scale * inv_d).abs()
 }
 
-/// The lanes of `doubt` whose triangle's plane is not ahead of the origin, decided in f64: differences of floats, and
+/// Lanes of `doubt` whose triangle's plane is not ahead of the origin, decided in f64: differences of floats, and
 /// products of those with 2^-53 relative error, against heights that are at least some 2^-24 of the coordinates.
 #[cold]
 #[inline(never)]
@@ -136,7 +136,7 @@ fn not_ahead(p: &Vertices, s: &Setup, axes: [usize; 3], lane: Option<usize>, dou
     Mask8::from_bits(doubt.lanes().filter(|i| !ahead(*i)).fold(0, |bits, i| bits | 1 << i))
 }
 
-/// The lanes of `doubt` whose triangle's plane is not met up to `limit`, decided like [`not_ahead`].
+/// Lanes of `doubt` whose triangle's plane is not met up to `limit`, decided like [`not_ahead`].
 #[cold]
 #[inline(never)]
 fn beyond(p: &Vertices, s: &Setup, axes: [usize; 3], lane: Option<usize>, limit: F32x8, doubt: Mask8) -> Mask8 {
@@ -148,8 +148,8 @@ fn beyond(p: &Vertices, s: &Setup, axes: [usize; 3], lane: Option<usize>, limit:
     Mask8::from_bits(doubt.lanes().filter(|i| !met(*i)).fold(0, |bits, i| bits | 1 << i))
 }
 
-/// How far the plane of the triangle in lane `i` is from the origin, and how far the direction goes towards it, in
-/// units of twice the area.
+/// Distance of the plane of the triangle in lane `i` from the origin, and component of the direction towards it, both
+/// times twice the area.
 fn plane(p: &Vertices, s: &Setup, axes: [usize; 3], lane: Option<usize>, i: usize) -> (f64, f64) {
     let at = |v: &[F32x8; 3]| v.map(|x| f64::from(x.lane(i)));
     let from = |rays: &[[f32; 8]; 3]| axes.map(|k| f64::from(rays[k.min(2)][lane.unwrap_or(i) & 7]));

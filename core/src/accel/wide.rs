@@ -1,4 +1,4 @@
-//! The built-in [`Intersector`]: which rays go together.
+//! The built-in [`Intersector`]: grouping of rays.
 //!
 //! Rays are grouped by direction octant and major axis; groups of more than [`FEW`] walk the tree as a packet, which
 //! doubles the throughput of coherent rays; the others go one by one, which is best for incoherent ones.
@@ -12,7 +12,7 @@ use crate::scene::Scene;
 use crate::scene::blob::{Leaf, NONE, Node};
 use croupier_simd::{F32x8, Mask8, U32x8};
 
-/// The scene's own tree of 8-wide nodes and 8-triangle leaves.
+/// Built-in intersector: the scene's own tree of 8-wide nodes and 8-triangle leaves.
 ///
 /// Watertight: no ray passes between triangles that share an edge or a vertex. A hit is the closest by computed t,
 /// among equal ones the triangle with the lowest index; which rays share a packet never changes a bit of the result.
@@ -26,13 +26,13 @@ pub struct WideBvh<'s> {
 }
 
 impl<'s> WideBvh<'s> {
-    /// The tree of a validated scene.
+    /// Intersector for the tree of a validated scene.
     pub fn new(scene: &Scene<'s>) -> Self {
         Self::from_parts(scene.nodes, scene.leaves)
     }
 
-    /// A tree outside a scene; the root is node 0, the rules of [`crate::scene::blob`] hold. Wrong indices and boxes
-    /// give wrong hits and nothing worse, but nodes that form a cycle are walked for ever.
+    /// Intersector for a tree outside a scene; the root is node 0, the rules of [`crate::scene::blob`] hold. Wrong
+    /// indices and boxes give wrong hits and nothing worse, but nodes that form a cycle make traversal endless.
     pub fn from_parts(nodes: &'s [Node], leaves: &'s [Leaf]) -> Self {
         let mut extent = 0.0f32;
         if let Some(root) = nodes.first() {
@@ -51,18 +51,18 @@ impl<'s> WideBvh<'s> {
     fn trace<const ANY: bool>(&self, s: &Setup, hits: &mut Hits) -> u32 {
         let tree = (self.nodes, self.leaves);
         let mut stack: Keys = [0; STACK];
-        let (mut left, mut alone, mut occluded) = (s.valid, 0, 0);
+        let (mut left, mut single, mut occluded) = (s.valid, 0, 0);
         while left != 0 {
             let group = s.alike(left.trailing_zeros() as usize & 7, left);
             left &= !group;
             if group.count_ones() <= FEW {
-                alone |= group;
+                single |= group;
             } else {
                 occluded |= walk_packet::<ANY>(tree, s, group, hits, &mut stack);
             }
         }
-        if alone != 0 {
-            occluded |= walk::<ANY>(tree, (0, &s.tmin), s, alone, hits, &mut stack);
+        if single != 0 {
+            occluded |= walk::<ANY>(tree, (0, &s.tmin), s, single, hits, &mut stack);
         }
         occluded
     }

@@ -15,7 +15,7 @@ pub struct Index8 {
 }
 
 impl Index8 {
-    /// From the side where it is `eta`.
+    /// Index as seen from the side where it is `eta`.
     #[inline(always)]
     pub fn new(eta: F32x8) -> Self {
         Self { eta, inverse: 1.0 / eta, k: (eta - 1.0) * (eta + 1.0) }

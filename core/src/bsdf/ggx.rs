@@ -47,13 +47,13 @@ pub struct Reflection8 {
 }
 
 impl Ggx8 {
-    /// Of width `alpha`, clamped to [`MIN_ALPHA`]..[`MAX_ALPHA`].
+    /// Distributions of width `alpha`, clamped to [`MIN_ALPHA`]..[`MAX_ALPHA`].
     #[inline(always)]
     pub fn new(alpha: F32x8) -> Self {
         Self { alpha: alpha.clamp(MIN_ALPHA, MAX_ALPHA) }
     }
 
-    /// Width.
+    /// Width alpha.
     #[inline(always)]
     pub fn alpha(&self) -> F32x8 {
         self.alpha

@@ -1,4 +1,4 @@
-//! What is known of a model without running it.
+//! Facts of a model, known without running it.
 
 /// A set of lobes, one bit each, as pbrt's `BxDFFlags`: on which side of the surface the model scatters, and how wide.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -21,24 +21,23 @@ impl Lobes {
         Self(self.0 | o.0)
     }
 
-    /// Is every lobe of `o` in `self`?
+    /// Whether every lobe of `o` is in `self`.
     pub const fn contains(self, o: Self) -> bool {
         self.0 & o.0 == o.0
     }
 
-    /// Is any lobe of `o` in `self`?
+    /// Whether any lobe of `o` is in `self`.
     pub const fn intersects(self, o: Self) -> bool {
         self.0 & o.0 != 0
     }
 
-    /// Nothing but delta lobes: light samples are of no use.
+    /// Whether there are delta lobes only: light samples are of no use then.
     pub const fn delta_only(self) -> bool {
         !self.intersects(Self::DIFFUSE.with(Self::GLOSSY))
     }
 }
 
-/// By which direction the learned statistics of a model are keyed: the one on which the radiance that it scatters
-/// depends most.
+/// Direction that keys the learned statistics of a model: the one on which the radiance that it scatters depends most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CacheDirection {
     /// Shading normal: what a diffuse surface reflects depends on where it faces.

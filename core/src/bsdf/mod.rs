@@ -47,7 +47,7 @@ pub struct Eval8 {
 }
 
 impl Eval8 {
-    /// Nothing in any lane: what models of delta lobes only return.
+    /// Zeros in every lane, the result of models that have delta lobes only.
     pub const ZERO: Self = Self { f: Vec3x8::ZERO, pdf: F32x8::ZERO };
 
     /// `self` where `mask`, else 0.
@@ -92,7 +92,7 @@ impl Sample8 {
     }
 }
 
-/// What a model reads per lane.
+/// Inputs of a model per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs8 {
     /// Material index.
@@ -104,13 +104,13 @@ pub struct Inputs8 {
 /// One scattering model over eight lanes, `'s` the scene whose tables it may keep a reference to. Two-sidedness is the
 /// caller's: for two-sided materials the frame already faces `wo`.
 pub trait Bsdf<'s>: Copy + 's {
-    /// What its lobes do.
+    /// Lobes of the model.
     const LOBES: Lobes;
 
-    /// Which direction keys its learned statistics.
+    /// Direction that keys the learned statistics.
     const CACHE_DIRECTION: CacheDirection;
 
-    /// Only delta lobes: no light sampling.
+    /// Whether the model has delta lobes only: no light sampling.
     const DELTA: bool = Self::LOBES.delta_only();
 
     /// Gathers the parameters of the lanes in `active`; other lanes may hold any material index.
@@ -131,7 +131,7 @@ pub trait Bsdf<'s>: Copy + 's {
 
 /// Code to run with the model of a material kind; see [`dispatch`].
 pub trait Visitor<'s> {
-    /// What it returns.
+    /// Result of the visit.
     type Out;
 
     /// Called with the model.
@@ -140,7 +140,7 @@ pub trait Visitor<'s> {
 
 macro_rules! models {
     ($($kind:ident => $model:ty),* $(,)?) => {
-        /// What is known of the model of `kind` without running it.
+        /// Facts of the model of `kind`, known without running it.
         #[expect(clippy::extra_unused_lifetimes, reason = "a model names it")]
         pub const fn facts<'s>(kind: MaterialKind) -> ModelFacts {
             match kind {
@@ -247,7 +247,7 @@ const _: () = {
     assert!(delta == delta_kinds(), "`delta` of a row against `Lobes::DIFFUSE` and `Lobes::GLOSSY`");
 };
 
-/// What lanes without a material read: parameters with which every model stays finite.
+/// Material of lanes without one: parameters with which every model stays finite.
 const IDLE: &Material = &Material {
     kind: 0,
     flags: 0,

@@ -38,7 +38,7 @@ pub(super) struct Base8 {
 
 impl Base8 {
     #[inline(always)]
-    pub fn gather(m: &Materials8<'_>, inputs: &Inputs8, active: Mask8) -> Self {
+    pub(super) fn gather(m: &Materials8<'_>, inputs: &Inputs8, active: Mask8) -> Self {
         let fdr = m.get(|m| m.fdr);
         let rho = inputs.reflectance.zero_unless(active);
         // the floor only keeps unphysical parameters finite
@@ -48,7 +48,7 @@ impl Base8 {
 
     /// Albedo of light that a fraction `entered` of came through the coat.
     #[inline(always)]
-    pub fn albedo(&self, entered: F32x8) -> Vec3x8 {
+    pub(super) fn albedo(&self, entered: F32x8) -> Vec3x8 {
         self.r * (entered * self.escape)
     }
 }

@@ -60,7 +60,7 @@ impl Bsdf<'_> for RoughConductor {
         Sample8 { wi, weight: self.fresnel(r.cos) * r.g1, pdf: r.pdf, delta: Mask8::NONE, valid: r.valid }.masked()
     }
 
-    /// That of the smooth conductor: an upper estimate for most angles.
+    /// Albedo of the smooth conductor: an upper estimate for most angles.
     #[inline(always)]
     fn albedo(&self, wo: Vec3x8) -> Vec3x8 {
         self.fresnel(wo.z).zero_unless(wo.z.gt(F32x8::ZERO))

@@ -10,8 +10,8 @@
 //! | `table` | T, energy the coat transmits from outside, `TRANSMITTANCE_ENTRIES` numbers | `REFLECTANCE_RANGE` |
 //!
 //! T is interpolated linearly. Samples come from the coat's visible normals with probability s / (s + d) and from the
-//! cosine with d / (s + d): s = 1 - T(wo), not below 2^-10 lest an odd table starve a narrow highlight, and d the mean
-//! over the channels of `T(wo) (1 - R) rho / (1 - rho R)`. Value and density are those of the mixture.
+//! cosine with d / (s + d): s = 1 - T(wo), not below 2^-10 so that no odd table starves a narrow highlight, and d the
+//! mean over the channels of `T(wo) (1 - R) rho / (1 - rho R)`. Value and density are those of the mixture.
 
 use super::fresnel::{self, Index8};
 use super::ggx::{Ggx8, Reflection8, mirrored_at};
@@ -22,7 +22,7 @@ use crate::scene::blob::{Material, TRANSMITTANCE_ENTRIES};
 use core::f32::consts::FRAC_1_PI;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
-/// What lanes without a table read.
+/// Table of lanes without one.
 const IDLE_TABLE: &[f32; TRANSMITTANCE_ENTRIES] = &[0.5; TRANSMITTANCE_ENTRIES];
 
 /// GGX coat over a diffuse base.

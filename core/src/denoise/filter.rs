@@ -1,4 +1,4 @@
-//! The passes over the neighbours.
+//! Passes over the neighbours of each pixel.
 
 use super::grid::{FEATURES, Grid, NOWHERE, REACH, SIGNAL, TINY, feature_distance, load, store};
 use croupier_simd::F32x8;
@@ -6,8 +6,8 @@ use croupier_simd::F32x8;
 /// Weights of the taps: the product of (1 2 1)/4 in both directions.
 const KERNEL: [[f32; 3]; 3] = [[0.0625, 0.125, 0.0625], [0.125, 0.25, 0.125], [0.0625, 0.125, 0.0625]];
 
-/// One level: taps `step` apart, 1 <= step <= `MARGIN`. `factor2`: squared standard errors of a difference at which two
-/// pixels stop belonging together.
+/// Smooths one level: taps `step` apart, 1 <= step <= `MARGIN`. `factor2`: squared standard errors of a difference at
+/// which two pixels stop belonging together.
 pub(super) fn smooth(grid: Grid, step: usize, factor2: f32, from: &[f32], features: &[f32], to: &mut [f32]) {
     let s = grid.stride;
     let inverse = F32x8::ONE / factor2;
@@ -85,10 +85,10 @@ pub(super) fn despeckle(grid: Grid, from: &[f32], features: &[f32], to: &mut [f3
                 }
             }
             for c in 0..3 {
-                // Without any neighbour both bounds are infinite, the wrong way round.
-                let alone = low[c].gt(high[c]);
+                // Without any neighbour both bounds are infinite, in reverse order.
+                let isolated = low[c].gt(high[c]);
                 let bounded = e[c].max(low[c].min(e[c] + reach)).min(high[c].max(e[c] - reach));
-                store(out, c * s + x, alone.select(e[c], bounded));
+                store(out, c * s + x, isolated.select(e[c], bounded));
             }
             store(out, 3 * s + x, load(rows[1].0, 3 * s + x));
         }

@@ -2,28 +2,28 @@
 
 use croupier_simd::F32x8;
 
-/// Columns of margin on either side of a scratch row: no tap leaves the row. A multiple of 8.
+/// Columns of margin on either side of a scratch row, a multiple of 8: no tap leaves the row.
 pub(super) const MARGIN: usize = 16;
-/// Values of a pixel that the levels change: e (rgb) and the variance of e, summed over rgb.
+/// Number of values of a pixel that the levels change: e (rgb) and the variance of e, summed over rgb.
 pub(super) const SIGNAL: usize = 4;
-/// Values of a pixel that stay: normal, albedo, each scaled so that a distance of 1 separates, and [`REACH`].
+/// Number of values of a pixel that stay: normal, albedo, each scaled so that a distance of 1 separates, and [`REACH`].
 pub(super) const FEATURES: usize = 7;
-/// Plane of the features: how far `despeckle` may move the pixel.
+/// Plane of the features with the largest change of the pixel by `despeckle`.
 pub(super) const REACH: usize = 6;
-/// Normal, x, of what is not in the picture: far from all that is.
+/// Normal, x, of pixels outside the picture: far from every normal inside.
 pub(super) const NOWHERE: f32 = 1e9;
 
-/// Squared radiance that never matters: keeps 0 / 0 away.
+/// Squared radiance below all that matters: avoids 0 / 0.
 pub(super) const TINY: f32 = 1e-20;
 
-/// Where a pixel is in scratch memory: rows of planes, each plane with a margin on both sides.
+/// Layout of scratch memory: rows of planes, each plane with a margin on both sides.
 #[derive(Clone, Copy)]
 pub(super) struct Grid {
     pub(super) columns: usize,
     pub(super) rows: usize,
-    /// `columns`, up to a multiple of 8.
+    /// Number of columns, rounded up to a multiple of 8.
     pub(super) padded: usize,
-    /// Values from one plane of a row to the next.
+    /// Distance from one plane of a row to the next, values.
     pub(super) stride: usize,
 }
 

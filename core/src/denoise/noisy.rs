@@ -1,17 +1,17 @@
-//! Planes of the noisy picture, and what can be wrong with them.
+//! Input of the denoiser: planes of the noisy picture, and errors about them.
 
 use core::fmt;
 
-/// The noisy picture: planes of `columns * rows` values, row by row; longer ones are cut. Pixels whose color or
+/// Noisy picture: planes of `columns * rows` values, row by row; longer ones are cut. Pixels whose color or
 /// variance is not finite (or beyond [`COLOR_LIMIT`] or its square) count as absent.
 #[derive(Clone, Copy, Debug)]
 pub struct Noisy<'a> {
-    /// Columns and rows.
+    /// Columns and rows of the picture.
     pub size: [u32; 2],
-    /// Mean radiance, rgb.
+    /// Mean radiance, linear rgb.
     pub color: [&'a [f32]; 3],
-    /// Squared standard error of the mean. Where it is 0 all around, pixels keep their values; among noisy neighbours 0
-    /// rather means that all samples of a pixel missed the light.
+    /// Squared standard error of the mean. Where it is 0 in the whole neighbourhood, pixels keep their values; among
+    /// noisy neighbours, 0 means that all samples of a pixel missed the light.
     pub variance: [&'a [f32]; 3],
     /// Mean albedo of the first hits, 0 to 1, 0 where nothing is hit. Three empty slices: unknown.
     pub albedo: [&'a [f32]; 3],
@@ -22,7 +22,7 @@ pub struct Noisy<'a> {
 /// Radiance above which a pixel counts as absent: squares of sums of it stay finite.
 pub const COLOR_LIMIT: f32 = 1e15;
 
-/// What has too few values.
+/// Slice that has too few values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// A plane of [`Noisy::color`].
@@ -33,18 +33,18 @@ pub enum Part {
     Albedo,
     /// A plane of [`Noisy::normal`].
     Normal,
-    /// The scratch memory; see [`scratch_len`](super::scratch_len).
+    /// Scratch memory; see [`scratch_len`](super::scratch_len).
     Scratch,
     /// A plane of the result.
     Out,
-    /// The memory of [`Planes`](super::Planes); see [`Planes::len`](super::Planes::len).
+    /// Memory of [`Planes`](super::Planes); see [`Planes::len`](super::Planes::len).
     Planes,
 }
 
-/// A slice is too short.
+/// Error about a slice that is too short.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DenoiseError {
-    /// Which one.
+    /// Slice that is too short.
     pub part: Part,
     /// Columns and rows of the picture.
     pub size: [u32; 2],

@@ -4,24 +4,25 @@ use super::grid::Grid;
 use super::noisy::{COLOR_LIMIT, Noisy};
 use croupier_simd::{F32x8, Mask8};
 
-/// Smallest divisor: below it radiance is hardly the surface's own color.
+/// Smallest divisor: below it radiance hardly depends on the surface's color.
 const ALBEDO_FLOOR: f32 = 0.1;
 
-/// Eight neighbouring pixels of a row as the filter sees them.
-pub(super) struct Pixels {
-    /// Which are in the picture and finite.
+/// Eight neighbouring pixels of a row, color divided by albedo.
+pub(super) struct NoisyPixels8 {
+    /// NoisyPixels8 that are in the picture and finite.
     pub present: Mask8,
     /// Color divided by albedo; 0 unless present.
     pub e: [F32x8; 3],
     /// Variance of `e`, summed over rgb; 0 unless present.
     pub variance: F32x8,
-    /// The albedo that it is divided by.
+    /// Albedo that `e` is divided by.
     pub divisor: [F32x8; 3],
+    /// Albedo, 0 to 1.
     pub albedo: [F32x8; 3],
 }
 
-impl Pixels {
-    /// Pixels `x`, `x + 1`, ... of row `y`. The same bits whenever it is called.
+impl NoisyPixels8 {
+    /// NoisyPixels8 `x`, `x + 1`, ... of row `y`. Every call gives the same bits.
     #[inline(always)]
     pub(super) fn read(noisy: &Noisy<'_>, grid: Grid, x: usize, y: usize) -> Self {
         let at = y * grid.columns + x;

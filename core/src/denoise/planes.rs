@@ -1,4 +1,4 @@
-//! The denoiser's planes in one piece of memory, filled from a film.
+//! Planes of the denoiser in one piece of memory, filled from a film.
 
 use super::denoise;
 use super::noisy::{DenoiseError, Noisy, Part};
@@ -9,20 +9,20 @@ use crate::film::{PixelAov, PixelStats};
 #[derive(Debug)]
 pub struct Planes<'m> {
     size: [u32; 2],
-    /// Mean radiance, rgb; see [`Noisy::color`].
+    /// Mean radiance, linear rgb; see [`Noisy::color`].
     pub color: [&'m mut [f32]; 3],
-    /// See [`Noisy::variance`].
+    /// Squared standard error of the mean; see [`Noisy::variance`].
     pub variance: [&'m mut [f32]; 3],
-    /// See [`Noisy::albedo`]; empty without features.
+    /// Mean albedo of the first hits ([`Noisy::albedo`]); empty without features.
     pub albedo: [&'m mut [f32]; 3],
-    /// See [`Noisy::normal`]; empty without features.
+    /// Mean shading normal of the first hits ([`Noisy::normal`]); empty without features.
     pub normal: [&'m mut [f32]; 3],
-    /// The denoised picture, rgb.
+    /// Denoised picture, linear rgb.
     pub out: [&'m mut [f32]; 3],
 }
 
 impl<'m> Planes<'m> {
-    /// Values needed; `usize::MAX` if that is not addressable.
+    /// Number of values needed; `usize::MAX` if that is not addressable.
     pub fn len(size: [u32; 2], features: bool) -> usize {
         let [columns, rows] = size.map(|n| n as usize);
         columns.saturating_mul(rows).saturating_mul(if features { 15 } else { 9 })

@@ -2,17 +2,17 @@
 
 use super::grid::{FEATURES, Grid, MARGIN, NOWHERE, REACH, SIGNAL, feature_distance, load, store};
 use super::noisy::Noisy;
-use super::pixels::{Pixels, load_or};
+use super::pixels::{NoisyPixels8, load_or};
 use croupier_simd::{F32x8, Mask8};
 
 /// Variance of a pixel that is still to be filled.
 const ABSENT: f32 = -1.0;
 
-/// Per squared distance of two normals, 1 separates. See `MEMBERSHIP`.
+/// Weight of the squared distance of two normals; a weighted distance of 1 separates. Chosen like `MEMBERSHIP`.
 const NORMAL_WEIGHT: f32 = 3.5;
-/// Per squared distance of two albedos. See `MEMBERSHIP`.
+/// Weight of the squared distance of two albedos. Chosen like `MEMBERSHIP`.
 const ALBEDO_WEIGHT: f32 = 3.0;
-/// Standard errors by which a pixel may be moved towards its neighbours.
+/// Largest change of a pixel towards its neighbours, standard errors.
 const DESPECKLE: f32 = 3.0;
 
 /// Fills `signal` and `features`; `other` is the block that the first level will write.
@@ -36,14 +36,14 @@ pub(super) fn prepare(noisy: &Noisy<'_>, grid: Grid, signal: &mut [f32], other: 
         for x in grid.packets() {
             let column = x - MARGIN;
             let inside = Mask8::first(grid.columns - column);
-            let p = Pixels::read(noisy, grid, column, y);
+            let p = NoisyPixels8::read(noisy, grid, column, y);
             let missing = inside.and_not(p.present);
             absent |= missing.any();
             store(v_row, 3 * s + x, missing.select(F32x8::splat(ABSENT), p.variance));
             for c in 0..3 {
                 store(e_row, c * s + x, p.e[c]);
                 let n = load_or(noisy.normal[c], y * grid.columns + column, 0.0);
-                // A NaN becomes -1: some normal, which only its own pixel is judged by.
+                // A NaN becomes -1: any normal serves, as it affects its own pixel only.
                 let n = n.clamp(-1.0, 1.0) * normal_scale;
                 let outside = if c == 0 { NOWHERE } else { 0.0 };
                 store(f_row, c * s + x, inside.select(n, F32x8::splat(outside)));
@@ -57,7 +57,7 @@ pub(super) fn prepare(noisy: &Noisy<'_>, grid: Grid, signal: &mut [f32], other: 
     smooth_variance(grid, other, signal, features);
 }
 
-/// Gives absent pixels the mean of those around them that are present or filled, in two sweeps: whatever is not reached
+/// Gives absent pixels the mean of those around them that are present or filled, in two sweeps: what is not reached
 /// from above and left is reached from below and right. Without any pixel the picture is black.
 fn fill(grid: Grid, signal: &mut [f32], other: &mut [f32]) {
     let pixels = grid.columns * grid.rows;
@@ -92,8 +92,8 @@ fn fill(grid: Grid, signal: &mut [f32], other: &mut [f32]) {
     }
 }
 
-/// The larger of a pixel's variance and the mean variance around it, among pixels with like features. Of few samples
-/// many have seen none of the light and know of no error; their neighbours do.
+/// Computes the larger of a pixel's variance and the mean variance around it, among pixels with similar features. With
+/// few samples, many pixels have missed the light and have no variance of their own; their neighbours have some.
 fn smooth_variance(grid: Grid, from: &[f32], to: &mut [f32], features: &mut [f32]) {
     let s = grid.stride;
     for y in 0..grid.rows {

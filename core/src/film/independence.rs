@@ -1,28 +1,28 @@
-//! How far the samples of an iteration are from independent, seen from outside: iterations are independent, so the
-//! squared difference of the picture before and an iteration is the sum of their true variances, whatever happens
+//! Correlation of an iteration's samples, measured from outside. Iterations are independent, so the expected squared
+//! difference between the picture before and an iteration is the sum of their true variances, however samples correlate
 //! within.
 
 use super::error::relative_denominator;
 use super::pixel::{PixelStats, PixelSums};
 use super::sqrt::SqrtNewton;
 
-/// Sums over the pixels of an iteration that is being merged: by how much it differs from the picture before, and by
-/// how much it should if the samples of each were independent. Relative, as relMSE is.
+/// Sums over the pixels of an iteration that is being merged: squared differences from the picture before, and those
+/// expected if all samples were independent. Relative, with the denominator of relMSE.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Differences {
-    /// Squared differences of the means: variance of the picture before plus variance of the iteration.
+    /// Squared differences of the means: true variance of the picture before plus true variance of the iteration.
     found: f64,
-    /// Stated variance of the picture before, and of the iteration.
+    /// Variance of independent samples: of the picture before, and of the iteration.
     stated: [f64; 2],
-    /// Sums of found^2, stated^2 and found x stated, per pixel.
+    /// Sums over pixels of found^2, stated^2 and found x stated.
     squares: [f64; 3],
-    /// Weight of the picture before, and of the iteration.
+    /// Weights of the picture before and of the iteration.
     weight: [f64; 2],
 }
 
 impl Differences {
-    /// A pixel's samples so far, and those of the iteration, each with weight `w`.
-    pub fn add(&mut self, p: &PixelStats, o: &PixelSums, w: f64) {
+    /// Adds a pixel: its samples so far, and those of the iteration, each with weight `w`.
+    pub(super) fn add(&mut self, p: &PixelStats, o: &PixelSums, w: f64) {
         if p.samples < 2 || o.samples < 2 {
             return;
         }
@@ -46,7 +46,7 @@ impl Differences {
     }
 }
 
-/// True over stated variance of the picture, and the standard error of that.
+/// True variance of the picture over that of independent samples, and the standard error of this ratio.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Independence {
     pub ratio: f64,
@@ -54,11 +54,11 @@ pub(super) struct Independence {
 }
 
 impl Independence {
-    /// Samples count as independent.
-    pub const UNKNOWN: Self = Self { ratio: 1.0, noise: 0.0 };
+    /// Ratio before two iterations: samples are assumed to be independent.
+    pub(super) const UNKNOWN: Self = Self { ratio: 1.0, noise: 0.0 };
 
-    /// The ratio after an iteration: the picture before had variance r S, the iteration has what was found beyond that.
-    pub fn after(self, d: &Differences) -> Self {
+    /// Ratio after an iteration: the picture before had variance r S, and the iteration has the rest of what was found.
+    pub(super) fn after(self, d: &Differences) -> Self {
         let [s, t] = d.stated;
         if s + t <= 0.0 {
             return self;
@@ -69,8 +69,8 @@ impl Independence {
         let noise = (a - 2.0 * r * ab + r * r * b).max(0.0);
         let [x, y] = d.weight.map(|w| w * w);
         let next = if y > x {
-            // a long iteration after a short one: what was found is mostly of the short one, and says nothing of the
-            // other
+            // a long iteration after a short one: the difference is mostly the short one's error and hardly depends on
+            // the other
             Self { ratio: r, noise: noise.sqrt_newton() / (s + t) }
         } else {
             let stated = x * s + y * t;

@@ -1,5 +1,13 @@
-//! What a picture is made of: per pixel f64 sums, so that neither 1e9 samples nor one firefly spoils the mean
-//! (NUMERICS FLM-1), and what can be said from them.
+//! Sums of every pixel in f64, so that the mean stays exact after 1e9 samples or a firefly (NUMERICS FLM-1), and the
+//! estimate of the picture's error.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `pixel` | sums of one pixel |
+//! | `error` | relMSE of a pixel, [`ErrorEstimate`] |
+//! | `independence` | correlation of an iteration's samples, measured |
+//! | `trimmed` | sums without the largest values |
+//! | `sqrt` | square root in f64 |
 
 mod error;
 mod independence;
@@ -16,7 +24,7 @@ pub(crate) use trimmed::trimmed;
 use error::relative_error;
 use independence::{Differences, Independence};
 
-/// The whole picture, row 0 at the top.
+/// Picture: sums of all pixels, row 0 at the top.
 #[derive(Debug)]
 pub struct Film<'m> {
     size: [u32; 2],
@@ -31,22 +39,22 @@ impl<'m> Film<'m> {
         Self { size, pixels, aovs, differences: Differences::default(), independence: Independence::UNKNOWN }
     }
 
-    /// Columns and rows.
+    /// Columns and rows of the picture.
     pub fn size(&self) -> [u32; 2] {
         self.size
     }
 
-    /// Pixels row by row.
+    /// Sums of the pixels, row by row.
     pub fn pixels(&self) -> &[PixelStats] {
         self.pixels
     }
 
-    /// Auxiliary sums row by row; empty if the settings did not ask for them.
+    /// Auxiliary sums of the pixels, row by row; empty if the settings do not ask for them.
     pub fn aovs(&self) -> &[PixelAov] {
         self.aovs
     }
 
-    /// Adds what an iteration drew for a pixel, each sample with weight `w`.
+    /// Adds the sums of an iteration to a pixel, each sample with weight `w`.
     pub(crate) fn merge(&mut self, pixel: usize, sums: &PixelSums, aov: Option<&PixelAov>, w: f64) {
         if let Some(p) = self.pixels.get_mut(pixel) {
             self.differences.add(p, sums, w);
@@ -57,13 +65,13 @@ impl<'m> Film<'m> {
         }
     }
 
-    /// All pixels of an iteration were merged.
+    /// Ends the merge of an iteration: all its pixels were added.
     pub(crate) fn end_iteration(&mut self) {
         self.independence = self.independence.after(&core::mem::take(&mut self.differences));
     }
 
     /// Estimated error of the picture. The interval is the normal one over the pixels' contributions, which are
-    /// independent; it is wide while few samples carry most of the error.
+    /// independent; it is wide while few samples cause most of the error.
     pub fn error_estimate(&self) -> ErrorEstimate {
         let n = self.pixels.len();
         if n == 0 {

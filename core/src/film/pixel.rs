@@ -6,13 +6,13 @@ use bytemuck::{Pod, Zeroable};
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct PixelSums {
-    /// Radiance, linear Rec. 709.
+    /// Sum of radiance, linear Rec. 709.
     pub sum: [f64; 3],
-    /// Squared radiance.
+    /// Sum of squared radiance.
     pub sum_sqr: [f64; 3],
-    /// Camera samples.
+    /// Number of camera samples.
     pub samples: u64,
-    /// Rays traced for them.
+    /// Number of rays traced for them, of all kinds.
     pub rays: u64,
 }
 
@@ -27,7 +27,7 @@ impl PixelSums {
         self.rays += u64::from(rays);
     }
 
-    /// Mean, and its squared standard error if its samples, two at least, are independent.
+    /// Mean and its squared standard error per channel, for two independent samples at least.
     pub(super) fn mean_and_variance(&self) -> [[f64; 2]; 3] {
         let n = self.samples as f64;
         core::array::from_fn(|c| {
@@ -37,8 +37,8 @@ impl PixelSums {
     }
 }
 
-/// Weighted sums over the camera samples of one pixel. All samples of the pixel in an iteration have the same
-/// weight `w`: 1, less where adaptive sampling took more.
+/// Weighted sums over the camera samples of one pixel. All samples of the pixel in an iteration have the same weight
+/// `w`: 1, less where adaptive sampling took more.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct PixelStats {
@@ -52,9 +52,9 @@ pub struct PixelStats {
     pub weight: f64,
     /// Sum of w^2.
     pub weight_sqr: f64,
-    /// Camera samples.
+    /// Number of camera samples.
     pub samples: u64,
-    /// Rays traced for them.
+    /// Number of rays traced for them, of all kinds.
     pub rays: u64,
 }
 
@@ -62,20 +62,20 @@ pub struct PixelStats {
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct PixelAov {
-    /// Albedo of the first hit from the camera's side, as roulette takes it: reflected and transmitted, 1 for clear
-    /// glass.
+    /// Sum of albedos of the first hit, seen from the camera, as roulette uses them: reflected and transmitted, 1 for
+    /// clear glass.
     pub albedo: [f64; 3],
-    /// Shading normal of the first hit, world space.
+    /// Sum of shading normals of the first hit, world space.
     pub normal: [f64; 3],
-    /// Distance to the first hit.
+    /// Sum of distances to the first hit, world units.
     pub depth: f64,
-    /// Camera samples that hit something.
+    /// Number of camera samples that hit a surface.
     pub hits: f64,
-    /// Roulette factors at the vertices of depth 1, 2, 3 and above.
+    /// Sum of roulette factors at vertices of depth 1, 2, 3 and above.
     pub factor: [f64; 4],
-    /// How many vertices those are.
+    /// Number of those vertices.
     pub vertices: [f64; 4],
-    /// Paths: camera samples and what splitting added.
+    /// Number of paths: camera samples and samples that splitting added.
     pub paths: f64,
 }
 
@@ -98,9 +98,9 @@ impl PixelStats {
         self.sum.map(|s| s / w)
     }
 
-    /// Squared standard error of the mean per channel, its samples taken as independent. With roulette or splitting
-    /// that is an upper bound: one comb rounds a packet, and the roundings of its samples cancel (standard errors of up
-    /// to twice the true ones were measured). One sample tells nothing of its error: its own square stands in.
+    /// Squared standard error of the mean per channel, for independent samples. With roulette or splitting that is an
+    /// upper bound: one comb rounds a packet, and the roundings of its samples cancel (standard errors of up to twice
+    /// the true ones were measured). One sample has no measurable variance: its square is used.
     pub fn variance_of_mean(&self) -> [f64; 3] {
         let (w, w2, m) = (self.weight, self.weight_sqr, self.mean());
         // w^2 - w2 is w^2 (1 - 1 / n) for n samples of equal weight

@@ -1,6 +1,6 @@
-//! Square roots in f64.
+//! Square root in f64: `core` has none.
 
-/// Square root where `core` has none: the same bits on every target.
+/// Square root with the same bits on every target.
 pub(crate) trait SqrtNewton {
     fn sqrt_newton(self) -> f64;
 }

@@ -1,22 +1,23 @@
-//! Sums without the largest values.
+//! Sums without the k largest values, by radix selection: four passes over the values, no memory.
 
 /// Sums of values without the largest.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Trimmed {
-    /// Values that count.
+    /// Number of values in the sum.
     pub count: u64,
-    /// Their sum.
+    /// Sum of those values.
     pub sum: f64,
-    /// The sum of their squares.
+    /// Sum of their squares.
     pub sum_sqr: f64,
-    /// The sum of the others: two disjoint sums, nothing is ever subtracted (NUMERICS STA-4).
+    /// Sum of the largest values, which are left out of `sum`: nothing is ever subtracted (NUMERICS STA-4).
     pub rest: f64,
-    /// The smallest of the others; infinite if there are none.
+    /// Smallest value that was left out; infinite if there is none.
     pub limit: f32,
 }
 
-/// Sums of the non-negative values that `visit` shows without the `k` largest, in `f32`. Of equal ones at the limit as
-/// many are left out as make `k`.
+/// Sums of the non-negative values that `visit` shows, without the `k` largest in `f32`. Of equal values at the limit,
+/// as many are left out as make `k`.
+#[inline(always)]
 pub(crate) fn trimmed(k: usize, mut visit: impl FnMut(&mut dyn FnMut(f64))) -> Trimmed {
     let mut t = Trimmed { limit: f32::INFINITY, ..Trimmed::default() };
     let mut out = k;
@@ -39,8 +40,9 @@ pub(crate) fn trimmed(k: usize, mut visit: impl FnMut(&mut dyn FnMut(f64))) -> T
     t
 }
 
-/// The `k`-th largest (k >= 1) of the non-negative values that `visit` shows, by radix selection on the float's bits:
-/// four visits, no memory. 0 if there are fewer.
+/// Finds the `k`-th largest (k >= 1) of the non-negative values that `visit` shows, by radix selection on the float's
+/// bits: four visits, no memory. 0 if there are fewer.
+#[inline(always)]
 fn kth_largest(k: usize, mut visit: impl FnMut(&mut dyn FnMut(f32))) -> f32 {
     let (mut prefix, mut left) = (0u32, k);
     for shift in [24u32, 16, 8, 0] {

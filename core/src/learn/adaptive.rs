@@ -1,25 +1,25 @@
-//! Adaptive sampling: how many camera samples the pixels of each tile get in an iteration.
+//! Adaptive sampling: allocation of an iteration's camera samples to the pixels of each tile.
 //!
-//! A pixel's error falls as variance over samples; the sum over the picture is least for a given work when the samples
-//! are as the square root of variance over cost. Numbers are the same for a tile of 8x8 pixels, because a pixel's own
-//! variance is mostly noise. Every pixel has one sample at least, and an iteration counts as much in all of them: were
-//! samples pooled, a pixel that happened to look dark and smooth would keep its error for ever.
+//! A pixel's squared error falls as variance over samples. For a given total cost, the sum over the picture is least
+//! when the density of samples is proportional to sqrt(variance / cost). All pixels of a tile get the same number,
+//! because a pixel's own variance is mostly noise. Every pixel gets one sample at least, and an iteration has the same
+//! weight in all of them: if samples were pooled, a pixel that happened to look dark and smooth would keep its error.
 
-use super::estimate::Pixels;
+use super::estimate::PixelEstimates;
 use crate::film::{Film, SqrtNewton};
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::tiles::{BlockGrid, film_index};
 
-/// Least and greatest share of a pixel in the samples beyond its first, relative to what the mean pixel wishes.
+/// Least and greatest density of the samples beyond a pixel's first, relative to the mean desired density.
 const SHARES: [f64; 2] = [0.25, 8.0];
 
-/// Camera samples per pixel, by tile.
+/// Camera samples per pixel of an iteration, by tile.
 #[derive(Debug)]
 pub(super) struct SampleAllocation<'m> {
     size: [u32; 2],
-    /// Empty if all pixels have as many.
+    /// Samples of each pixel of a tile; empty if all pixels have the same number.
     counts: &'m mut [u32],
-    /// Mean over the pixels that was asked for.
+    /// Mean over the pixels, as the host asked for it.
     samples: u32,
 }
 
@@ -37,7 +37,7 @@ impl<'m> SampleAllocation<'m> {
         self.counts.get(tile as usize).copied().unwrap_or(self.samples)
     }
 
-    /// Samples of a pixel over the mean.
+    /// Samples of a pixel over the mean pixel's.
     #[inline]
     pub(super) fn share(&self, film: u32) -> f64 {
         if self.counts.is_empty() {
@@ -47,33 +47,33 @@ impl<'m> SampleAllocation<'m> {
         if n > 0 { f64::from(n) / f64::from(self.samples.max(1)) } else { 1.0 }
     }
 
-    /// Deals out `samples` camera samples per pixel in the mean: one to each, the others by the desired density of their tiles, with what
-    /// rounding leaves over handed from tile to tile.
-    pub(super) fn allocate(&mut self, samples: u32, film: &Film<'_>, pixels: &Pixels<'_>) {
+    /// Allocates `samples` camera samples per pixel in the mean: one to each, the others by the desired density of
+    /// their tile. What rounding leaves over goes to the next tile (error diffusion).
+    pub(super) fn allocate(&mut self, samples: u32, film: &Film<'_>, pixels: &PixelEstimates<'_>) {
         self.samples = samples;
         self.counts.fill(samples);
         if self.counts.is_empty() || !pixels.known() || samples < 2 {
             return;
         }
-        // wishes wait where the counts will be
-        let (mut wished, mut area) = (0.0, 0.0);
+        // densities are stored where the counts will be
+        let (mut desired, mut area) = (0.0, 0.0);
         for tile in 0..self.counts.len() {
             let desired_density = self.desired_density(tile as u32, film, pixels) as f32;
             let n = self.area(tile as u32);
-            wished += f64::from(desired_density) * n;
+            desired += f64::from(desired_density) * n;
             area += n;
             if let Some(count) = self.counts.get_mut(tile) {
                 *count = desired_density.to_bits();
             }
         }
-        let mean = wished / area;
+        let mean = desired / area;
         if !(mean > 0.0 && mean.is_finite()) {
             return self.counts.fill(samples);
         }
         let [least, most] = SHARES;
         let share = |bits: u32| (f64::from(f32::from_bits(bits)) / mean).clamp(least, most);
-        let dealt: f64 = (0..).zip(&*self.counts).map(|(tile, &bits)| share(bits) * self.area(tile)).sum();
-        let scale = f64::from(samples - 1) * area / dealt;
+        let allocated: f64 = (0..).zip(&*self.counts).map(|(tile, &bits)| share(bits) * self.area(tile)).sum();
+        let scale = f64::from(samples - 1) * area / allocated;
         let mut left = 0.0;
         for tile in 0..self.counts.len() {
             let n = self.area(tile as u32);
@@ -85,14 +85,14 @@ impl<'m> SampleAllocation<'m> {
         }
     }
 
-    /// Pixels of a tile.
+    /// Number of pixels in a tile.
     fn area(&self, tile: u32) -> f64 {
         f64::from(BlockGrid::tiles(self.size).area(tile))
     }
 
-    /// sqrt(variance / cost) of a tile's samples. Pixels count their rays, of whatever kind, so the cost is their
-    /// number.
-    fn desired_density(&self, tile: u32, film: &Film<'_>, pixels: &Pixels<'_>) -> f64 {
+    /// Desired density of a tile's samples: sqrt(variance / cost). The cost is the number of rays of all kinds, which
+    /// is what pixels count.
+    fn desired_density(&self, tile: u32, film: &Film<'_>, pixels: &PixelEstimates<'_>) -> f64 {
         let [from, to] = BlockGrid::tiles(self.size).corners(tile);
         let (mut error, mut rays) = (0.0, 0.0);
         for y in from[1]..to[1] {

@@ -1,5 +1,5 @@
-//! The estimate of every pixel that errors are weighed by: a picture's relative error cannot be known without the
-//! picture.
+//! Estimates of the pixels' radiance, by which errors are weighted: a relative error needs the value that it is
+//! relative to.
 
 use super::settings::{Learning, Objective, PixelEstimator};
 use crate::denoise::{self, Planes};
@@ -7,7 +7,7 @@ use crate::film::{Film, REL_MSE_EPSILON};
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::tiles::BlockGrid;
 
-/// Where the values are.
+/// Storage of the estimates.
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one per session, and no allocator to box it")]
 enum Values<'m> {
@@ -16,19 +16,19 @@ enum Values<'m> {
     Blocks([&'m mut [f32]; 3]),
 }
 
-/// Estimates of the pixels.
+/// Estimates of the pixels' radiance, linear Rec. 709: denoised, means of blocks, or given by the host.
 #[derive(Debug)]
-pub(super) struct Pixels<'m> {
+pub(super) struct PixelEstimates<'m> {
     size: [u32; 2],
     relative: bool,
     values: Values<'m>,
-    /// There are values.
+    /// There are estimates.
     known: bool,
-    /// They are the host's.
+    /// The estimates are the host's.
     given: bool,
 }
 
-impl<'m> Pixels<'m> {
+impl<'m> PixelEstimates<'m> {
     pub(super) fn measure(m: Measure, size: [u32; 2], features: bool, how: Option<PixelEstimator>) -> Measure {
         match how {
             None => m,
@@ -63,12 +63,12 @@ impl<'m> Pixels<'m> {
         Ok(Self { size, relative: learning.objective == Objective::Relative, values, known: false, given: false })
     }
 
-    /// Are there values?
+    /// Are there estimates?
     pub(super) fn known(&self) -> bool {
         self.known
     }
 
-    /// The estimate of a pixel, 0 while unknown.
+    /// Estimate of a pixel, 0 while unknown.
     #[inline]
     pub(super) fn value(&self, film: u32) -> [f32; 3] {
         let (planes, i) = match &self.values {
@@ -79,7 +79,7 @@ impl<'m> Pixels<'m> {
         planes.map(|p| p.get(i).copied().unwrap_or(0.0))
     }
 
-    /// What a squared error of a pixel counts, per channel.
+    /// Weight of a squared error of a pixel in the error of the picture, per channel.
     #[inline]
     pub(super) fn error_weight(&self, film: u32) -> [f32; 3] {
         if !self.known || !self.relative {
@@ -88,7 +88,7 @@ impl<'m> Pixels<'m> {
         self.value(film).map(|x| 1.0 / (x * x + REL_MSE_EPSILON as f32))
     }
 
-    /// A plane with room for one value per pixel, until [`Self::take_back`]; empty if there is none.
+    /// Plane with room for one value per pixel, on loan until [`Self::take_back`]; empty if there is none.
     pub(super) fn lend(&mut self) -> &'m mut [f32] {
         match &mut self.values {
             Values::Denoised { planes, .. } => core::mem::take(&mut planes.color[0]),
@@ -96,14 +96,14 @@ impl<'m> Pixels<'m> {
         }
     }
 
-    /// What [`Self::lend`] gave.
+    /// Returns the plane that [`Self::lend`] gave.
     pub(super) fn take_back(&mut self, plane: &'m mut [f32]) {
         if let Values::Denoised { planes, .. } = &mut self.values {
             planes.color[0] = plane;
         }
     }
 
-    /// All values, if there is one per pixel.
+    /// Estimates as rgb planes, if there is one per pixel.
     pub(super) fn planes(&self) -> Option<[&[f32]; 3]> {
         match &self.values {
             Values::Denoised { planes, .. } if self.known => Some(planes.out.each_ref().map(|p| &**p)),
@@ -111,7 +111,7 @@ impl<'m> Pixels<'m> {
         }
     }
 
-    /// The host's values replace the built-in ones from now on; `false` if there is not one per pixel.
+    /// Replaces the built-in estimates by the host's from now on; `false` if there is not one per pixel.
     pub(super) fn give(&mut self, rgb: &[[f32; 3]]) -> bool {
         let Values::Denoised { planes, .. } = &mut self.values else { return false };
         if planes.out.iter().any(|p| p.len() != rgb.len()) {
@@ -126,7 +126,7 @@ impl<'m> Pixels<'m> {
         true
     }
 
-    /// New values from the picture so far.
+    /// Estimates the pixels anew from the film, unless the host has given estimates.
     pub(super) fn refresh(&mut self, film: &Film<'_>) {
         if self.given {
             return;

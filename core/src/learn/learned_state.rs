@@ -1,8 +1,8 @@
-//! The session's side of learning: everything learned, frozen while an iteration runs.
+//! The session's side of learning: all learned statistics, frozen while an iteration runs.
 
 use super::adaptive::SampleAllocation;
 use super::cache::{BINS, Cache, NO_BIN, Training, VertexKind8};
-use super::estimate::Pixels;
+use super::estimate::PixelEstimates;
 use super::needs::Needs;
 use super::picture::{Picture, PictureStatistics, Visit};
 use super::settings::{Learning, Objective};
@@ -15,10 +15,10 @@ use crate::scene::Scene;
 use crate::tiles::BlockGrid;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
-/// Bins of path lengths per block of pixels, for statistics over the picture: those of a leaf, whose place it takes.
+/// Bins of path lengths per block of pixels, for statistics over the picture: a block takes the bins of one leaf.
 const DEPTHS: u32 = BINS as u32;
 
-/// Everything learned.
+/// Learned statistics of a render: of the scene or the picture, of every pixel, of the picture as a whole.
 #[derive(Debug)]
 pub struct LearnedState<'m> {
     learning: Learning,
@@ -26,17 +26,17 @@ pub struct LearnedState<'m> {
     cache: Option<Cache<'m>>,
     /// Side of the pixel blocks of statistics over the picture.
     block: u32,
-    pixels: Pixels<'m>,
+    pixels: PixelEstimates<'m>,
     allocation: SampleAllocation<'m>,
     picture: Picture,
-    /// Something needs the statistics of the picture.
+    /// Some setting needs the statistics of the picture.
     needed: bool,
 }
 
 impl<'m> LearnedState<'m> {
     pub(crate) fn measure(m: Measure, needs: &Needs) -> Measure {
         let m = needs.cache.map_or(m, |size| Cache::measure(m, size));
-        let m = Pixels::measure(m, needs.size, needs.features, needs.pixels);
+        let m = PixelEstimates::measure(m, needs.size, needs.features, needs.pixels);
         SampleAllocation::measure(m, needs.size, needs.adaptive)
     }
 
@@ -58,14 +58,14 @@ impl<'m> LearnedState<'m> {
             size: n.size,
             cache,
             block,
-            pixels: Pixels::carve(c, n.size, n.features, n.pixels, &n.learning)?,
+            pixels: PixelEstimates::carve(c, n.size, n.features, n.pixels, &n.learning)?,
             allocation: SampleAllocation::carve(c, n.size, n.adaptive)?,
             picture: Picture::default(),
             needed: n.pixels.is_some(),
         })
     }
 
-    /// The cache of statistics over the scene. Those over the picture have no tree and cannot be saved.
+    /// Cache of statistics over the scene. Statistics over the picture have no tree and cannot be saved.
     pub(crate) fn cache(&self) -> Option<&Cache<'m>> {
         self.cache.as_ref().filter(|c| !c.is_flat())
     }
@@ -79,7 +79,7 @@ impl<'m> LearnedState<'m> {
         self.cache.as_ref().map_or(0, Cache::bins)
     }
 
-    /// See [`Cache::find_jittered`].
+    /// Bins of eight vertices; see [`Cache::find_jittered`].
     #[inline]
     pub(crate) fn scene_bins(
         &self,
@@ -95,7 +95,7 @@ impl<'m> LearnedState<'m> {
         }
     }
 
-    /// The bin of path length `depth` under a pixel.
+    /// Bin of path length `depth` under a pixel.
     pub(crate) fn image_bin(&self, film: u32, depth: u32) -> u32 {
         BlockGrid::new(self.size, self.block).of_pixel(film) * DEPTHS + depth.clamp(1, DEPTHS) - 1
     }
@@ -110,15 +110,15 @@ impl<'m> LearnedState<'m> {
         self.allocation.of_tile(tile)
     }
 
-    /// What a squared error of a sample of a pixel counts, per channel: less if the pixel has more samples. And its
-    /// samples over those of the mean pixel.
+    /// Weight of a squared error of one sample of a pixel, per channel: less if the pixel has more samples. And the
+    /// pixel's samples over those of the mean pixel.
     #[inline]
     pub(crate) fn error_weight(&self, film: u32) -> ([f32; 3], f32) {
         let share = self.allocation.share(film) as f32;
         (self.pixels.error_weight(film).map(|x| x / (share * share)), share)
     }
 
-    /// See [`Cache::bins_towards`].
+    /// Bins of other directions; see [`Cache::bins_towards`].
     #[inline]
     pub(crate) fn bins_towards(&self, bin: U32x8, dir: Vec3x8, active: Mask8) -> U32x8 {
         match &self.cache {
@@ -127,25 +127,25 @@ impl<'m> LearnedState<'m> {
         }
     }
 
-    /// See [`Cache::visibility_root`].
+    /// Roots of visibilities; see [`Cache::visibility_root`].
     #[inline]
     pub(crate) fn visibility_root(&self, bin: U32x8) -> F32x8 {
         self.cache.as_ref().map_or(F32x8::ONE, |c| c.visibility_root(bin))
     }
 
-    /// Mean cost of a camera sample over its mean error; 0 while unknown.
+    /// Mean cost of a camera sample over its mean weighted squared error; 0 while unknown.
     pub(crate) fn cost_over_variance(&self) -> f32 {
         self.picture.cost_over_variance()
     }
 
-    /// Error of one sample in its pixel beyond which it is an outlier to the statistics; infinite while unknown.
+    /// Weighted squared error beyond which a sample is an outlier to the statistics; infinite while unknown.
     #[inline]
     pub(crate) fn outlier(&self) -> f32 {
         let limit = self.picture.blended.limit;
         if limit > 0.0 { limit as f32 } else { f32::INFINITY }
     }
 
-    /// What is known of the picture, for vertices of pixels of this error weight.
+    /// Statistics of the picture, for vertices of pixels with this error weight.
     #[inline]
     pub(crate) fn image8(&self, error_weight: Vec3x8) -> Learned8 {
         Learned8 {
@@ -156,7 +156,7 @@ impl<'m> LearnedState<'m> {
         }
     }
 
-    /// Adds what is known of eight bins, their values times `unscale`.
+    /// Adds the statistics of eight bins, their values times `unscale`.
     #[inline]
     pub(crate) fn local8(&self, learned: &mut Learned8, bin: U32x8, unscale: Vec3x8, active: Mask8) {
         let Some(cache) = &self.cache else { return };
@@ -171,41 +171,41 @@ impl<'m> LearnedState<'m> {
         };
     }
 
-    /// The picture per camera sample: of the last iteration, and as factors use it.
+    /// Variance and cost per camera sample: of the last iteration, and as factors use them.
     pub(crate) fn statistics(&self) -> [PictureStatistics; 2] {
         [self.picture.last, self.picture.blended]
     }
 
-    /// Is it known what an error in a pixel counts?
+    /// Are the error weights of the pixels known?
     pub(crate) fn weighs_pixels(&self) -> bool {
         self.pixels.known() || self.learning.objective == Objective::Absolute
     }
 
-    /// Estimates of the pixels, rgb planes.
+    /// Estimates of the pixels as rgb planes, if there is one per pixel.
     pub(crate) fn estimate(&self) -> Option<[&[f32]; 3]> {
         self.pixels.planes()
     }
 
-    /// The host's estimate of the pixels replaces the built-in one from now on.
+    /// Replaces the built-in estimate of the pixels by the host's from now on; `false` if it does not fit.
     pub(crate) fn give_estimate(&mut self, rgb: &[[f32; 3]]) -> bool {
         self.pixels.give(rgb)
     }
 
-    /// Measures error and cost of an iteration, whose pixels `visit` shows, against the estimate made before it.
+    /// Measures variance and cost of an iteration, whose pixels `visit` shows, against the estimate made before it.
     pub(crate) fn measure_picture(&mut self, counters: &Counters, visit: impl Visit) {
         if self.needed && self.pixels.known() {
             self.picture.measure(&self.learning, &mut self.pixels, &self.allocation, counters, visit);
         }
     }
 
-    /// Weight of the samples of a pixel: less where adaptive sampling took more, so that every iteration counts as much
-    /// in all pixels.
+    /// Weight of each sample of a pixel: less where adaptive sampling took more, so that an iteration has the same
+    /// weight in all pixels.
     ///
-    /// All iterations weigh the same per sample, because other weights make pictures wrong. EARS merges iterations by
+    /// All iterations have the same weight per sample, because other weights bias pictures. EARS merges iterations by
     /// inverse variance, but bright iterations are the noisy ones: pictures of 16 pixels with caustics came out 0.9 %
-    /// too dark, and with weights by the variance or the work of earlier iterations up to 2 % too bright. As lengths
-    /// double, little is lost with the first ones, which have learned least. A quarter of the weight for the very first
-    /// made the next pictures worse and no later one better.
+    /// too dark, and with weights by the variance or the work of earlier iterations up to 2 % too bright. As the
+    /// lengths of iterations double, the first ones, which have learned least, cost little. A quarter of the weight for
+    /// the very first made the next pictures worse and no later one better.
     pub(crate) fn weight_of(&self, film: usize) -> f64 {
         1.0 / self.allocation.share(film as u32)
     }
@@ -220,7 +220,7 @@ impl<'m> LearnedState<'m> {
         }
     }
 
-    /// Ends an iteration: adds what the shards learned of the scene.
+    /// Ends an iteration: merges what the shards learned of the scene.
     pub(crate) fn learn_scene<'a, 'b: 'a>(&mut self, shards: impl Iterator<Item = &'a Training<'b>>) {
         if let Some(cache) = &mut self.cache {
             cache.begin_merge(f64::from(self.learning.decay));

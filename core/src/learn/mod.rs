@@ -1,8 +1,8 @@
-//! What paths have taught so far: statistics by place and direction ([`cache`]), an estimate of every pixel, and
-//! variance and cost of the picture. All of it is frozen while an iteration runs and changes when it ends.
+//! Statistics learned from paths: by position and direction ([`cache`]), an estimate of every pixel, and variance and
+//! cost of the picture. They are frozen while an iteration runs and change when it ends.
 //!
-//! This layer knows places, directions, values and costs. It must not know materials, lights or how paths are traced.
-//! Statistics change efficiency only: whatever they hold, no estimate's mean moves.
+//! This layer knows positions, directions, values and costs. It must not know materials, lights or how paths are
+//! traced. Statistics change efficiency only: whatever their values, all estimators stay unbiased.
 //!
 //! How it works as a whole, where it departs from the papers, and what is not done: docs/LEARNING.md.
 

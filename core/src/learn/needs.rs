@@ -1,24 +1,24 @@
-//! What a render learns, as the settings ask for it.
+//! Statistics that a render has to learn, as the settings ask for it.
 
 use super::cache::CacheSize;
 use super::settings::{Learning, PixelEstimator};
 use crate::rrs::Space;
 
-/// What a render learns, and how.
+/// Statistics that a render has to learn.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Needs {
     /// Columns and rows of the picture.
     pub size: [u32; 2],
-    /// The film holds albedos and normals, which the denoiser looks at.
+    /// Albedos and normals are in the film, for the denoiser.
     pub features: bool,
-    /// Over what local statistics are kept, if at all.
+    /// Domain of local statistics, if there are any.
     pub space: Option<Space>,
     /// Room for local statistics, if there are any.
     pub cache: Option<CacheSize>,
-    /// How the pixels are estimated, if anything needs that.
+    /// Estimator of the pixels, if anything needs it.
     pub pixels: Option<PixelEstimator>,
-    /// Pixels get samples by their error.
+    /// Adaptive sampling is on.
     pub adaptive: bool,
-    /// The caller's choices.
+    /// Settings of learning.
     pub learning: Learning,
 }

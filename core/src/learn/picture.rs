@@ -1,45 +1,45 @@
-//! Error and cost of the picture per camera sample (EARS, eqs. 33 and 34).
+//! Variance and cost of the picture per camera sample (EARS, eqs. 33 and 34).
 
 use super::adaptive::SampleAllocation;
-use super::estimate::Pixels;
+use super::estimate::PixelEstimates;
 use super::settings::Learning;
 use crate::counters::Counters;
 use crate::film::{PixelSums, trimmed};
 use crate::rrs::Norm;
 
-/// Share of the pixels whose variance is left out of the picture's. A single outlier would decide all factors: with the
-/// 0.001 % of EARS (section 5.2), none in a small picture, one bright sample made all vertices look worthless, and
-/// roulette then made more such samples.
+/// Share of the pixels whose variance is left out of the picture's. A single outlier would decide all factors. The
+/// 0.001 % of EARS (section 5.2) leave out no pixel of a small picture: one bright sample made all vertices look
+/// worthless, and roulette then produced more such samples.
 const OUTLIERS: f64 = 1e-3;
 
-/// What is known of the picture's error and cost per camera sample.
+/// Variance and cost of the picture per camera sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PictureStatistics {
-    /// Mean error over the pixels (eq. 34) without the outliers.
+    /// Mean weighted squared error over the pixels (eq. 34), without the outliers.
     pub variance: f64,
-    /// The outliers' part of it, kept apart.
+    /// The outliers' part of that mean.
     pub outliers: f64,
-    /// Mean counted cost (eq. 33).
+    /// Mean counted cost (eq. 33), in scattered rays ([`crate::cost`]).
     pub cost: f64,
-    /// Error of one sample that would make its pixel an outlier.
+    /// Weighted squared error at which one sample makes its pixel an outlier.
     pub limit: f64,
 }
 
-/// Calls its argument with every pixel's film index and sums of an iteration.
+/// Visitor of an iteration's pixels: calls its argument with the film index and the sums of each.
 pub(crate) trait Visit: Fn(&mut dyn FnMut(usize, &PixelSums)) {}
 
 impl<F: Fn(&mut dyn FnMut(usize, &PixelSums))> Visit for F {}
 
-/// Statistics over the iterations.
+/// Statistics of the picture, over the iterations.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Picture {
-    /// Of the last iteration.
+    /// Statistics of the last iteration.
     pub last: PictureStatistics,
-    /// Of all, older ones discounted.
+    /// Statistics of all iterations, older ones discounted.
     pub blended: PictureStatistics,
-    /// What `blended` weighs: counted cost.
+    /// Weight of `blended`: counted cost.
     weight: f64,
-    /// Of the first iteration.
+    /// Statistics of the first iteration.
     first: Option<PictureStatistics>,
 }
 
@@ -59,12 +59,12 @@ impl Picture {
     pub(super) fn measure(
         &mut self,
         learning: &Learning,
-        pixels: &mut Pixels<'_>,
+        pixels: &mut PixelEstimates<'_>,
         allocation: &SampleAllocation<'_>,
         counters: &Counters,
         visit: impl Visit,
     ) {
-        // errors are read six times; where there is room they are computed once
+        // errors are read six times; where there is room for them they are computed once
         let kept = pixels.lend();
         let error = |film: usize, sums: &PixelSums| {
             // sums of finite samples may make errors that f32 does not hold
@@ -112,9 +112,15 @@ impl Picture {
     }
 }
 
-/// Mean error of a pixel's samples against its estimate, weighted by its error weight, normed over the channels; over the
-/// pixel's share of the samples, so that the mean over the pixels is the picture's.
-fn error_of(film: u32, p: &PixelSums, norm: Norm, pixels: &Pixels<'_>, allocation: &SampleAllocation<'_>) -> f64 {
+/// Mean squared error of a pixel's samples against its estimate, times its error weight, as a norm over the channels.
+/// It is divided by the pixel's share of the samples, so that the mean over the pixels is the picture's.
+fn error_of(
+    film: u32,
+    p: &PixelSums,
+    norm: Norm,
+    pixels: &PixelEstimates<'_>,
+    allocation: &SampleAllocation<'_>,
+) -> f64 {
     let (n, share) = (p.samples as f64, allocation.share(film));
     let (value, error_weight) = (pixels.value(film), pixels.error_weight(film));
     let error = |c: usize| {

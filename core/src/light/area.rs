@@ -97,7 +97,7 @@ impl LightModel for Area {
         }
     }
 
-    /// Of a Lambertian emitter.
+    /// Power of a Lambertian emitter.
     fn power(light: &Light, _: &SceneExtent) -> f64 {
         PI * f64::from(light.area) * luminance(light.emission)
     }

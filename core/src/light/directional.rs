@@ -30,7 +30,7 @@ impl LightModel for Directional {
         }
     }
 
-    /// Through a disk of the scene's radius.
+    /// Power through a disk of the scene's radius.
     fn power(light: &Light, scene: &SceneExtent) -> f64 {
         PI * scene.radius * scene.radius * luminance(light.emission)
     }

@@ -46,19 +46,19 @@ fn splat(c: [f32; 3]) -> Vec3x8 {
     Vec3x8::splat(c[0], c[1], c[2])
 }
 
-/// A cell per lane and the place in it.
-struct Place {
+/// A cell of the map per lane, and the position in it.
+struct MapPosition {
     column: [u32; 8],
     row: [u32; 8],
-    /// From the left texels to the right ones.
+    /// Position from the left texels to the right ones.
     x: F32x8,
-    /// From the upper texels to the lower ones, linear in theta.
+    /// Position from the upper texels to the lower ones, linear in theta.
     y: F32x8,
 }
 
-/// Where the direction `d` in map space looks. NaN gives some cell.
+/// Position on the map in the direction `d` of map space. NaN gives some cell.
 #[inline(always)]
-fn place(e: &Environment, d: Vec3x8) -> Place {
+fn map_position(e: &Environment, d: Vec3x8) -> MapPosition {
     let theta = (d.x * d.x + d.z * d.z).sqrt().atan2(d.y);
     let rows = e.height.max(2) - 1;
     let v = (theta * (FRAC_1_PI * rows as f32)).clamp(0.0, rows as f32);
@@ -68,7 +68,7 @@ fn place(e: &Environment, d: Vec3x8) -> Place {
     let left = c.floor();
     let width = e.width.clamp(1, i32::MAX as u32) as i32;
     let wrap = |i: i32| i.rem_euclid(width) as u32;
-    Place {
+    MapPosition {
         column: left.to_i32().to_array().map(wrap),
         row: row.to_i32().to_array().map(|j| j as u32),
         x: c - left,
@@ -78,7 +78,7 @@ fn place(e: &Environment, d: Vec3x8) -> Place {
 
 /// The four texels around each cell of `mask`: upper left, upper right, lower left, lower right. Zeros elsewhere.
 #[inline(always)]
-fn corners(scene: &Scene<'_>, e: &Environment, at: &Place, mask: Mask8) -> [Vec3x8; 4] {
+fn corners(scene: &Scene<'_>, e: &Environment, at: &MapPosition, mask: Mask8) -> [Vec3x8; 4] {
     let mut out = [[[0.0f32; 3]; 8]; 4];
     for i in mask.lanes() {
         let left = at.column[i] as usize;
@@ -134,7 +134,7 @@ impl Band {
         self.flipped.select(1.0 - x, x)
     }
 
-    /// Share of the band's solid angle above the place `y` in it, both downwards from 0 to 1.
+    /// Share of the band's solid angle above the height `y` in it, both downwards from 0 to 1.
     #[inline(always)]
     fn share_above(&self, y: F32x8) -> F32x8 {
         let y = self.turn(y);
@@ -143,7 +143,7 @@ impl Band {
         self.turn((above / self.share).clamp(0.0, 1.0))
     }
 
-    /// (cos theta, sin theta) of the place with `t` of the band's solid angle above it.
+    /// (cos theta, sin theta) of the height with `t` of the band's solid angle above it.
     #[inline(always)]
     fn polar(&self, t: F32x8) -> (F32x8, F32x8) {
         let top = (self.row * self.half_step).sin_cos_2pi().0;
@@ -182,7 +182,7 @@ fn table<'s>(scene: &Scene<'s>, e: &Environment, row: Option<u32>) -> &'s [Alias
 
 /// Solid-angle density of the map's sampler in the lanes of `mask`.
 #[inline(always)]
-fn map_density(scene: &Scene<'_>, e: &Environment, at: &Place, c: [Vec3x8; 4], mask: Mask8) -> F32x8 {
+fn map_density(scene: &Scene<'_>, e: &Environment, at: &MapPosition, c: [Vec3x8; 4], mask: Mask8) -> F32x8 {
     let rows = table(scene, e, None);
     let mut chosen = [0.0f32; 8];
     for i in mask.lanes() {
@@ -209,7 +209,7 @@ impl LightModel for Surroundings {
         let Some(e) = scene.environment else { return LightSample8::NONE };
         let (wi, radiance, pdf) = if e.kind == EnvironmentKind::Map as u32 {
             let wi = sample_map(scene, e, words, mask);
-            let at = place(e, to_local(e, wi));
+            let at = map_position(e, to_local(e, wi));
             let c = corners(scene, e, &at, mask);
             (wi, bilinear(c, at.x, at.y) * splat(e.radiance), map_density(scene, e, &at, c, mask))
         } else {
@@ -229,15 +229,15 @@ impl LightModel for Surroundings {
         }
     }
 
-    /// Through a disk of the scene's radius.
+    /// Power through a disk of the scene's radius.
     fn power(_: &Light, scene: &SceneExtent) -> f64 {
         PI * scene.radius * scene.radius * scene.environment
     }
 }
 
-/// Unit world direction from the map's sampler. The words choose row, cell, and place in the cell; the place takes
-/// 16 bits for each coordinate from the last word, and below them the 8 lowest bits of the first two, which move the
-/// choice of row and cell in 2^-24 of the cases only.
+/// Unit world direction from the map's sampler. The words choose row, cell, and position in the cell; the position
+/// takes 16 bits for each coordinate from the last word, and below them the 8 lowest bits of the first two, which move
+/// the choice of row and cell in 2^-24 of the cases only.
 #[inline(always)]
 fn sample_map(scene: &Scene<'_>, e: &Environment, words: [U32x8; 3], mask: Mask8) -> Vec3x8 {
     // lanes outside the mask read the first entries, which are near
@@ -252,7 +252,7 @@ fn sample_map(scene: &Scene<'_>, e: &Environment, words: [U32x8; 3], mask: Mask8
     let low = |w: U32x8| (w & U32x8::splat(0xff)) << 8;
     let u0 = ((words[2] & U32x8::splat(0xffff_0000)) | low(words[0])).to_unit();
     let u1 = ((words[2] << 16) | low(words[1])).to_unit();
-    let at = Place { column, row, x: F32x8::ZERO, y: F32x8::ZERO };
+    let at = MapPosition { column, row, x: F32x8::ZERO, y: F32x8::ZERO };
     let l = relative_luminance(corners(scene, e, &at, mask));
     let t = sample_linear(u0, l[0] + l[1], l[2] + l[3]);
     let x = sample_linear(u1, lerp(t, l[0], l[2]), lerp(t, l[1], l[3]));
@@ -271,7 +271,7 @@ pub fn environment_radiance(scene: &Scene<'_>, dir: Vec3x8, mask: Mask8) -> Vec3
     if e.kind != EnvironmentKind::Map as u32 {
         return radiance.zero_unless(mask);
     }
-    let at = place(e, to_local(e, dir));
+    let at = map_position(e, to_local(e, dir));
     (bilinear(corners(scene, e, &at, mask), at.x, at.y) * radiance).zero_unless(mask)
 }
 
@@ -288,7 +288,7 @@ pub fn environment_pdf<S: LightSelector>(
 ) -> F32x8 {
     let Some(e) = scene.environment else { return F32x8::ZERO };
     let density = if e.kind == EnvironmentKind::Map as u32 {
-        let at = place(e, to_local(e, dir));
+        let at = map_position(e, to_local(e, dir));
         map_density(scene, e, &at, corners(scene, e, &at, mask), mask)
     } else {
         F32x8::splat(UNIFORM_SPHERE)

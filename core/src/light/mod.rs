@@ -1,11 +1,11 @@
-//! Emission and its sampling. One kind per file, which implements [`LightModel`]; `models!` is the table of them, its
+//! Emission and its sampling. One kind per file, which implements `LightModel`; `models!` is the table of them, its
 //! other half the table of `scene/blob/lights.rs`.
 //!
 //! | kind | file | technique | density | power |
 //! |---|---|---|---|---|
 //! | area | `area.rs` | uniform on the triangle | r^2 / (A cos) | pi A L |
-//! | environment map | `environment.rs` | alias tables over cells, bilinear luminance inside | exact | pi R^2 times its integral |
-//! | constant environment | `environment.rs` | uniform sphere | 1 / (4 pi) | pi R^2 times its integral |
+//! | environment map | `environment.rs` | alias tables over cells, bilinear luminance inside | exact | pi R^2 x integral |
+//! | constant environment | `environment.rs` | uniform sphere | 1 / (4 pi) | pi R^2 x integral |
 //! | point | `point.rs` | the point | delta | 4 pi I |
 //! | directional | `directional.rs` | the direction | delta | pi R^2 E |
 //!
@@ -87,16 +87,17 @@ impl LightSample8 {
     }
 }
 
-/// How a light is chosen for a reference point. [`PowerSelector`] is built in; hosts may bring their own, such as a
+/// Choice of a light for a reference point. [`PowerSelector`] is built in; hosts may bring their own, such as a
 /// light tree.
 ///
 /// Pictures are right if both functions tell the same probabilities and every light that could be seen from a point has
 /// one above 0: point and directional lights are found in no other way. How good the choice is shows in the noise only.
 ///
 /// ```
-/// use croupier::light::LightSelector;
-/// use croupier::simd::{F32x8, Mask8, U32x8, Vec3x8};
-/// use croupier::{Plan, Scene, Session, SessionError, accel::WideBvh, profile::Full};
+/// use croupier::unstable::light::LightSelector;
+/// use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
+/// use croupier::{Plan, Scene, Session, SessionError};
+/// use croupier::unstable::{accel::WideBvh, profile::Full};
 ///
 /// /// All lights alike.
 /// struct Uniform(u32);
@@ -131,7 +132,7 @@ pub trait LightSelector {
     fn probability(&self, point: Vec3x8, normal: Vec3x8, light: U32x8, mask: Mask8) -> F32x8;
 }
 
-/// What lanes without a light read: black, of no kind.
+/// Light of lanes without one: black, of no kind.
 const IDLE: &Light = &Light {
     kind: NONE,
     triangle: NONE,
@@ -171,9 +172,9 @@ impl<'s> Chosen<'s> {
     }
 }
 
-/// One kind of light: what its file provides.
+/// Contract of a light kind: what its file provides.
 trait LightModel {
-    /// No scattered ray can find it.
+    /// Whether no scattered ray can find the light.
     const DELTA: bool;
 
     /// A direction to the light in the lanes of `mask`, seen from `p`, from three random words; the result's `pdf`
@@ -243,7 +244,7 @@ const _: () = {
 ///
 /// `p` are the reference points, `n` their unit normals (a hint for the selector only; nothing below the horizon is
 /// dropped, since surfaces may transmit). `words` are four independent 32-bit random numbers: the first chooses the
-/// light, the others the place on it. Lanes that come out not `valid` scatter no direct light in this sample: black,
+/// light, the others the position on it. Lanes that come out not `valid` scatter no direct light in this sample: black,
 /// edge-on, behind the light, touching it, or at a distance whose square overflows.
 #[inline(always)]
 pub fn sample<S: LightSelector>(

@@ -20,7 +20,8 @@ pub(super) struct Point;
 impl LightModel for Point {
     const DELTA: bool = true;
 
-    /// Irradiance I / r^2 on a surface facing the light. Nothing arrives at the point itself: no direction.
+    /// Sample with the irradiance I / r^2 on a surface facing the light. Nothing arrives at the point itself: no
+    /// direction.
     #[inline(always)]
     fn sample(_: &Scene<'_>, light: &Chosen<'_>, p: Vec3x8, _: [U32x8; 3], _: Mask8) -> LightSample8 {
         let d = light.vector - p;
@@ -42,7 +43,7 @@ impl LightModel for Point {
         }
     }
 
-    /// Over all directions.
+    /// Power over all directions.
     fn power(light: &Light, _: &SceneExtent) -> f64 {
         2.0 * TAU * luminance(light.emission)
     }

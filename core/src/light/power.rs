@@ -11,7 +11,7 @@ pub fn luminance(rgb: [f32; 3]) -> f64 {
     LUMINANCE[0] * r + LUMINANCE[1] * g + LUMINANCE[2] * b
 }
 
-/// What the powers of a scene's lights depend on beside the lights.
+/// Facts about the scene on which the powers of its lights depend.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneExtent {
     /// Radius of a sphere around the scene, world units.

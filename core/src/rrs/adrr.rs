@@ -1,9 +1,9 @@
-//! Adjoint-driven roulette (Vorba and Krivanek 2016): the roulette of [`super::Adrrs`] without its splitting.
+//! Adjoint-driven roulette (Vorba and Křivánek, SIGGRAPH 2016): the roulette of [`super::Adrrs`] without its splitting.
 
 use super::{RrsStrategy, Space, Vertices8, adrrs};
 use croupier_simd::F32x8;
 
-/// The weight window's factor, at most 1.
+/// Weight window without splitting: its factor, at most 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Adrr;
 

@@ -1,5 +1,5 @@
-//! Adjoint-driven roulette and splitting (Vorba and Krivanek 2016): a path keeps the weight at which it is expected to
-//! contribute one pixel's worth. What lies in a window around that is left alone.
+//! Adjoint-driven roulette and splitting (Vorba and Křivánek, SIGGRAPH 2016): a path keeps the weight at which its
+//! expected contribution is the radiance of its pixel. Inside a window around that weight the factor is 1.
 //!
 //! | parameter | unit | value |
 //! |---|---|---|
@@ -9,14 +9,14 @@
 use super::{Classic, RrsStrategy, Space, Vertices8};
 use croupier_simd::F32x8;
 
-/// Lower end of the window.
+/// Lower end of the window, expected contribution over the pixel.
 const LOWER: f32 = 1.0 / 3.0;
-/// Upper end.
+/// Upper end of the window, expected contribution over the pixel.
 const UPPER: f32 = 5.0 / 3.0;
-/// Samples of a bin at which its mean counts as much as the rule that needs none.
+/// Samples of a bin at which its mean has as much weight as the rule that needs none.
 const TRUST: f32 = 32.0;
 
-/// The weight window's factor; that of `classic` where nothing is known.
+/// Weight window: the factor that brings a path into it; the factor of `classic` where nothing is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Adrrs;
 
@@ -26,7 +26,7 @@ impl Adrrs {
     }
 }
 
-/// The factor that brings an expected contribution into the window.
+/// Factor that brings an expected contribution into the window.
 #[inline(always)]
 pub(super) fn window(v: F32x8) -> F32x8 {
     let (low, high) = (F32x8::splat(LOWER), F32x8::splat(UPPER));
@@ -34,7 +34,7 @@ pub(super) fn window(v: F32x8) -> F32x8 {
     v.gt(high).select(v / high, s)
 }
 
-/// [`window`], grown out of `classic` with the samples that stand behind it.
+/// Blend of `classic` and [`window`] by the samples behind the bin's mean.
 #[inline(always)]
 pub(super) fn guarded(v: &Vertices8) -> F32x8 {
     let l = &v.learned;

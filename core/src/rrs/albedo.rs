@@ -1,14 +1,14 @@
-//! Roulette by albedo (EARS sections 2 and 6.4): of this vertex, or of all vertices so far multiplied, which path
-//! guiding needs because a guided throughput says nothing about how much light is left.
+//! Roulette by albedo (EARS, SIGGRAPH 2022, sections 2 and 6.4): of this vertex, or the product over all vertices so
+//! far. Path guiding needs the product, because a guided throughput does not say how much light is left.
 
 use super::{RrsStrategy, Vertices8};
 use core::fmt;
 use croupier_simd::F32x8;
 
-/// Mean albedo of the vertex, or the product along the path.
+/// Roulette by the mean albedo of the vertex, or by the product along the path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Albedo {
-    /// Multiply the albedos of all vertices so far.
+    /// Product of the albedos of all vertices so far, instead of the albedo of this vertex.
     pub product: bool,
 }
 
@@ -17,7 +17,7 @@ impl Albedo {
         match options {
             "" => Some(Self { product: false }),
             "product" => Some(Self { product: true }),
-            _ => Option::None,
+            _ => None,
         }
     }
 }

@@ -1,18 +1,19 @@
-//! Factors per pixel and path length (Bolin and Meyer 1997): those of EARS with statistics that know nothing but the
-//! block of pixels and the depth. Two vertices of one depth under one pixel get the same factor however much they
-//! differ.
+//! Factors per pixel and path length (Bolin and Meyer, "An error metric for Monte Carlo ray tracing", 1997): the rule
+//! of EARS with statistics by block of pixels and depth only. Two vertices of one depth under one pixel get the same
+//! factor however much they differ.
 //!
-//! Guarded as [`super::Ears`] is: trusted at once, statistics of a few fireflies split paths for ever or kill them, and
-//! come back as samples so rare that a picture of 512 samples a pixel looks biased (kitchen).
+//! Guarded like [`super::Ears`]: with statistics that are trusted at once, a few fireflies make paths split without end
+//! or terminate, and their light comes back in samples so rare that a picture of 512 samples per pixel looks biased
+//! (scene kitchen).
 
 use super::{RrsStrategy, Space, Vertices8, ears};
 use core::fmt;
 use croupier_simd::F32x8;
 
-/// The most efficient factor for the contributions of this depth; that of `classic` where little is known.
+/// Most efficient factor for the contributions of this depth; the factor of `classic` where little is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BolinMeyer {
-    /// Trust statistics at once.
+    /// Full trust in statistics from the first sample on.
     pub plain: bool,
 }
 

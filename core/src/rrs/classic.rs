@@ -1,5 +1,5 @@
-//! The baseline of the EARS paper (section 6): throughput times albedo from the fifth bounce. The absolute form is what
-//! other renderers mean by "classic"; the authors' program plays relative to the pixel, which suits dark pictures.
+//! Baseline of the EARS paper (SIGGRAPH 2022, section 6): throughput times albedo from the fifth bounce. Other
+//! renderers mean the absolute form; the authors' program plays relative to the pixel, which suits dark pictures.
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
@@ -10,12 +10,12 @@ use super::{RrsStrategy, Vertices8};
 use core::fmt;
 use croupier_simd::{F32x8, U32x8};
 
-/// max rgb of (prefix weight x albedo), over the pixel if `relative`, at most 1, from bounce `start`.
+/// Roulette by throughput times albedo: the largest rgb, over the pixel if `relative`, at most 1, from bounce `start`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Classic {
-    /// First bounce that plays.
+    /// First bounce at which roulette is played.
     pub start: u32,
-    /// Over the estimate of the pixel.
+    /// Throughput over the estimate of the pixel, instead of absolute throughput.
     pub relative: bool,
 }
 
@@ -30,7 +30,7 @@ impl Classic {
         let (start, relative) = match options.split_once(':') {
             Some((start, "relative")) => (start, true),
             Some(_) => return None,
-            Option::None => (options, false),
+            None => (options, false),
         };
         super::number(start, 5).filter(|&s: &u32| s >= 1).map(|start| Self { start, relative })
     }

@@ -1,9 +1,10 @@
-//! Roulette by the last bounce's weight (seed 002): the throughput then stays near what it was.
+//! Roulette by the weight of the last bounce, `f cos / pdf` (Arvo and Kirk, SIGGRAPH 1990): the throughput then stays
+//! near its value before the bounce.
 
 use super::{RrsStrategy, Vertices8};
 use croupier_simd::F32x8;
 
-/// The largest rgb of the last bounce's weight, at most 1.
+/// Roulette by the last bounce: the largest rgb of its weight, at most 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Contribution;
 

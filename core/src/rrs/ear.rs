@@ -1,13 +1,13 @@
-//! Efficiency-aware roulette: [`super::Ears`] without splitting.
+//! Efficiency-aware roulette (EARS, SIGGRAPH 2022): [`super::Ears`] without splitting.
 
 use super::{RrsStrategy, Space, Vertices8, ears};
 use core::fmt;
 use croupier_simd::F32x8;
 
-/// The most efficient factor of at most 1.
+/// Efficiency-aware roulette: the most efficient factor of at most 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ear {
-    /// Trust statistics at once, as the paper does.
+    /// Full trust in statistics from the first sample on, as in the paper.
     pub plain: bool,
 }
 

@@ -1,9 +1,9 @@
-//! Efficiency-aware roulette and splitting (Rath et al., SIGGRAPH 2022): the factors that make error x cost of the
-//! whole picture least, from local and global variance and cost (eq. 32), as a fixed point over the iterations.
+//! Efficiency-aware roulette and splitting (Rath et al., SIGGRAPH 2022): the factors that minimise variance x cost of
+//! the whole picture, from local and global variance and cost (eq. 32), as a fixed point over the iterations.
 //!
-//! Where little is known the paper's rule acts on noise: a bin whose few samples found nothing kills every path. So the
-//! factor grows out of simpler rules, geometrically: `classic` without samples, `adrrs` (which needs a mean) with some,
-//! EARS (which needs a second moment) with more.
+//! Where little is known the paper's rule acts on noise: a bin whose few samples found nothing terminates every path.
+//! So the factor is a geometric blend of rules by the number of samples: `classic` without any, `adrrs` (which needs a
+//! mean) with some, EARS (which needs a second moment) with more.
 //!
 //! | parameter | unit | value |
 //! |---|---|---|
@@ -15,19 +15,19 @@ use super::{Classic, Learned8, MAX_FACTOR, MIN_FACTOR, RrsStrategy, Space, Verti
 use core::fmt;
 use croupier_simd::{F32x8, I32x8, Vec3x8};
 
-/// Samples at which the mean counts half.
+/// Samples at which the rule of the mean has half the weight.
 const TRUST_MEAN: f32 = 32.0;
-/// Samples at which the second moment counts half.
+/// Samples at which the rule of the second moment has half the weight.
 pub(super) const TRUST_MOMENT: f32 = 256.0;
-/// Bits of 1.
+/// Bits of the float 1.
 const ONE: i32 = 0x3F80_0000;
-/// Throughput (times albedo) that roulette may lead to.
+/// Largest throughput (times albedo) that roulette may lead to.
 const MOST_THROUGHPUT: f32 = 10.0;
 
-/// The most efficient factor.
+/// Efficiency-aware roulette and splitting: the most efficient factor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ears {
-    /// Trust statistics at once, as the paper does.
+    /// Full trust in statistics from the first sample on, as in the paper.
     pub plain: bool,
 }
 
@@ -45,34 +45,35 @@ pub(super) fn parse_plain(options: &str) -> Option<bool> {
     }
 }
 
-/// Eq. 27, robust where moment and variance disagree: roulette by the moment, splitting by the variance, else neither.
+/// Factor of eq. 27, robust where moment and variance disagree: roulette by the moment, splitting by the variance, else
+/// 1.
 #[inline(always)]
 pub(super) fn split_or_kill(l: &Learned8, beta: Vec3x8) -> F32x8 {
     let one = F32x8::ONE;
-    let (kill, split) = (l.efficient_square(beta, l.local.moment), l.efficient_square(beta, l.local.variance));
-    kill.le(one).select(kill, split.max(one)).sqrt()
+    let (roulette, splitting) = (l.efficient_square(beta, l.local.moment), l.efficient_square(beta, l.local.variance));
+    roulette.le(one).select(roulette, splitting.max(one)).sqrt()
 }
 
-/// Steps of a float from 1 to a factor: 2^23 times its logarithm to base 2, linear between powers of 2. Means of levels
-/// are geometric means within 6 %, exact at both ends, and take no logarithm.
+/// Level of a factor: number of floats from 1 to it, which is 2^23 times its logarithm to base 2, linear between powers
+/// of 2. Means of levels are geometric means within 6 %, exact at both ends, and take no logarithm.
 #[inline(always)]
 fn level(s: F32x8) -> F32x8 {
     (s.clamp(MIN_FACTOR, MAX_FACTOR).to_bits().to_i32() - I32x8::splat(ONE)).to_f32()
 }
 
-/// The factor of a [`level`].
+/// Factor of a [`level`].
 #[inline(always)]
 fn from_level(level: F32x8) -> F32x8 {
     F32x8::from_bits((level.to_i32() + I32x8::splat(ONE)).to_u32())
 }
 
-/// The least factor of roulette that keeps the throughput within its limit, at most 1.
+/// Smallest factor of roulette that keeps the throughput within its limit, at most 1.
 #[inline(always)]
 pub(super) fn least_throughput(beta: Vec3x8, albedo: Vec3x8) -> F32x8 {
     ((beta * albedo).max_component() / MOST_THROUGHPUT).min(F32x8::ONE)
 }
 
-/// `s` where much is known, simpler rules where less is.
+/// Blend of `s`, where much is known, with simpler rules, where less is.
 #[inline(always)]
 pub(super) fn grown(v: &Vertices8, s: F32x8, plain: bool) -> F32x8 {
     let l = &v.learned;
@@ -86,8 +87,8 @@ pub(super) fn grown(v: &Vertices8, s: F32x8, plain: bool) -> F32x8 {
     let broken = known.and_not(s.is_finite() & window.is_finite());
     let learned = blend(level(window), level(s), l.local.trust(TRUST_MOMENT));
     let s = known.select(from_level(blend(level(classic), learned, l.local.trust(TRUST_MEAN))), classic);
-    // what is killed out of ignorance comes back as a few samples of enormous weight: no factor below 1 brings the
-    // throughput over the limit
+    // paths terminated for lack of statistics come back as a few samples of enormous weight: no factor below 1 brings
+    // the throughput over the limit
     let s = s.max(least_throughput(v.beta, v.albedo));
     // levels hide what is not finite, `Strategy::factor` looks for it
     broken.select(F32x8::splat(f32::NAN), s)

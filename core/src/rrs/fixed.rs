@@ -1,4 +1,4 @@
-//! A constant factor at every vertex: the workhorse that proves roulette and splitting.
+//! Constant factor at every vertex, for tests of roulette and splitting.
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
@@ -8,7 +8,7 @@ use super::{MAX_FACTOR, MIN_FACTOR, RrsStrategy, Vertices8};
 use core::fmt;
 use croupier_simd::F32x8;
 
-/// The factor.
+/// Constant factor at every vertex.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fixed {
     /// Samples per vertex.

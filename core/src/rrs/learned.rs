@@ -1,9 +1,9 @@
-//! What strategies may know from earlier iterations.
+//! Learned statistics as strategies see them.
 
 use crate::names::names;
 use croupier_simd::{F32x8, LUMINANCE, Vec3x8};
 
-/// How a colour becomes a number.
+/// Norm of a colour: how errors of the channels become one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Norm {
     /// Largest of r, g, b.
@@ -28,7 +28,7 @@ impl Norm {
         }
     }
 
-    /// The norm of each lane.
+    /// Norm of each lane.
     #[inline(always)]
     pub fn of(self, c: Vec3x8) -> F32x8 {
         match self {
@@ -45,7 +45,7 @@ impl Norm {
 
 names!(Norm: Mean = "mean", Luminance = "luminance", Max = "max");
 
-/// Over what local statistics are kept.
+/// Domain of local statistics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Space {
     /// Cells of the scene and directions.
@@ -59,21 +59,21 @@ pub enum Space {
 pub struct Local8 {
     /// Mean of one sample's reflected radiance, rgb (EARS, eq. 36).
     pub mean: Vec3x8,
-    /// Mean of its square, at least `mean^2` (eq. 35).
+    /// Mean square of one sample's reflected radiance, at least `mean^2` (eq. 35).
     pub moment: Vec3x8,
-    /// Its variance at a point, without the spread of the mean over the cell as far as pairs of samples of one vertex
+    /// Variance of one sample at a point, without the spread of the mean over the cell as far as pairs of samples of one vertex
     /// tell; at most `moment` (eq. 37).
     pub variance: Vec3x8,
     /// Mean counted cost of one sample ([`crate::cost::COST_BOUNCE`] and its like; eq. 38).
     pub cost: F32x8,
-    /// Mean square of its light sample over `moment`, over all channels, at most 1.
+    /// Mean square of the contribution of next event estimation over `moment`, over all channels, at most 1.
     pub nee_share: F32x8,
     /// Confidence: samples behind these numbers, older ones discounted; 0 where nothing is known.
     pub count: F32x8,
 }
 
 impl Local8 {
-    /// Nothing known.
+    /// Statistics where nothing is known.
     pub const NONE: Self = Self {
         mean: Vec3x8::ZERO,
         moment: Vec3x8::ZERO,
@@ -93,37 +93,37 @@ impl Local8 {
 /// Statistics that were frozen before the iteration began, one vertex per lane: of the picture and of the vertex.
 #[derive(Clone, Copy, Debug)]
 pub struct Learned8 {
-    /// What a squared error of the pixel's rgb counts in the error of the picture: 1 / (I^2 + 0.01) for the relative
-    /// objective with I the estimate of the pixel, 1 for the absolute one.
+    /// Weight of a squared error of the pixel in the error of the picture, per channel: 1 / (I^2 + 0.01) for the
+    /// relative objective with I the estimate of the pixel, 1 for the absolute one.
     pub error_weight: Vec3x8,
-    /// How the errors of the channels become one.
+    /// Norm over the channels.
     pub norm: Norm,
-    /// Mean cost of a camera sample over its mean error (eqs. 33, 34); 0 while unknown.
+    /// Mean cost of a camera sample over its mean weighted squared error (eqs. 33, 34); 0 while unknown.
     pub cost_over_variance: F32x8,
-    /// Statistics of the vertex's samples, in radiance.
+    /// Statistics of the vertex's samples, of reflected radiance.
     pub local: Local8,
 }
 
 impl Learned8 {
-    /// Nothing known: errors count absolutely.
+    /// Statistics where nothing is known; errors are absolute.
     pub const NONE: Self =
         Self { error_weight: Vec3x8::ONE, norm: Norm::Mean, cost_over_variance: F32x8::ZERO, local: Local8::NONE };
 
-    /// The square of the factor that is best for samples whose square is expected to be `r`: eq. 32 for prefix weight
-    /// `beta`.
+    /// Square of the most efficient factor (eq. 32) at prefix weight `beta`, for samples whose second moment or
+    /// variance is `r`.
     #[inline(always)]
     pub fn efficient_square(&self, beta: Vec3x8, r: Vec3x8) -> F32x8 {
         let error = self.norm.of(beta * beta * self.error_weight * r);
         error * self.cost_over_variance / self.local.cost
     }
 
-    /// The expected contribution of a vertex in units of its pixel, mean over the channels.
+    /// Expected contribution of a vertex in units of its pixel, mean over the channels.
     #[inline(always)]
     pub fn contribution(&self, beta: Vec3x8) -> F32x8 {
         (beta * self.local.mean * self.root_error_weight()).mean()
     }
 
-    /// Per channel: 1 over the pixel for the relative objective, 1 for the absolute.
+    /// Square root of the error weight, per channel: 1 over the pixel for the relative objective, 1 for the absolute.
     #[inline(always)]
     pub fn root_error_weight(&self) -> Vec3x8 {
         let i = self.error_weight;
@@ -135,8 +135,8 @@ impl Learned8 {
 mod tests {
     use super::*;
 
-    /// One colour and eight have the same norm, and white keeps its value. Killed by: weights of another table in one of
-    /// the two, channels exchanged, weights that do not add up to 1.
+    /// One colour and eight have the same norm, and white keeps its value. Killed by: weights of another table in one
+    /// of the two, channels exchanged, weights that do not add up to 1.
     #[test]
     fn norms_of_one_and_of_eight_agree() {
         for norm in [Norm::Max, Norm::Luminance, Norm::Mean] {

@@ -1,10 +1,11 @@
-//! Roulette for light samples ([`crate::Settings::shadow_roulette`]), in two rounds: before one is drawn, by what those
-//! of its place have given; before its ray is traced, by what it would give.
+//! Roulette for next event estimation ([`crate::Settings::shadow_roulette`]), in two rounds: before a light is sampled,
+//! by what light samples of the same bin have contributed; before the shadow ray is traced, by what this one would
+//! contribute.
 //!
-//! Both are eq. 32 of EARS with another second moment and the cost of a shadow ray, as roulette only (Veach 1997,
-//! section 10.4.1, "efficiency-optimised Russian roulette", has the same idea of a threshold). That cost stands for
-//! drawing as well, which is not counted as work. A sample that survives both counts over both chances, each of at
-//! least [`MIN_FACTOR`], so a wrong guess costs noise, never the mean.
+//! Both are eq. 32 of EARS with another second moment and the cost of a shadow ray, as roulette only (compare
+//! "efficiency-optimized Russian roulette", Veach 1997, section 10.4.1). That cost covers sampling the light as well,
+//! which is not counted as work. A light sample that survives both rounds is divided by both probabilities, each at
+//! least [`MIN_FACTOR`], so wrong statistics cost noise, never bias.
 
 use super::ears::{TRUST_MOMENT, least_throughput};
 use super::{Learned8, MIN_FACTOR};
@@ -12,9 +13,9 @@ use crate::cost::COST_SHADOW;
 use croupier_simd::{F32x8, Vec3x8};
 
 impl Learned8 {
-    /// Chance in [[`MIN_FACTOR`], 1] that a sample of a vertex draws a light sample: `beta` is the prefix weight of the
-    /// vertex's samples, roulette included. 1 where nothing is known; it grows out of that with the samples behind the
-    /// second moment, and keeps the limit of throughput, as [`super::Ears`] does.
+    /// Probability in [[`MIN_FACTOR`], 1] that a sample of a vertex uses next event estimation: `beta` is the prefix
+    /// weight of the vertex's samples, roulette included. It is 1 where nothing is known, is blended by the samples
+    /// behind the second moment, and keeps the limit of throughput, like the factor of [`super::Ears`].
     #[inline(always)]
     pub fn nee_probability(&self, beta: Vec3x8, albedo: Vec3x8) -> F32x8 {
         let one = F32x8::ONE;
@@ -25,8 +26,8 @@ impl Learned8 {
         known.select(grown.max(least_throughput(beta, albedo)).clamp(MIN_FACTOR, 1.0), one)
     }
 
-    /// Chance in [[`MIN_FACTOR`], 1] that the ray to a light sample is traced, which adds the radiance `value` to the
-    /// camera sample if nothing hides it; `root` is the square root of the chance that nothing does.
+    /// Probability in [[`MIN_FACTOR`], 1] that the shadow ray of a light sample is traced: `value` is the radiance that
+    /// it adds to the camera sample if unoccluded, `root` the square root of the probability of that.
     #[inline(always)]
     pub fn shadow_ray_probability(&self, value: Vec3x8, root: F32x8) -> F32x8 {
         let error = self.norm.of(value * value * self.error_weight);

@@ -1,8 +1,8 @@
 //! Russian roulette and splitting: how many samples a vertex gets.
 //!
 //! A strategy gives a real factor `s` per lane; [`comb()`] rounds the factors of a packet to sample counts with
-//! E\[n\] = s. Every estimate is divided by `s`, never by `n`, so any positive `s` that was fixed before the samples
-//! were drawn leaves the mean alone (EARS, SIGGRAPH 2022, eq. 10). How `s` is learned: docs/LEARNING.md.
+//! E\[n\] = s. Every estimate is divided by `s`, never by `n`, so it is unbiased for any positive `s` that was fixed
+//! before the samples were drawn (EARS, SIGGRAPH 2022, eq. 10). How `s` is learned: docs/LEARNING.md.
 //!
 //! A new strategy is one file and one line in the table below.
 
@@ -44,10 +44,10 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Smallest factor of an unbiased strategy.
 pub const MIN_FACTOR: f32 = 0.05;
-/// Largest factor.
+/// Largest factor of an unbiased strategy.
 pub const MAX_FACTOR: f32 = 20.0;
 
-/// What a strategy may look at, one vertex per lane.
+/// Input of strategies, one vertex per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Vertices8 {
     /// Prefix weight: throughput over all factors so far.
@@ -62,26 +62,26 @@ pub struct Vertices8 {
     pub depth: U32x8,
     /// Phong exponent that corresponds to the material's roughness; 0 unless [`Strategy::needs_shininess`].
     pub shininess: F32x8,
-    /// What was learned before the iteration.
+    /// Statistics learned before the iteration.
     pub learned: Learned8,
 }
 
-/// One way to choose factors.
+/// Contract of a strategy: a rule for factors.
 pub trait RrsStrategy {
     /// Does [`Self::factor`] read `albedo` or `albedo_product`?
     const NEEDS_ALBEDO: bool = false;
 
-    /// Does it read `shininess`?
+    /// Does [`Self::factor`] read `shininess`?
     const NEEDS_SHININESS: bool = false;
 
-    /// Is its factor the most efficient one (EARS, eq. 32), the rule of roulette for light
-    /// samples ([`crate::Settings::shadow_roulette`])?
+    /// Is the factor the most efficient one (EARS, eq. 32), which is also the rule of roulette for next event
+    /// estimation ([`crate::Settings::shadow_roulette`])?
     const EFFICIENCY_AWARE: bool = false;
 
-    /// Does it read the picture's part of `learned`?
+    /// Does [`Self::factor`] read the picture's part of `learned`?
     const NEEDS_IMAGE: bool = false;
 
-    /// Over what does it learn local statistics, if at all? They need the albedo and the picture.
+    /// Domain of the local statistics that the strategy learns, if any. They need the albedo and the picture.
     const SPACE: Option<Space> = Option::None;
 
     /// With these options, is the picture's part of `learned` needed ([`Self::NEEDS_IMAGE`])?
@@ -94,21 +94,21 @@ pub trait RrsStrategy {
         Ok(())
     }
 
-    /// The factor per lane, before clamping to [[`MIN_FACTOR`], [`MAX_FACTOR`]]. Lanes that are not finite count as 1.
+    /// Factor per lane, before clamping to [[`MIN_FACTOR`], [`MAX_FACTOR`]]. Lanes that are not finite count as 1.
     fn factor(&self, v: &Vertices8) -> F32x8;
 }
 
 macro_rules! strategies {
     ($($(#[$doc:meta])* $name:ident, $text:literal, $help:literal;)*) => {
-        /// A strategy with its parameters.
+        /// Strategy of roulette and splitting, with its parameters.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub enum Strategy { $($(#[$doc])* $name($name)),* }
 
         impl Strategy {
-            /// Names and one-line descriptions.
+            /// Names and one-line descriptions of all strategies.
             pub const TABLE: &'static [(&'static str, &'static str)] = &[$(($text, $help)),*];
 
-            /// The name in [`Self::TABLE`].
+            /// Name in [`Self::TABLE`].
             pub const fn name(&self) -> &'static str {
                 match self { $(Self::$name(_) => $text),* }
             }
@@ -122,39 +122,39 @@ macro_rules! strategies {
                 }
             }
 
-            /// See [`RrsStrategy::NEEDS_ALBEDO`].
+            /// Does the factor depend on the albedo ([`RrsStrategy::NEEDS_ALBEDO`])?
             pub fn needs_albedo(&self) -> bool {
                 match self { $(Self::$name(_) => <$name as RrsStrategy>::NEEDS_ALBEDO),* }
             }
 
-            /// See [`RrsStrategy::NEEDS_SHININESS`].
+            /// Does the factor depend on the shininess ([`RrsStrategy::NEEDS_SHININESS`])?
             pub fn needs_shininess(&self) -> bool {
                 match self { $(Self::$name(_) => <$name as RrsStrategy>::NEEDS_SHININESS),* }
             }
 
-            /// Does it need the statistics of the picture?
+            /// Does the factor depend on statistics of the picture?
             pub fn needs_image(&self) -> bool {
                 self.space().is_some() || match self {
                     $(Self::$name(x) => <$name as RrsStrategy>::NEEDS_IMAGE && x.plays_relative()),*
                 }
             }
 
-            /// See [`RrsStrategy::EFFICIENCY_AWARE`].
+            /// Is the factor the most efficient one ([`RrsStrategy::EFFICIENCY_AWARE`])?
             pub fn is_efficiency_aware(&self) -> bool {
                 match self { $(Self::$name(_) => <$name as RrsStrategy>::EFFICIENCY_AWARE),* }
             }
 
-            /// See [`RrsStrategy::SPACE`].
+            /// Domain of the local statistics that the strategy learns ([`RrsStrategy::SPACE`]).
             pub fn space(&self) -> Option<Space> {
                 match self { $(Self::$name(_) => <$name as RrsStrategy>::SPACE),* }
             }
 
-            /// May it end every path below some threshold for ever, so that the picture is biased?
+            /// May the factor be 0, so that the picture is biased?
             pub const fn is_biased(&self) -> bool {
                 matches!(self, Self::Threshold(_))
             }
 
-            /// The factor per lane: unbiased strategies are clamped to [[`MIN_FACTOR`], [`MAX_FACTOR`]], and a factor
+            /// Factor per lane: unbiased strategies are clamped to [[`MIN_FACTOR`], [`MAX_FACTOR`]], and a factor
             /// that is not finite is 1 (NUMERICS RRS-3).
             #[inline(always)]
             pub fn factor(&self, v: &Vertices8) -> F32x8 {
@@ -190,15 +190,15 @@ macro_rules! strategies {
 strategies! {
     /// No roulette: 1 up to `max_depth`.
     None, "none", "factor 1; paths end at max_depth only";
-    /// Deterministic cut, biased.
+    /// Deterministic termination, biased.
     Threshold, "threshold", "threshold[:EPS]: 1 while throughput > EPS, else the path ends (biased on purpose)";
-    /// Last bounce's weight.
+    /// Roulette by the last bounce's weight.
     Contribution, "contribution", "largest rgb of the last bounce's weight";
-    /// Throughput.
+    /// Roulette by throughput.
     Throughput, "throughput", "throughput[:max|luminance|mean[:LO:HI[:START]]]: clamped norm of the throughput";
-    /// Albedo.
+    /// Roulette by albedo.
     Albedo, "albedo", "albedo[:product]: albedo of the vertex, or of all vertices so far multiplied";
-    /// Throughput times albedo.
+    /// Roulette by throughput times albedo.
     Classic, "classic", "classic[:START[:relative]]: throughput x albedo from the START-th bounce (5), absolute or over the pixel";
     /// Go with the winners.
     Winners, "winners", "winners[:VR:VV]: throughput x albedo x sqrt(VR + VV / (shininess + 1)^2)";
@@ -212,7 +212,7 @@ strategies! {
     Ear, "ear", "ear[:plain]: efficiency-aware roulette, learned; plain trusts its statistics at once";
     /// Efficiency-aware roulette and splitting.
     Ears, "ears", "ears[:plain]: efficiency-aware roulette and splitting, learned; plain trusts its statistics at once";
-    /// Constant.
+    /// Constant factor.
     Fixed, "fixed", "fixed:S: the constant factor S at every vertex, 0.05 to 20";
 }
 
@@ -222,10 +222,10 @@ impl Default for Strategy {
     }
 }
 
-/// Why a strategy's text is not understood.
+/// Reason why a strategy's text is not understood.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParseError {
-    /// No strategy of this name.
+    /// The name is not that of any strategy.
     Name,
     /// The options after the colon do not fit the named strategy.
     Options(&'static str),
@@ -249,7 +249,7 @@ impl fmt::Display for ParseError {
 
 impl core::error::Error for ParseError {}
 
-/// A number for an option, `default` where the text is empty.
+/// Number of an option, `default` if the text is empty.
 fn number<T: core::str::FromStr>(text: &str, default: T) -> Option<T> {
     if text.is_empty() { Some(default) } else { text.parse().ok() }
 }

@@ -1,9 +1,9 @@
-//! No roulette and no splitting; `max_depth` is the only end. Biased by what lies beyond it (seeds 000, 003).
+//! No roulette and no splitting: paths end at `max_depth` only, which biases the picture by the light beyond it.
 
 use super::{RrsStrategy, Vertices8};
 use croupier_simd::F32x8;
 
-/// Factor 1.
+/// Neither roulette nor splitting: factor 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct None;
 

@@ -1,4 +1,4 @@
-//! Deterministic cut below a throughput (seed 003): biased on purpose, to show what bias looks like.
+//! Deterministic termination below a throughput: biased on purpose, to show what bias looks like.
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
@@ -8,10 +8,10 @@ use super::{RrsStrategy, Vertices8};
 use core::fmt;
 use croupier_simd::F32x8;
 
-/// Factor 1 while the largest rgb of the throughput exceeds `eps`, else 0.
+/// Deterministic termination: factor 1 while the largest rgb of the throughput exceeds `eps`, else 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Threshold {
-    /// Cut below this.
+    /// Throughput at and below which paths end.
     pub eps: f32,
 }
 

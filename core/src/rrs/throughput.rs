@@ -1,4 +1,5 @@
-//! Roulette by throughput, the textbook rule (seeds 000, 003).
+//! Roulette by throughput, the textbook rule (Arvo and Kirk, SIGGRAPH 1990; Pharr, Jakob and Humphreys, "Physically
+//! Based Rendering", section 13.4 of the fourth edition).
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
@@ -10,7 +11,7 @@ use super::{MAX_FACTOR, MIN_FACTOR, Norm, RrsStrategy, Vertices8};
 use core::fmt;
 use croupier_simd::{F32x8, U32x8};
 
-/// clamp(norm(throughput), low, high) from depth `start`, 1 before.
+/// Roulette by throughput: clamp(norm(throughput), low, high) from depth `start`, 1 before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Throughput {
     /// Norm of the throughput.
@@ -19,7 +20,7 @@ pub struct Throughput {
     pub low: f32,
     /// Largest factor.
     pub high: f32,
-    /// First depth that plays.
+    /// First depth at which roulette is played, path segments from the camera.
     pub start: u32,
 }
 

@@ -1,6 +1,6 @@
-//! "Go with the winners" (Szirmay-Kalos, Antal and Sbert 2005): what a path may still bring, times how much its samples
-//! differ. The variance of a vertex is taken to be that of reflected light plus that of visibility, the latter the less
-//! the narrower the lobe.
+//! "Go with the winners" (Szirmay-Kalos, Antal and Sbert 2005): expected contribution of a path times the relative
+//! standard deviation of its samples. The variance of a vertex is modelled as that of reflected light plus that of
+//! visibility, which is less for narrower lobes.
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
@@ -11,7 +11,7 @@ use super::{RrsStrategy, Vertices8};
 use core::fmt;
 use croupier_simd::F32x8;
 
-/// max rgb of (prefix weight x albedo) x sqrt(`reflected` + `visible` / (shininess + 1)^2).
+/// Go with the winners: max rgb of (prefix weight x albedo) x sqrt(`reflected` + `visible` / (shininess + 1)^2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Winners {
     /// Relative variance of reflected light.

@@ -36,20 +36,20 @@ macro_rules! kinds {
         #[repr(u32)]
         pub enum $name { $($(#[$vdoc])* $v = $n),* }
         impl $name {
-            /// Every kind, in the order of its numbers.
+            /// Every kind, in the order of the numbers.
             pub const ALL: &'static [Self] = &[$(Self::$v),*];
 
-            /// From the number in the blob.
+            /// Kind of a number in the blob.
             pub const fn from_u32(x: u32) -> Option<Self> {
                 match x { $($n => Some(Self::$v),)* _ => None }
             }
 
-            /// The name in scene files.
+            /// Name in scene files.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$v => $text),* }
             }
 
-            /// From the name in scene files.
+            /// Kind of a name in scene files.
             pub fn from_name(name: &str) -> Option<Self> {
                 match name { $($text => Some(Self::$v),)* _ => None }
             }
@@ -64,7 +64,7 @@ pub use lights::*;
 pub use materials::*;
 
 kinds! {
-    /// What a section holds.
+    /// Kinds of sections.
     SectionKind {
         /// [`SceneInfo`], exactly one.
         Info = 0, "info";
@@ -102,7 +102,7 @@ kinds! {
     }
 }
 
-/// Start of a blob.
+/// Header of a blob.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Header {
@@ -213,9 +213,9 @@ pub struct Camera {
     pub origin: [f32; 3],
     /// Unit viewing axis.
     pub forward: [f32; 3],
-    /// From the image centre to its right edge, at distance 1.
+    /// Vector from the image centre to its right edge, at distance 1.
     pub right: [f32; 3],
-    /// From the image centre to its lower edge, at distance 1.
+    /// Vector from the image centre to its lower edge, at distance 1.
     pub down: [f32; 3],
     /// Lens radius; 0 is a pinhole.
     pub lens_radius: f32,

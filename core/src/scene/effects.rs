@@ -1,4 +1,4 @@
-//! Which effects a scene calls for. The effects of materials, lights and environments follow from their tables in
+//! Effects that a scene calls for. Those of materials, lights and environments follow from their tables in
 //! [`super::blob`].
 
 use super::blob::{EnvironmentKind, LightKind, MaterialKind, environment_table, light_table, material_table};
@@ -109,12 +109,12 @@ impl Effects {
         Self(self.0 | o.0)
     }
 
-    /// Is every effect of `o` in `self`?
+    /// Whether every effect of `o` is in `self`.
     pub const fn contains(self, o: Self) -> bool {
         self.0 & o.0 == o.0
     }
 
-    /// Is any effect of `o` in `self`?
+    /// Whether any effect of `o` is in `self`.
     pub const fn intersects(self, o: Self) -> bool {
         self.0 & o.0 != 0
     }

@@ -1,4 +1,4 @@
-//! Why bytes are not a scene: the object, its index and the number that is wrong.
+//! Errors of scene validation: the object, its index and the number that is wrong.
 
 use super::blob::{MAX_TREE_DEPTH, SectionKind, VERSION};
 use core::fmt;
@@ -68,7 +68,7 @@ impl Field {
     }
 }
 
-/// What is wrong with an entry of the section table.
+/// Fault of an entry of the section table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SectionFault {
@@ -84,7 +84,7 @@ pub enum SectionFault {
     Overlaps(SectionKind),
 }
 
-/// What is wrong with a child slot of a node.
+/// Fault of a child slot of a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ChildFault {
@@ -107,7 +107,7 @@ pub enum ChildFault {
     Deep,
 }
 
-/// What is wrong with a triangle slot of a leaf.
+/// Fault of a triangle slot of a leaf.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum SlotFault {
@@ -119,7 +119,7 @@ pub enum SlotFault {
     Outside(f32),
 }
 
-/// Why bytes are not a scene.
+/// Error of scene validation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum SceneError {
@@ -138,20 +138,20 @@ pub enum SceneError {
     Misaligned,
     /// The content is not what was written.
     Hash {
-        /// In the header.
+        /// Hash in the header.
         stated: u64,
-        /// Of the bytes.
+        /// Hash of the bytes.
         found: u64,
     },
     /// More sections than there are kinds.
     SectionCount(u32),
     /// A section of unknown kind.
     UnknownSection(u32),
-    /// A section with an impossible place, stride or count.
+    /// A section with an impossible offset, stride or count.
     Section {
-        /// Which.
+        /// Kind of the section.
         kind: SectionKind,
-        /// Why.
+        /// Fault of the section.
         fault: SectionFault,
     },
     /// The header's reserved bytes are not 0.
@@ -191,9 +191,9 @@ pub enum SceneError {
         of: SectionKind,
         /// Record.
         index: u32,
-        /// Which number.
+        /// Field of the record.
         field: Field,
-        /// Its value.
+        /// Value found.
         found: f32,
     },
     /// A node's child slot.
@@ -202,7 +202,7 @@ pub enum SceneError {
         node: u32,
         /// Slot, 0 to 7.
         slot: u32,
-        /// Why.
+        /// Fault of the child slot.
         fault: ChildFault,
     },
     /// A leaf's triangle slot.
@@ -211,14 +211,14 @@ pub enum SceneError {
         leaf: u32,
         /// Slot, 0 to 7.
         slot: u32,
-        /// Why.
+        /// Fault of the triangle slot.
         fault: SlotFault,
     },
     /// Records that the walk from the root does not reach, or a childless node.
     Unreached {
         /// Nodes or leaves.
         of: SectionKind,
-        /// First one.
+        /// Index of the first one.
         index: u32,
     },
     /// The leaves do not hold every triangle exactly once.
@@ -234,7 +234,7 @@ pub enum SceneError {
         of: SectionKind,
         /// First entry of the table.
         first: u32,
-        /// Its length.
+        /// Length of the table.
         length: u32,
         /// Sum over the items of (stated - actual) / stated probability, each weighed by up to +-1.
         deviation: f32,

@@ -19,9 +19,9 @@ pub struct Scene<'s>(Records<'s>);
 /// The sections of a scene blob.
 #[derive(Clone, Copy, Debug)]
 pub struct Records<'s> {
-    /// Facts about the whole.
+    /// Facts about the whole scene.
     pub info: &'s SceneInfo,
-    /// Tree.
+    /// Nodes of the tree.
     pub nodes: &'s [Node],
     /// Leaves of the tree.
     pub leaves: &'s [Leaf],
@@ -35,13 +35,13 @@ pub struct Records<'s> {
     pub textures: &'s [Texture],
     /// sRGB texels.
     pub texels: &'s [u32],
-    /// Tables of materials.
+    /// Tables that materials refer to.
     pub tables: &'s [f32],
     /// Lights.
     pub lights: &'s [Light],
     /// Alias table over the lights; may be empty if no light emits.
     pub light_alias: &'s [Alias],
-    /// The environment, if any.
+    /// Environment, if any.
     pub environment: Option<&'s Environment>,
     /// Radiance of the environment map.
     pub env_texels: &'s [[f32; 3]],
@@ -51,9 +51,9 @@ pub struct Records<'s> {
     pub camera: &'s Camera,
     /// Material names, newline-separated; see [`Scene::material_name`].
     pub names: &'s [u8],
-    /// What it calls for: effects of materials that triangles use, and of its lights and camera.
+    /// Effects that the scene calls for: of the materials that triangles use, of lights and camera.
     pub effects: Effects,
-    /// Hash of the content.
+    /// [`content_hash`] of the blob.
     pub hash: u64,
 }
 

@@ -11,9 +11,8 @@
 
 use super::job::Job;
 use super::ledger::{Ledger, NO_BIN, NO_RECORD};
-use super::nee::ShadowRays8;
+use super::packets::{Contribution8, Samples8, ShadowRays8};
 use super::path::Path8;
-use super::refill::Samples8;
 use super::root::{PixelTarget, Roots};
 use super::vertex::PathVertex;
 use crate::counters::Counters;
@@ -24,15 +23,6 @@ use crate::memory::{Carver, Measure, MemoryError};
 use crate::rrs::Norm;
 use crate::settings::Settings;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
-
-/// Radiance found by eight lanes.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Contribution8 {
-    /// What it counts in the pixel: prefix weight included.
-    pub pixel: Vec3x8,
-    /// What it counts in the sample's own estimate: no prefix weight.
-    pub local: Vec3x8,
-}
 
 /// All that a shard keeps beyond a packet, but for the vertices that wait.
 #[derive(Debug)]
@@ -243,7 +233,7 @@ impl<'m> Bookkeeping<'m> {
         }
         for i in (visible & logged).lanes() {
             let (x, scale) = (local.lane(i), self.ledger.scale(v.path.record.lane(i)));
-            training.log_light(v.bin.lane(i), [0, 1, 2].map(|c| x[c] * scale[c]), v.nee_probability.lane(i));
+            training.log_nee(v.bin.lane(i), [0, 1, 2].map(|c| x[c] * scale[c]), v.nee_probability.lane(i));
         }
     }
 

@@ -4,8 +4,8 @@
 use super::book::Bookkeeping;
 use super::job::Job;
 use super::ledger::NO_RECORD;
+use super::packets::RayState8;
 use super::path::Path8;
-use super::ray_state::RayState8;
 use super::root::PixelTarget;
 use crate::camera;
 use crate::geometry::Ray8;
@@ -20,6 +20,8 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 pub(super) struct CameraCursor {
     /// Current tile, if any is left.
     tile: Option<u32>,
+    /// First column and row of the current tile.
+    start: [u32; 2],
     /// Pixel slots of the tiles before it.
     base: u32,
     /// Slot within the tile.
@@ -31,11 +33,11 @@ pub(super) struct CameraCursor {
 impl CameraCursor {
     pub(super) fn new(tiles: &Tiles, shard: u32, samples: u32) -> Self {
         let tile = if samples == 0 { None } else { tiles.next_of(shard, 0) };
-        Self { tile, base: 0, slot: 0, sample: 0 }
+        Self { tile, start: tile.map_or([0; 2], |tile| tiles.start(tile)), base: 0, slot: 0, sample: 0 }
     }
 
     pub(super) const fn finished() -> Self {
-        Self { tile: None, base: 0, slot: 0, sample: 0 }
+        Self { tile: None, start: [0; 2], base: 0, slot: 0, sample: 0 }
     }
 
     pub(super) fn is_finished(&self) -> bool {
@@ -46,7 +48,7 @@ impl CameraCursor {
     /// tile.
     fn next(&mut self, tiles: &Tiles, shard: u32, samples: impl Fn(u32) -> u32) -> Option<([u32; 2], u32, u32)> {
         while let Some(tile) = self.tile {
-            let found = tiles.pixel(tile, self.slot).map(|p| (p, self.base + self.slot, self.sample));
+            let found = tiles.pixel(self.start, self.slot).map(|p| (p, self.base + self.slot, self.sample));
             self.sample += 1;
             if found.is_none() || self.sample >= samples(tile) {
                 self.sample = 0;
@@ -55,6 +57,7 @@ impl CameraCursor {
                     self.slot = 0;
                     self.base += TILE_PIXELS;
                     self.tile = tiles.next_of(shard, tile + 1);
+                    self.start = self.tile.map_or([0; 2], |tile| tiles.start(tile));
                 }
             }
             if found.is_some() {

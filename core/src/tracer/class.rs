@@ -13,20 +13,20 @@ pub(crate) struct Queue(u8);
 
 impl PacketClass {
     /// How many there are.
-    pub const COUNT: usize = MaterialKind::ALL.len();
+    pub(crate) const COUNT: usize = MaterialKind::ALL.len();
 
     /// The class of surfaces of a material kind, given by its number in the blob.
-    pub fn of_material(kind: u32) -> Option<Self> {
+    pub(crate) fn of_material(kind: u32) -> Option<Self> {
         ((kind as usize) < Self::COUNT).then_some(Self(kind as u8))
     }
 
     /// The kernel: a BSDF.
-    pub fn bsdf(self) -> MaterialKind {
+    pub(crate) fn bsdf(self) -> MaterialKind {
         MaterialKind::ALL[self.0 as usize % Self::COUNT]
     }
 
     /// Where its samples wait.
-    pub fn queue(self, with_nee: bool) -> Queue {
+    pub(crate) fn queue(self, with_nee: bool) -> Queue {
         Queue(if with_nee { self.0 } else { self.0 + Self::COUNT as u8 })
     }
 }
@@ -35,16 +35,16 @@ const _: () = assert!(2 * PacketClass::COUNT <= u8::MAX as usize);
 
 impl Queue {
     /// How many there are.
-    pub const COUNT: usize = 2 * PacketClass::COUNT;
+    pub(crate) const COUNT: usize = 2 * PacketClass::COUNT;
 
     /// Every queue, those with next event estimation first.
-    pub fn all() -> impl Iterator<Item = Self> {
+    pub(crate) fn all() -> impl Iterator<Item = Self> {
         (0..Self::COUNT as u8).map(Self)
     }
 
     /// The queues whose bits are set, in order.
     #[inline(always)]
-    pub fn of_bits(mut bits: u32) -> impl Iterator<Item = Self> {
+    pub(crate) fn of_bits(mut bits: u32) -> impl Iterator<Item = Self> {
         core::iter::from_fn(move || {
             let first = bits.trailing_zeros();
             bits &= bits.wrapping_sub(1);
@@ -53,17 +53,17 @@ impl Queue {
     }
 
     /// Its number, below [`Self::COUNT`].
-    pub fn index(self) -> usize {
+    pub(crate) fn index(self) -> usize {
         self.0 as usize
     }
 
     /// The class of its samples.
-    pub fn class(self) -> PacketClass {
+    pub(crate) fn class(self) -> PacketClass {
         PacketClass(self.0 % PacketClass::COUNT as u8)
     }
 
     /// Do its samples draw light samples?
-    pub fn with_nee(self) -> bool {
+    pub(crate) fn with_nee(self) -> bool {
         self.index() < PacketClass::COUNT
     }
 }

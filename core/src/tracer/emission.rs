@@ -1,7 +1,7 @@
 //! Emission that rays meet, weighted against the light sample that could have found it.
 
-use super::book::Contribution8;
-use super::ray_state::RayState8;
+use super::packets::Contribution8;
+use super::packets::RayState8;
 use crate::geometry::SurfaceHit8;
 use crate::light::{self, power_heuristic};
 use crate::scene::Effects;

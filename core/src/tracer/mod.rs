@@ -14,7 +14,8 @@
 //! | `settle` | vertices go to the ring, finished paths to the books |
 //! | `vertex`, `ring`, `class` | path vertices, and the fixed ring in which they wait by class |
 //! | `book`, `root`, `ledger` | radiance and cost of camera samples and of learned samples in flight |
-//! | `shard`, `job` | one unit of parallel work, and what all of them share |
+//! | `packets`, `path` | what stages hand to each other |
+//! | `shard`, `state`, `job` | one unit of parallel work, what it keeps, and what all of them share |
 
 mod aov;
 mod book;
@@ -27,9 +28,9 @@ mod job;
 mod ledger;
 mod nee;
 mod occlude;
+mod packets;
 mod path;
 mod pipeline;
-mod ray_state;
 mod refill;
 mod ring;
 mod root;
@@ -40,6 +41,7 @@ mod shading;
 mod shard;
 #[cfg(test)]
 mod stage_tests;
+mod state;
 mod trace;
 mod vertex;
 

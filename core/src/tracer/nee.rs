@@ -1,30 +1,14 @@
 //! Next event estimation: a light sample per lane, its weight against the BSDF sample that could have found it, and
 //! roulette for its shadow ray.
 
-use super::book::{Bookkeeping, Contribution8};
+use super::book::Bookkeeping;
 use super::ledger::NO_BIN;
-use super::path::Path8;
-use super::refill::Samples8;
+use super::packets::{Contribution8, Samples8, ShadowRays8};
 use crate::bsdf::{self, Eval8};
 use crate::geometry::{self, Ray8};
 use crate::light::{self, LightSample8, power_heuristic};
 use crate::world::World;
-use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
-
-/// Eight shadow rays and what they bring if nothing is in the way.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ShadowRays8 {
-    /// Lanes with a ray.
-    pub active: Mask8,
-    /// From the vertex to the light sample.
-    pub ray: Ray8,
-    /// Whose rays these are.
-    pub path: Path8,
-    /// What counts where the light sample is visible.
-    pub found: Contribution8,
-    /// Bins of the statistics of visibility, [`NO_BIN`] where nothing is learned.
-    pub towards: U32x8,
-}
+use croupier_simd::{F32x8, U32x8, Vec3x8};
 
 /// One light sample per lane; `None` where next event estimation does not apply to the packet.
 #[inline(always)]

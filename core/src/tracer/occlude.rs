@@ -1,7 +1,7 @@
 //! Stage `occlude`: shadow rays, any hit.
 
 use super::book::Bookkeeping;
-use super::nee::ShadowRays8;
+use super::packets::ShadowRays8;
 use crate::accel::Intersector;
 use crate::cost::COST_SHADOW;
 use crate::world::World;

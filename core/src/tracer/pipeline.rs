@@ -13,6 +13,7 @@
 
 use super::camera_rays::camera_rays;
 use super::emission;
+use super::job::Job;
 use super::nee::{sample_lights, shadow_rays};
 use super::occlude::occlude;
 use super::refill::{Refill, refill, samples};
@@ -20,17 +21,16 @@ use super::roulette::roulette;
 use super::scatter::scatter;
 use super::settle::settle;
 use super::shading::{albedo, shade};
-use super::shard::Shard;
+use super::state::State;
 use super::trace::trace;
 use crate::geometry::SurfaceHit8;
 use crate::settings::MAX_PATH_LENGTH;
 use crate::world::World;
 use croupier_simd::{Mask8, U32x8, Vec3x8};
 
-/// One packet through all stages; `false` when nothing is left.
-pub(super) fn turn<W: World>(shard: &mut Shard<'_>, world: &W) -> bool {
-    let index = shard.index();
-    let Shard { job, cursor, ring, book, comb, .. } = shard;
+/// One packet of shard `index` through all stages; `false` when nothing is left.
+pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State<'_>) -> bool {
+    let State { cursor, ring, book, comb } = state;
     let settings = &job.settings;
 
     let rays = match refill(cursor, ring, book) {

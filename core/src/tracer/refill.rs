@@ -3,32 +3,12 @@
 
 use super::book::Bookkeeping;
 use super::camera_rays::CameraCursor;
-use super::class::{PacketClass, Queue};
+use super::class::Queue;
+use super::packets::Samples8;
 use super::path::Path8;
 use super::ring::{RESERVE, Ring, Taken8};
-use super::vertex::PathVertex8;
-use crate::rng::Key8;
 use crate::world::World;
 use croupier_simd::{Mask8, U32x8};
-
-/// Samples of waiting vertices, all of one class.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Samples8 {
-    /// The vertices that they are drawn at.
-    pub vertex: PathVertex8,
-    /// Lanes with a sample.
-    pub active: Mask8,
-    /// Lanes whose path may have another segment.
-    pub continues: Mask8,
-    /// Kernel that they need.
-    pub class: PacketClass,
-    /// Do they draw light samples?
-    pub with_nee: bool,
-    /// Whose samples these are: the vertices' roots and depths, ledger records of their own.
-    pub path: Path8,
-    /// Random keys.
-    pub key: Key8,
-}
 
 /// What a packet is filled with.
 #[derive(Clone, Copy, Debug)]

@@ -2,9 +2,10 @@
 //! with n samples) are the packet's roulette masks; one comb rounds the whole packet, another decides which samples draw
 //! light samples.
 
-use super::book::{Bookkeeping, Contribution8};
+use super::book::Bookkeeping;
 use super::cache_key::cache_lookup;
 use super::ledger::NO_BIN;
+use super::packets::Contribution8;
 use super::ring::RESERVE;
 use super::shading::Arrival8;
 use super::vertex::pack_samples;

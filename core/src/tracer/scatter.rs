@@ -1,7 +1,7 @@
 //! Stage `scatter`: one BSDF sample per lane, and the BSDF's value towards the light samples. All lanes run one kernel.
 
-use super::ray_state::RayState8;
-use super::refill::Samples8;
+use super::packets::RayState8;
+use super::packets::Samples8;
 use crate::bsdf::{self, Bsdf, Eval8, Inputs8, Sample8, Visitor};
 use crate::geometry::{self, Ray8};
 use crate::scene::Scene;

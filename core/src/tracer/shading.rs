@@ -1,7 +1,7 @@
 //! Stage `surface`: the vertices that hits become, with material, shading normal and texture.
 
 use super::ledger::NO_BIN;
-use super::ray_state::RayState8;
+use super::packets::RayState8;
 use super::vertex::PathVertex8;
 use crate::bsdf::{self, Bsdf, Inputs8, Visitor};
 use crate::geometry::{SurfaceHit8, SurfacePoint8};

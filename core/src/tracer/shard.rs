@@ -1,11 +1,9 @@
 //! One unit of parallel work: exclusively owned, bounded, deterministic.
 
-use super::book::Bookkeeping;
 use super::camera_rays::CameraCursor;
 use super::job::Job;
 use super::pipeline::turn;
-use super::ring::Ring;
-use super::roulette::CombNumbers;
+use super::state::State;
 use crate::counters::Counters;
 use crate::film::{PixelAov, PixelSums};
 use crate::learn::cache::Training;
@@ -64,16 +62,13 @@ pub struct Shard<'m> {
     index: u32,
     /// Scene and iteration that the books belong to; iteration 0 is none.
     joined: (u64, Iteration),
-    pub(super) cursor: CameraCursor,
-    pub(super) ring: Ring<'m>,
-    pub(super) book: Bookkeeping<'m>,
-    pub(super) comb: CombNumbers,
+    pub(super) state: State<'m>,
 }
 
 impl<'m> Shard<'m> {
     /// Bytes of a shard; [`Self::carve`] carves in the same order.
     pub(crate) fn measure(job: &Job) -> Measure {
-        Bookkeeping::measure(Ring::measure(Measure::new(), job.settings.ring as usize), job)
+        State::measure(job)
     }
 
     /// Carves shard `index` out of a block of `layout`.
@@ -88,10 +83,7 @@ impl<'m> Shard<'m> {
             job: *job,
             index,
             joined: (0, Iteration::default()),
-            cursor: CameraCursor::finished(),
-            ring: Ring::carve(&mut c, s.ring as usize).map_err(memory)?,
-            book: Bookkeeping::carve(&mut c, job).map_err(memory)?,
-            comb: CombNumbers::new(0, 0, index),
+            state: State::carve(&mut c, job).map_err(memory)?,
         })
     }
 
@@ -102,14 +94,14 @@ impl<'m> Shard<'m> {
 
     /// Counts of the current iteration.
     pub fn counters(&self) -> &Counters {
-        &self.book.counters
+        &self.state.book.counters
     }
 
     /// Starts no further camera samples in the iteration of its last step; stepping on to [`StepResult::Done`] finishes
     /// those in flight, so that what was rendered stays unbiased. A shard that has not stepped in this iteration yet
     /// joins it with a step of 0 rays first.
     pub fn stop(&mut self) {
-        self.cursor = CameraCursor::finished();
+        self.state.cursor = CameraCursor::finished();
     }
 
     /// Works until the budget is used or the iteration is finished. Many small steps and one big step give the same
@@ -118,23 +110,19 @@ impl<'m> Shard<'m> {
         if self.joined != world.identity() {
             self.begin(world);
         }
-        let start = self.book.counters.rays();
-        while self.book.counters.rays() - start < budget.rays {
-            if !turn(self, world) {
+        let start = self.state.book.counters.rays();
+        while self.state.book.counters.rays() - start < budget.rays {
+            if !turn(world, &self.job, self.index, &mut self.state) {
                 return StepResult::Done;
             }
         }
         StepResult::More
     }
 
-    /// Joins an iteration; what one that was given up has left is forgotten.
+    /// Joins the iteration of `world`.
     pub(crate) fn begin<W: World>(&mut self, world: &W) {
-        let iteration = world.iteration();
         self.joined = world.identity();
-        self.ring.reset();
-        self.book.begin(world.learned());
-        self.cursor = CameraCursor::new(&self.job.tiles, self.index, iteration.samples);
-        self.comb = CombNumbers::new(self.job.settings.seed, iteration.number, self.index);
+        self.state.begin(world, &self.job, self.index);
     }
 
     /// Settings that the shard was made for.
@@ -144,12 +132,12 @@ impl<'m> Shard<'m> {
 
     /// What the shard has learned in this iteration.
     pub(crate) fn training(&self) -> Option<&Training<'m>> {
-        self.book.training.as_ref()
+        self.state.book.training.as_ref()
     }
 
     /// Has the shard finished this iteration of this scene?
     pub(crate) fn is_done(&self, identity: (u64, Iteration)) -> bool {
-        self.joined == identity && self.cursor.is_finished() && self.ring.waiting() == 0
+        self.joined == identity && self.state.cursor.is_finished() && self.state.ring.waiting() == 0
     }
 
     /// Calls `f(film index, sums, auxiliary sums)` for each pixel of the shard.
@@ -158,9 +146,10 @@ impl<'m> Shard<'m> {
         let mut next = tiles.next_of(self.index, 0);
         let mut slot = 0;
         while let Some(tile) = next {
+            let start = tiles.start(tile);
             for k in 0..TILE_PIXELS {
-                if let (Some(p), Some(stats)) = (tiles.pixel(tile, k), self.book.pixels.get(slot)) {
-                    f(tiles.film_index(p), stats, self.book.aovs.get(slot));
+                if let (Some(p), Some(stats)) = (tiles.pixel(start, k), self.state.book.pixels.get(slot)) {
+                    f(tiles.film_index(p), stats, self.state.book.aovs.get(slot));
                 }
                 slot += 1;
             }

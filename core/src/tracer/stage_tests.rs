@@ -2,23 +2,26 @@
 
 extern crate std;
 
-use super::book::Contribution8;
 use super::cache_key::cache_lookup;
 use super::camera_rays::{CameraCursor, camera_rays};
 use super::class::PacketClass;
 use super::emission;
 use super::ledger::{NO_BIN, NO_RECORD};
-use super::nee::{ShadowRays8, sample_lights, shadow_rays};
+use super::nee::{sample_lights, shadow_rays};
 use super::occlude::occlude;
+use super::packets::Contribution8;
+use super::packets::RayState8;
+use super::packets::Samples8;
+use super::packets::ShadowRays8;
 use super::path::Path8;
-use super::ray_state::RayState8;
-use super::refill::{Refill, Samples8, refill, samples};
+use super::refill::{Refill, refill, samples};
 use super::root::PixelTarget;
 use super::roulette::{Decision8, roulette};
 use super::scatter::scatter;
 use super::settle::settle;
 use super::shading::{Arrival8, albedo, shade};
 use super::shard::Shard;
+use super::state::State;
 use super::trace::trace;
 use super::vertex::PathVertex8;
 use crate::geometry::{Ray8, SurfaceHit8};
@@ -62,7 +65,7 @@ fn strategy(name: &str) -> impl FnOnce(&mut Settings) {
 fn paths(shard: &mut Shard<'_>, depth: u32) -> Path8 {
     let root = U32x8::from_fn(|i| {
         let target = PixelTarget { error_weight: [1.0; 3], share: 1.0, film: i as u32, pixel: i as u32 };
-        shard.book.open_camera_sample(target, false).expect("a root").0
+        shard.state.book.open_camera_sample(target, false).expect("a root").0
     });
     Path8 { root, record: U32x8::splat(NO_RECORD), depth: U32x8::splat(depth) }
 }
@@ -88,7 +91,7 @@ fn rays(shard: &mut Shard<'_>) -> RayState8 {
 fn arrive(world: &TestWorld<'_>, shard: &mut Shard<'_>, depth: u32) -> (RayState8, SurfaceHit8, Arrival8) {
     let mut rays = rays(shard);
     rays.path.depth = U32x8::splat(depth);
-    let hit = SurfaceHit8::gather(world.scene(), &trace(world, &mut shard.book, &rays));
+    let hit = SurfaceHit8::gather(world.scene(), &trace(world, &mut shard.state.book, &rays));
     let arrival = shade(world, &rays, &hit, &hit.point());
     (rays, hit, arrival)
 }
@@ -138,30 +141,35 @@ fn refill_takes_what_waits_before_camera_samples() {
     world(
         |_| (),
         |world, shard| {
-            assert!(matches!(refill(&shard.cursor, &mut shard.ring, &mut shard.book), Refill::Camera));
+            assert!(matches!(
+                refill(&shard.state.cursor, &mut shard.state.ring, &mut shard.state.book),
+                Refill::Camera
+            ));
             let mut v = floor(shard);
             v.samples = U32x8::new([8, 9, 1, 1, 1, 1, 1, 1]);
             let class = |kind| PacketClass::of_material(kind as u32).expect("a class");
             let records = v.records();
-            shard.ring.push(class(MaterialKind::Diffuse), records[0]);
-            shard.ring.push(class(MaterialKind::Mirror), records[1]);
-            let Refill::Samples(taken) = refill(&shard.cursor, &mut shard.ring, &mut shard.book) else {
+            shard.state.ring.push(class(MaterialKind::Diffuse), records[0]);
+            shard.state.ring.push(class(MaterialKind::Mirror), records[1]);
+            let Refill::Samples(taken) = refill(&shard.state.cursor, &mut shard.state.ring, &mut shard.state.book)
+            else {
                 panic!("samples wait")
             };
-            let s = samples(world, &shard.ring, &mut shard.book, &taken);
+            let s = samples(world, &shard.state.ring, &mut shard.state.book, &taken);
             assert_eq!((s.class, s.active.count(), s.with_nee), (class(MaterialKind::Mirror), 8, false));
             assert_eq!(s.path.root.to_array(), [v.path.root.lane(1); 8]);
-            assert_eq!(shard.book.roots.get(v.path.root.lane(1)).open, 9, "eight lanes and the vertex");
-            assert_eq!(shard.book.counters.vertex_samples, 8);
+            assert_eq!(shard.state.book.roots.get(v.path.root.lane(1)).open, 9, "eight lanes and the vertex");
+            assert_eq!(shard.state.book.counters.vertex_samples, 8);
             assert!(s.continues.all() && s.key.lo.lane(0) != s.key.lo.lane(1));
 
-            shard.cursor = CameraCursor::finished();
+            shard.state.cursor = CameraCursor::finished();
             let mut rest = 0;
-            while let Refill::Samples(taken) = refill(&shard.cursor, &mut shard.ring, &mut shard.book) {
+            while let Refill::Samples(taken) = refill(&shard.state.cursor, &mut shard.state.ring, &mut shard.state.book)
+            {
                 rest += taken.lanes;
             }
             assert_eq!(rest, 9);
-            assert!(matches!(refill(&shard.cursor, &mut shard.ring, &mut shard.book), Refill::Done));
+            assert!(matches!(refill(&shard.state.cursor, &mut shard.state.ring, &mut shard.state.book), Refill::Done));
         },
     );
 }
@@ -174,10 +182,13 @@ fn samples_at_the_last_depth_do_not_continue() {
         |world, shard| {
             let mut v = floor(shard);
             v.samples = U32x8::splat(2);
-            shard.ring.push(PacketClass::of_material(0).expect("a class"), v.records()[0]);
-            shard.cursor = CameraCursor::finished();
-            let Refill::Samples(taken) = refill(&shard.cursor, &mut shard.ring, &mut shard.book) else { panic!() };
-            let s = samples(world, &shard.ring, &mut shard.book, &taken);
+            shard.state.ring.push(PacketClass::of_material(0).expect("a class"), v.records()[0]);
+            shard.state.cursor = CameraCursor::finished();
+            let Refill::Samples(taken) = refill(&shard.state.cursor, &mut shard.state.ring, &mut shard.state.book)
+            else {
+                panic!()
+            };
+            let s = samples(world, &shard.state.ring, &mut shard.state.book, &taken);
             assert_eq!((s.active.count(), s.continues.count()), (2, 0));
         },
     );
@@ -189,7 +200,7 @@ fn camera_rays_go_through_their_pixels() {
     world(
         |_| (),
         |world, shard| {
-            let Shard { job, cursor, book, .. } = shard;
+            let Shard { job, state: State { cursor, book, .. }, .. } = shard;
             let mut samples = [0; 256];
             loop {
                 let r = camera_rays(world, job, 0, cursor, book);
@@ -244,7 +255,7 @@ fn shadow_rays_bring_weighted_radiance() {
             s.vertex.beta = Vec3x8::splat(1.0, 2.0, 4.0);
             let l = sample_lights(world, &s).expect("light samples");
             let f = scatter(world, &s, Some(l.wi)).nee;
-            let rays = shadow_rays(world, &mut shard.book, &s, &l, &f, false).expect("rays");
+            let rays = shadow_rays(world, &mut shard.state.book, &s, &l, &f, false).expect("rays");
             let (mut area, mut far) = (0, 0);
             for i in rays.active.lanes() {
                 let cos = l.wi.lane(i)[2];
@@ -277,10 +288,10 @@ fn occlusion_is_found_and_charged() {
             let found = Contribution8 { pixel: Vec3x8::ONE, local: Vec3x8::ONE };
             let active = Mask8::from_bits(0b0011_1111);
             let s = ShadowRays8 { active, ray, path, found, towards: U32x8::splat(NO_BIN) };
-            assert_eq!(occlude(world, &mut shard.book, &s).bits(), 0b0010_1010);
-            let rays = path.root.to_array().map(|r| shard.book.roots.get(r).rays);
+            assert_eq!(occlude(world, &mut shard.state.book, &s).bits(), 0b0010_1010);
+            let rays = path.root.to_array().map(|r| shard.state.book.roots.get(r).rays);
             assert_eq!(rays, [1, 1, 1, 1, 1, 1, 0, 0]);
-            assert_eq!((shard.book.counters.shadow_rays, shard.book.counters.occlude.lanes), (6, 6));
+            assert_eq!((shard.state.book.counters.shadow_rays, shard.state.book.counters.occlude.lanes), (6, 6));
         },
     );
 }
@@ -303,16 +314,16 @@ fn scattering_samples_the_bsdf() {
                 assert!(cos > 0.0 && out.rays.ray.o.lane(i)[2] > 0.0);
                 close(out.rays.pdf.lane(i), cos / PI);
                 close(out.nee.pdf.lane(i), 1.0 / PI);
-                for c in 0..3 {
-                    close(out.rays.weight.lane(i)[c], FLOOR[c]);
-                    close(out.rays.beta.lane(i)[c], 2.0 * FLOOR[c]);
-                    close(out.nee.f.lane(i)[c], FLOOR[c] / PI);
+                for (c, rho) in FLOOR.into_iter().enumerate() {
+                    close(out.rays.weight.lane(i)[c], rho);
+                    close(out.rays.beta.lane(i)[c], 2.0 * rho);
+                    close(out.nee.f.lane(i)[c], rho / PI);
                 }
             }
             assert_eq!(out.rays.path.depth.to_array(), [2; 8]);
             assert!(out.rays.skip_mis.none());
-            shard.book.break_lanes(out.broken, &s.path);
-            assert_eq!((shard.book.counters.non_finite, shard.book.counters.first_non_finite), (1, 7));
+            shard.state.book.break_lanes(out.broken, &s.path);
+            assert_eq!((shard.state.book.counters.non_finite, shard.state.book.counters.first_non_finite), (1, 7));
         },
     );
 }
@@ -325,16 +336,16 @@ fn rays_find_what_they_hit() {
         |world, shard| {
             let mut r = rays(shard);
             r.active = Mask8::from_bits(0b1111_1101);
-            let hit = trace(world, &mut shard.book, &r);
+            let hit = trace(world, &mut shard.state.book, &r);
             assert_eq!(hit.hit.bits(), 0b0111_1101);
             assert_eq!(hit.triangle.to_array()[2..7], [1, 0, 2, 2, 3]);
             assert_eq!([0, 4, 5, 6].map(|i| hit.t.lane(i)), [0.5, 0.5, 0.5, 1.5]);
-            let charged = r.path.root.to_array().map(|root| shard.book.roots.get(root).rays);
+            let charged = r.path.root.to_array().map(|root| shard.state.book.roots.get(root).rays);
             assert_eq!(charged, [1, 0, 1, 1, 1, 1, 1, 1]);
-            assert_eq!((shard.book.counters.trace.lanes, shard.book.counters.scatter_rays), (7, 0));
+            assert_eq!((shard.state.book.counters.trace.lanes, shard.state.book.counters.scatter_rays), (7, 0));
             r.path.depth = U32x8::splat(2);
-            trace(world, &mut shard.book, &r);
-            assert_eq!(shard.book.counters.scatter_rays, 7);
+            trace(world, &mut shard.state.book, &r);
+            assert_eq!(shard.state.book.counters.scatter_rays, 7);
         },
     );
 }
@@ -347,7 +358,7 @@ fn emission_is_weighted_against_light_samples() {
         |_| (),
         |world, shard| {
             let mut r = rays(shard);
-            let hit = SurfaceHit8::gather(world.scene(), &trace(world, &mut shard.book, &r));
+            let hit = SurfaceHit8::gather(world.scene(), &trace(world, &mut shard.state.book, &r));
             let ng = hit.point().ng;
             let escaped = Mask8::from_bits(0b1000_0000);
             for skip_mis in [true, false] {
@@ -404,16 +415,17 @@ fn auxiliary_values_go_to_their_pixels() {
             let (rays, hit, a) = arrive(world, shard, 1);
             let t = F32x8::from_fn(|i| if i == 1 { f32::NAN } else { hit.t.lane(i) });
             let first = Mask8::from_bits(0b0000_0111);
-            shard.book.record_first_hit(first, &rays.path, t, a.vertex.ns, Vec3x8::from_fn(|_| FLOOR));
-            let [good, bad] = [0, 1].map(|pixel: usize| shard.book.aovs[pixel]);
+            shard.state.book.record_first_hit(first, &rays.path, t, a.vertex.ns, Vec3x8::from_fn(|_| FLOOR));
+            let [good, bad] = [0, 1].map(|pixel: usize| shard.state.book.aovs[pixel]);
             assert_eq!((good.hits, good.depth, good.normal), (1.0, 0.5, [0.0, 0.0, 1.0]));
             assert_eq!((good.albedo, bad.hits), (FLOOR.map(f64::from), 0.0));
-            assert_eq!((shard.book.counters.non_finite, shard.book.counters.first_non_finite), (1, 2));
+            assert_eq!((shard.state.book.counters.non_finite, shard.state.book.counters.first_non_finite), (1, 2));
             let path = Path8 { depth: U32x8::new([1, 2, 3, 4, 5, 9, 1, 1]), ..rays.path };
-            shard.book.record_factors(Mask8::from_bits(0b0011_1111), &path, F32x8::splat(2.0));
-            let column = [0, 1, 2, 3, 4, 5].map(|p: usize| shard.book.aovs[p].factor.iter().position(|f| *f == 2.0));
+            shard.state.book.record_factors(Mask8::from_bits(0b0011_1111), &path, F32x8::splat(2.0));
+            let column =
+                [0, 1, 2, 3, 4, 5].map(|p: usize| shard.state.book.aovs[p].factor.iter().position(|f| *f == 2.0));
             assert_eq!(column, [Some(0), Some(1), Some(2), Some(3), Some(3), Some(3)]);
-            assert_eq!(shard.book.aovs[6].vertices, [0.0; 4]);
+            assert_eq!(shard.state.book.aovs[6].vertices, [0.0; 4]);
         },
     );
 }
@@ -426,7 +438,7 @@ fn roulette_rounds_factors_and_divides_by_them() {
         let change = |s: &mut Settings| (strategy("fixed:3")(s), s.split_budget = budget).0;
         world(change, |world, shard| {
             let (_, _, mut a) = arrive(world, shard, 1);
-            let Shard { job, book, comb, .. } = shard;
+            let Shard { job, state: State { book, comb, .. }, .. } = shard;
             let d = roulette(world, &job.settings, book, comb, free, &mut a);
             assert_eq!(d.with_nee, d.n, "without roulette for light samples all draw one");
             let limited = [book.counters.splits_limited_by_ring, book.counters.splits_limited_by_budget];
@@ -448,7 +460,7 @@ fn the_comb_keeps_half_of_every_packet() {
         let mut kept = [0; 8];
         for _ in 0..4096 {
             let mut a = arrival;
-            let Shard { job, book, comb, .. } = &mut *shard;
+            let Shard { job, state: State { book, comb, .. }, .. } = &mut *shard;
             let d = roulette(world, &job.settings, book, comb, 500, &mut a);
             let n: u32 = d.n.iter().sum();
             assert!(n == 2 || n == 3, "{n} of 5 lanes");
@@ -468,7 +480,7 @@ fn vertices_are_looked_up_by_what_decides_their_radiance() {
     world(strategy("ears"), |world, shard| {
         let (_, _, mut a) = arrive(world, shard, 2);
         a.albedo = Vec3x8::splat(0.5, 0.25, 0.0);
-        let later = cache_lookup(world, &shard.book, &a, Space::Scene);
+        let later = cache_lookup(world, &shard.state.book, &a, Space::Scene);
         assert_eq!((later.unscale.lane(0), later.scale.lane(0)), ([0.5, 0.25, 0.0], [2.0, 4.0, 0.0]));
         let leaf = |bin: u32| bin / 16;
         let bin = later.bin.to_array();
@@ -476,7 +488,7 @@ fn vertices_are_looked_up_by_what_decides_their_radiance() {
         assert_eq!((leaf(bin[0]), bin[0]), (leaf(bin[4]), bin[1]), "diffuse vertices share a tree");
         assert!(leaf(bin[6]) != leaf(bin[0]) && bin[4] != bin[0], "a tree for glossy ones, a bin for each normal");
         a.vertex.path.depth = U32x8::splat(1);
-        let first = cache_lookup(world, &shard.book, &a, Space::Scene);
+        let first = cache_lookup(world, &shard.state.book, &a, Space::Scene);
         assert_eq!(first.bin.to_array(), [NO_BIN; 8], "pixels are not known yet");
     });
 }
@@ -491,13 +503,13 @@ fn vertices_wait_or_their_paths_end() {
             let n = [2, 0, 1, 0, 0, 0, 5, 0];
             let decision = Decision8 { n, with_nee: [1, 0, 1, 0, 0, 0, 5, 0] };
             a.vertex.samples = U32x8::from_fn(|i| n[i] | decision.with_nee[i] << 16);
-            settle(&mut shard.book, &mut shard.ring, &a, &decision);
-            let c = &shard.book.counters;
+            settle(&mut shard.state.book, &mut shard.state.ring, &a, &decision);
+            let c = &shard.state.book.counters;
             assert_eq!((c.paths_terminated, c.camera_samples, c.splits, c.light_samples_skipped), (2, 2, 5, 1));
-            assert_eq!(shard.ring.waiting(), 3);
+            assert_eq!(shard.state.ring.waiting(), 3);
             let mirror = PacketClass::of_material(MaterialKind::Mirror as u32).expect("a class");
-            assert_eq!(shard.ring.fullest(), Some((mirror.queue(true), 5)));
-            assert_eq!(shard.book.roots.get(a.vertex.path.root.lane(6)).splits, 4);
+            assert_eq!(shard.state.ring.fullest(), Some((mirror.queue(true), 5)));
+            assert_eq!(shard.state.book.roots.get(a.vertex.path.root.lane(6)).splits, 4);
         },
     );
 }
@@ -512,12 +524,13 @@ fn books_close_into_pixels() {
             let path = paths(shard, 3);
             let x = Vec3x8::from_fn(|i| [i as f32, 1.0, if i == 5 { f32::INFINITY } else { 0.5 }]);
             let found = Contribution8 { pixel: x, local: x };
-            shard.book.accumulate(Mask8::from_bits(0b0011_0110), &path, &found);
-            shard.book.accumulate(Mask8::from_bits(0b0000_0010), &path, &found);
-            shard.book.close_lanes(Mask8::all_lanes(), &path);
-            let sums = [0, 1, 2, 5].map(|p: usize| (shard.book.pixels[p].sum, shard.book.pixels[p].samples));
+            shard.state.book.accumulate(Mask8::from_bits(0b0011_0110), &path, &found);
+            shard.state.book.accumulate(Mask8::from_bits(0b0000_0010), &path, &found);
+            shard.state.book.close_lanes(Mask8::all_lanes(), &path);
+            let sums =
+                [0, 1, 2, 5].map(|p: usize| (shard.state.book.pixels[p].sum, shard.state.book.pixels[p].samples));
             assert_eq!(sums, [([0.0; 3], 1), ([2.0, 2.0, 1.0], 1), ([2.0, 1.0, 0.5], 1), ([0.0; 3], 1)]);
-            let c = &shard.book.counters;
+            let c = &shard.state.book.counters;
             assert_eq!((c.non_finite, c.first_non_finite, c.path_segments), (1, 6, 24));
         },
     );

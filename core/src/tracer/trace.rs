@@ -1,7 +1,7 @@
 //! Stage `trace`: closest hits.
 
 use super::book::Bookkeeping;
-use super::ray_state::RayState8;
+use super::packets::RayState8;
 use crate::accel::Intersector;
 use crate::cost::COST_BOUNCE;
 use crate::geometry::Hit8;

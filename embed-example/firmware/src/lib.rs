@@ -4,9 +4,9 @@
 #![forbid(unsafe_code)]
 
 use croupier::Scene;
-use croupier::rng::Key8;
-use croupier::scene::blob::content_hash;
-use croupier::simd::{F32x8, U32x8};
+use croupier::unstable::rng::Key8;
+use croupier::unstable::scene::blob::content_hash;
+use croupier::unstable::simd::{F32x8, U32x8};
 
 /// Bytes at an address that is a multiple of 64.
 #[repr(C, align(64))]

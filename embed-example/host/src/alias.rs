@@ -4,10 +4,10 @@
 //! the estimator divides by differ, and the estimate is biased by the difference (NUMERICS SMP-3). Here the weights
 //! become integer widths first; the widths, the thresholds and the probabilities then follow exactly.
 
-use croupier::scene::blob::Alias;
+use croupier::unstable::scene::blob::Alias;
 use std::cmp::Ordering;
 
-/// How many 32-bit numbers there are.
+/// Number of 32-bit numbers.
 const RANGE: u64 = 1 << 32;
 
 /// First of the 32-bit numbers that pick slot `i` of `n`: the smallest r with `(r n) >> 32 >= i`.
@@ -17,7 +17,7 @@ fn first(i: usize, n: usize) -> u64 {
 
 /// Integer widths that sum to exactly 2^32: 0 for a weight of 0, at least 1 for a positive weight.
 ///
-/// Every positive weight gets one unit, the rest is dealt out by rounding the running sum, so that a width is within
+/// Every positive weight gets one unit, the rest is distributed by rounding the running sum, so that a width is within
 /// one unit of its share of `2^32 - n`. Negative and non-finite weights count as 0. `None` if no weight is positive.
 pub fn widths(weights: &[f64]) -> Option<Vec<u64>> {
     let clean = |w: f64| if w.is_finite() && w > 0.0 { w } else { 0.0 };
@@ -30,13 +30,13 @@ pub fn widths(weights: &[f64]) -> Option<Vec<u64>> {
     // Relative to the largest, so that a sum of huge weights stays finite.
     let total: f64 = weights.iter().map(|w| clean(*w) / largest).sum();
     let spare = RANGE - positive;
-    let (mut sum, mut dealt) = (0.0, 0);
+    let (mut sum, mut given) = (0.0, 0);
     let mut widths = Vec::with_capacity(weights.len());
     for w in weights.iter().copied().map(clean) {
         sum += w / largest;
         let upto = ((sum / total * spare as f64).round() as u64).min(spare);
-        widths.push(if w > 0.0 { 1 + upto - dealt } else { 0 });
-        dealt = upto;
+        widths.push(if w > 0.0 { 1 + upto - given } else { 0 });
+        given = upto;
     }
     Some(widths)
 }

@@ -21,16 +21,16 @@ pub use error::BakeError;
 use crate::blob::{AlignedBytes, BlobWriter};
 use crate::bvh;
 use crate::description::SceneDescription;
-use croupier::scene::blob::{SceneInfo, SectionKind};
+use croupier::unstable::scene::blob::{SceneInfo, SectionKind};
 
-/// Choices of baking.
+/// Options of baking.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BakeOptions {
-    /// How long to look for a good tree.
+    /// Effort of building the tree.
     pub effort: bvh::Effort,
 }
 
-/// Parts of baking, in order.
+/// Stages of baking, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// Checks vertices and triangles.
@@ -49,7 +49,7 @@ impl Stage {
     /// Every stage, in order.
     pub const ALL: &'static [Self] = &[Self::Geometry, Self::Tree, Self::Materials, Self::Lights, Self::Write];
 
-    /// What to show while it lasts.
+    /// Name of the stage for progress displays.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Geometry => "checking geometry",
@@ -61,14 +61,14 @@ impl Stage {
     }
 }
 
-/// What baking found and made.
+/// Counts and sizes of a baked scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BakeReport {
     /// Triangles in the blob.
     pub triangles: u32,
-    /// Triangles without area, left out.
+    /// Triangles without area, which are left out.
     pub dropped_degenerate: u32,
-    /// Those of them that would have been lights.
+    /// Triangles without area that would have been lights.
     pub dropped_lights: u32,
     /// Smooth triangles with a vertex normal of length 0, shaded flat.
     pub flattened: u32,
@@ -86,12 +86,12 @@ pub struct BakeReport {
     pub bytes: u64,
 }
 
-/// A scene blob and how it came about.
+/// Scene blob with a report of its making.
 #[derive(Clone, Debug)]
 pub struct Baked {
     /// The blob, at an address that suits [`croupier::Scene::from_bytes`] best.
     pub bytes: AlignedBytes,
-    /// What baking found and made.
+    /// Counts and sizes.
     pub report: BakeReport,
 }
 

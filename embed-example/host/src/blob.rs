@@ -1,7 +1,7 @@
-//! Writes scene blobs: header, section table, sections, content hash ([`croupier::scene::blob`]).
+//! Writes scene blobs: header, section table, sections, content hash ([`croupier::unstable::scene::blob`]).
 
 use bytemuck::{Pod, Zeroable};
-use croupier::scene::blob::{ALIGN, Header, MAGIC, Section, SectionKind, VERSION, content_hash};
+use croupier::unstable::scene::blob::{ALIGN, Header, MAGIC, Section, SectionKind, VERSION, content_hash};
 use std::fmt;
 use std::ops::Deref;
 
@@ -18,12 +18,12 @@ pub struct AlignedBytes {
 }
 
 impl AlignedBytes {
-    /// That many zeros. The system provides large ones page by page when they are first touched.
+    /// Zeros of that length. The system provides large ones page by page when they are first touched.
     pub fn zeroed(length: usize) -> Self {
         Self { lines: bytemuck::zeroed_vec(length.div_ceil(ALIGN)), length }
     }
 
-    /// The same, or `None` where that much memory is not to be had.
+    /// Zeros of that length, or `None` where the system has not enough memory.
     pub fn try_zeroed(length: usize) -> Option<Self> {
         Some(Self { lines: bytemuck::try_zeroed_vec(length.div_ceil(ALIGN)).ok()?, length })
     }
@@ -52,7 +52,7 @@ impl fmt::Debug for AlignedBytes {
 /// Collects sections and lays them out, in the order in which they were added.
 ///
 /// ```
-/// use croupier::scene::blob::{Header, SectionKind};
+/// use croupier::unstable::scene::blob::{Header, SectionKind};
 /// use croupier_host::blob::BlobWriter;
 /// let mut writer = BlobWriter::default();
 /// writer.section(SectionKind::Tables, &[0.25f32, 0.5]);

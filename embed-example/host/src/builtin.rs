@@ -122,7 +122,7 @@ fn unit(p: [f64; 3]) -> [f64; 3] {
     p.map(|x| x / length)
 }
 
-/// A plain sky: white at the horizon, blue at the zenith, a dim ground below; radiance near 1.
+/// Environment map of a plain sky: white at the horizon, blue at the zenith, a dim ground below; radiance near 1.
 ///
 /// With y the upward component of the direction, the sky is horizon + (zenith - horizon) sqrt(y); the square root puts
 /// most of the change near the horizon, as haze does.

@@ -6,7 +6,7 @@
 //! | [`Bias`] | is there an error that noise does not explain, and where |
 //! | [`Ratio`] | is the whole image too bright or too dark |
 //! | [`crate::flip`] | how large is the difference to the eye |
-//! | [`equivalence`] | is a difference shown to be *small* (not just: not shown to be large) |
+//! | [`equivalence()`] | is a difference shown to be *small* (not just: not shown to be large) |
 
 mod bias;
 mod equivalence;

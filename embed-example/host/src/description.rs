@@ -21,7 +21,7 @@
 //! # Ok::<(), croupier_host::bake::BakeError>(())
 //! ```
 
-use croupier::scene::blob::MaterialKind;
+use croupier::unstable::scene::blob::MaterialKind;
 
 /// A whole scene. Indices are positions in the `Vec`s here.
 #[derive(Clone, Debug)]
@@ -38,7 +38,7 @@ pub struct SceneDescription {
     pub textures: Vec<Texture>,
     /// Lights, except the one at infinity all around.
     pub emitters: Vec<Emitter>,
-    /// What surrounds the scene; `None` is black.
+    /// Environment of the scene; `None` is black.
     pub environment: Option<Environment>,
     /// Camera.
     pub camera: Camera,
@@ -80,26 +80,26 @@ pub struct Object {
 /// A named material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
-    /// Name; messages and scene files know it by this.
+    /// Name in messages and scene files.
     pub name: String,
     /// Both sides behave like the front; else the back of an opaque surface is black. Ignored by dielectrics and
     /// `Null`.
     pub two_sided: bool,
-    /// How it scatters.
+    /// Scattering model.
     pub model: Model,
 }
 
 /// Diffuse albedo, or scale of a specular reflection; 0 to 1 per channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reflectance {
-    /// The same everywhere.
+    /// Constant colour.
     Constant([f32; 3]),
     /// Index of a texture.
     Texture(u32),
 }
 
 /// Parameters that a model has, by their keys in scene files; see the core's `bsdf` for the formulas and
-/// [`Parameter`](croupier::scene::blob::Parameter) for the ranges.
+/// [`Parameter`](croupier::unstable::scene::blob::Parameter) for the ranges.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ModelParameters {
     /// Diffuse albedo, or scale of a specular reflection.
@@ -118,7 +118,7 @@ pub struct ModelParameters {
 
 /// Source of a model's parameters, such as an object of a scene file.
 pub trait ParameterSource {
-    /// Why a parameter cannot be had.
+    /// Error of a parameter that is missing or of another type.
     type Error;
     /// `reflectance`.
     fn reflectance(&mut self) -> Result<Reflectance, Self::Error>;
@@ -147,7 +147,7 @@ macro_rules! models {
                 match self { $(Self::$kind { .. } => MaterialKind::$kind),* }
             }
 
-            /// The parameters it has.
+            /// Parameters of the model.
             pub fn parameters(&self) -> ModelParameters {
                 match *self {
                     $(Self::$kind $({ $($parameter),* })? =>
@@ -191,7 +191,7 @@ models! {
 /// An 8-bit image, sRGB-encoded; bilinear, repeated.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Texture {
-    /// Where it came from, for messages.
+    /// Name or path, for messages.
     pub name: String,
     /// Columns.
     pub width: u32,
@@ -230,7 +230,7 @@ pub enum Emitter {
 /// Light from infinity, all around.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Environment {
-    /// The same radiance from all directions.
+    /// Constant radiance from all directions.
     Constant {
         /// Radiance.
         radiance: [f32; 3],
@@ -292,14 +292,14 @@ impl Default for Camera {
 }
 
 impl Model {
-    /// Does light pass it?
+    /// Whether light passes the surface.
     pub const fn is_transmissive(&self) -> bool {
         self.kind().facts().transmissive
     }
 }
 
 impl Default for SceneDescription {
-    /// Nothing, in black, seen by the default camera; at most 40 path segments.
+    /// Empty black scene, seen by the default camera; at most 40 path segments.
     fn default() -> Self {
         Self {
             vertices: Vec::new(),

@@ -13,13 +13,12 @@ pub use observe::{Observer, Progress, Target, Unobserved};
 pub use result::{CacheRecord, IterationRecord, Rendered};
 
 use crate::blob::AlignedBytes;
-use croupier::accel::Intersector;
-use croupier::learn::cache::{Cache, CacheError};
-use croupier::profile::{AnyProfile, DiffuseOnly, Full, Profile};
-use croupier::rrs::Space;
-use croupier::{
-    Budget, Counters, ErrorEstimate, Phase, Plan, Scene, Session, SessionError, Settings, Shard, StepResult,
-};
+use croupier::unstable::Phase;
+use croupier::unstable::accel::Intersector;
+use croupier::unstable::learn::cache::{Cache, CacheError};
+use croupier::unstable::profile::{AnyProfile, DiffuseOnly, Full, Profile};
+use croupier::unstable::rrs::Space;
+use croupier::{Budget, Counters, ErrorEstimate, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
 use rayon::prelude::*;
 use schedule::Work;
 use std::sync::atomic::{AtomicU64, Ordering};

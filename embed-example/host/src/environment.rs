@@ -1,8 +1,8 @@
 //! Sampling tables and selection weights of lights: what baking adds to the scene's description of emission.
 
 use crate::alias;
-use croupier::light::{SceneExtent, luminance, power};
-use croupier::scene::blob::{Alias, Environment, EnvironmentKind, Light};
+use croupier::unstable::light::{SceneExtent, luminance, power};
+use croupier::unstable::scene::blob::{Alias, Environment, EnvironmentKind, Light};
 use std::f64::consts::{PI, TAU};
 
 /// Integral of bilinear luminance over each cell of a lat-long map, in luminance x sr, row by row.

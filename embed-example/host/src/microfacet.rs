@@ -1,9 +1,9 @@
 //! Tables that plastics need at bake time, by quadrature in f64.
 
-use croupier::scene::blob::TRANSMITTANCE_ENTRIES;
+use croupier::unstable::scene::blob::TRANSMITTANCE_ENTRIES;
 use std::f64::consts::PI;
 
-/// What a rough coat does to light that scatters below it.
+/// Transmittance and internal reflectance of a rough coat.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoughPlasticTable {
     /// T: energy transmitted from outside at cosines 0, 1/63, ... 1: the mean over visible normals of (1 - F)
@@ -24,7 +24,10 @@ const GRAZING: f64 = 1e-6;
 
 /// Table of a GGX coat of width `alpha` in (0, 10] and relative index `eta` = int_ior / ext_ior > 0.
 pub fn rough_plastic(alpha: f64, eta: f64) -> RoughPlasticTable {
-    let alpha = alpha.clamp(f64::from(croupier::bsdf::ggx::MIN_ALPHA), f64::from(croupier::bsdf::ggx::MAX_ALPHA));
+    let alpha = alpha.clamp(
+        f64::from(croupier::unstable::bsdf::ggx::MIN_ALPHA),
+        f64::from(croupier::unstable::bsdf::ggx::MAX_ALPHA),
+    );
     let rule = gauss_legendre(POINTS);
     let mu = |i: usize| (i as f64 / (TRANSMITTANCE_ENTRIES - 1) as f64).max(GRAZING);
     let transmittance = std::array::from_fn(|i| energy(&rule, alpha, eta, mu(i), false) as f32);

@@ -72,7 +72,7 @@ impl Statistics {
     pub fn of(r: &Rendered) -> Self {
         let c = &r.counters;
         let over = |a: u64, b: u64| a as f64 / b.max(1) as f64;
-        let first = |f: fn(&croupier::film::PixelAov) -> f64| r.aovs.iter().map(f).sum::<f64>();
+        let first = |f: fn(&croupier::unstable::film::PixelAov) -> f64| r.aovs.iter().map(f).sum::<f64>();
         let hits = first(|a| a.vertices[0]);
         let pixels = u64::from(r.size[0]) * u64::from(r.size[1]);
         // the error is unknown until a pixel has two samples

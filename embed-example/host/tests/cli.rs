@@ -1,7 +1,7 @@
 //! The program from outside: exit status, one clear line of error, JSON.
 
 use bytemuck::{Zeroable, bytes_of};
-use croupier::scene::blob::{self, ALIGN, Camera, Header, SceneInfo, Section, SectionKind};
+use croupier::unstable::scene::blob::{self, ALIGN, Camera, Header, SceneInfo, Section, SectionKind};
 use croupier_host::image::Picture;
 use std::path::Path;
 use std::process::{Command, Output};

@@ -1,6 +1,7 @@
 //! The program's flags about learning, denoising, false colours and statistics, from outside.
 
-use croupier::{Scene, SettingRange, Settings};
+use croupier::unstable::SettingRange;
+use croupier::{Scene, Settings};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::builtin;
 use croupier_host::image::Picture;

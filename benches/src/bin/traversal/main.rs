@@ -14,9 +14,9 @@
 mod rays;
 
 use clap::Parser;
-use croupier::accel::{Intersector, WideBvh};
-use croupier::geometry::{Hit8, Ray8};
-use croupier::simd::Mask8;
+use croupier::unstable::accel::{Intersector, WideBvh};
+use croupier::unstable::geometry::{Hit8, Ray8};
+use croupier::unstable::simd::Mask8;
 use croupier_benches::clock::Clock;
 use croupier_benches::results::{Results, Table};
 use croupier_host::bvh::{self, Effort};

@@ -1,17 +1,17 @@
 //! The scene of the benchmark, and its sets of rays in the layouts of the kernels.
 
-use croupier::accel::{Intersector, WideBvh};
-use croupier::geometry::Ray8;
-use croupier::simd::{F32x8, Mask8, Vec3x8};
+use croupier::unstable::accel::{Intersector, WideBvh};
+use croupier::unstable::geometry::Ray8;
+use croupier::unstable::simd::{F32x8, Mask8, Vec3x8};
 use glam::Vec3;
 use obvhs::ray::Ray;
 use std::path::Path;
 
 /// Corners of a triangle.
-pub type Tri = [[f32; 3]; 3];
+pub(crate) type Tri = [[f32; 3]; 3];
 
 /// What primary rays need of a camera.
-pub struct Camera {
+pub(crate) struct Camera {
     origin: Vec3,
     target: Vec3,
     up: Vec3,
@@ -97,7 +97,7 @@ struct One {
 }
 
 /// One set in the two layouts.
-pub struct Set {
+pub(crate) struct Set {
     pub name: &'static str,
     /// Is any hit enough?
     pub any: bool,
@@ -193,7 +193,7 @@ fn bounds(triangles: &[Tri]) -> (Vec3, Vec3) {
 }
 
 /// Triangles and camera of an OBJ file with its `scene.json`, or of a generated scene.
-pub fn scene(path: Option<&Path>) -> (Vec<Tri>, Camera) {
+pub(crate) fn scene(path: Option<&Path>) -> (Vec<Tri>, Camera) {
     let Some(path) = path else { return generated() };
     let triangles = read_obj(path);
     let (lo, hi) = bounds(&triangles);
@@ -202,7 +202,7 @@ pub fn scene(path: Option<&Path>) -> (Vec<Tri>, Camera) {
 }
 
 /// Primary rays, bounces and shadow rays.
-pub fn sets(wide: &WideBvh<'_>, triangles: &[Tri], camera: &Camera, width: usize) -> [Set; 5] {
+pub(crate) fn sets(wide: &WideBvh<'_>, triangles: &[Tri], camera: &Camera, width: usize) -> [Set; 5] {
     let mut r = Random(3);
     let (lo, hi) = bounds(triangles);
     let size = hi - lo;

@@ -1,4 +1,5 @@
-//! The statistics of one bin, in the three forms they take: gathered, kept, looked up.
+//! Statistics of one bin in their three forms: of one shard and iteration ([`BinRecord`]), of all iterations
+//! ([`BinSums`]), as look-ups read them ([`FrozenBin`]).
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use crate::rrs::Local8;
@@ -14,15 +15,15 @@ pub const NO_BIN: u32 = u32::MAX;
 /// Samples, pairs and shadow rays that one bin takes from one shard in one iteration, each: below it no f32 sum stalls.
 pub const BIN_LIMIT: u16 = u16::MAX;
 
-/// Values and costs above 2^55 count as 2^55: [`BIN_LIMIT`] of their squares are still finite.
+/// Largest value or cost, 2^55: greater ones count as this, and sums of [`BIN_LIMIT`] squares are still finite.
 pub const MAX_VALUE: f32 = 36_028_797_018_963_968.0;
-/// Twice the square of [`MAX_VALUE`].
+/// Largest second moment: twice the square of [`MAX_VALUE`].
 const MAX_SQUARE: f32 = 2.0 * MAX_VALUE * MAX_VALUE;
 
-/// Pairs that `moment - mean^2` counts for in the variance.
+/// Weight of `moment - mean^2` in the variance, in pairs.
 const SPREAD_PAIRS: f64 = 16.0;
 
-/// What a shard has gathered in an iteration.
+/// Sums of one shard in one iteration.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct BinRecord {
@@ -32,8 +33,8 @@ pub(super) struct BinRecord {
     sum: [f32; 3],
     sqr: [f32; 3],
     pair: [f32; 3],
-    /// Squares of the light samples, all channels.
-    light: f32,
+    /// Squares of contributions of next event estimation, all channels.
+    nee: f32,
 }
 
 impl BinRecord {
@@ -52,12 +53,12 @@ impl BinRecord {
         true
     }
 
-    /// Adds the square of a finite light sample, times `drawn`.
-    pub(super) fn add_light(&mut self, x: [f32; 3], drawn: f32) {
+    /// Adds the square of a finite contribution of next event estimation, times its probability.
+    pub(super) fn add_nee(&mut self, x: [f32; 3], nee_probability: f32) {
         if self.count != BIN_LIMIT {
             let square: f32 = x.map(|x| x.clamp(0.0, MAX_VALUE)).map(|x| x * x).iter().sum();
-            // more of them may come than samples, whose records are full or spoiled
-            self.light = (self.light + drawn.clamp(0.0, 1.0) * square).min(f32::MAX);
+            // there may be more of them than samples: incomplete samples are not added
+            self.nee = (self.nee + nee_probability.clamp(0.0, 1.0) * square).min(f32::MAX);
         }
     }
 
@@ -74,7 +75,7 @@ impl BinRecord {
     }
 }
 
-/// Shadow rays that a shard has traced in an iteration from a leaf towards a bin's directions.
+/// Shadow rays of one shard in one iteration, from a leaf towards a bin's directions.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct ShadowRecord {
@@ -94,7 +95,7 @@ impl ShadowRecord {
     }
 }
 
-/// Sums over all iterations; f64, so that 1e9 samples lose nothing.
+/// Sums over all iterations, in f64 so that 1e9 samples lose nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct BinSums {
@@ -104,15 +105,15 @@ pub(super) struct BinSums {
     sum: [f64; 3],
     sqr: [f64; 3],
     pair: [f64; 3],
-    /// Shadow rays from the leaf towards the bin's directions, whatever the bins of their vertices.
+    /// Shadow rays from the leaf towards the bin's directions, from vertices of any bin of the leaf.
     rays: f64,
-    /// Those that met nothing.
+    /// Shadow rays among them that were unoccluded.
     visible: f64,
-    /// Squares of light samples, all channels, as if each sample had drawn one.
-    light: f64,
+    /// Squares of contributions of next event estimation, all channels, as if every sample had used it.
+    nee: f64,
 }
 
-/// Numbers of a [`BinSums`].
+/// Number of the sums.
 const FIELDS: usize = size_of::<BinSums>() / 8;
 
 impl BinSums {
@@ -125,7 +126,7 @@ impl BinSums {
         pair: [0.0; 3],
         rays: 0.0,
         visible: 0.0,
-        light: 0.0,
+        nee: 0.0,
     };
 
     pub(super) fn fields(&self) -> &[f64; FIELDS] {
@@ -147,7 +148,7 @@ impl BinSums {
         }
     }
 
-    /// Adds `samples` samples, and as many pairs and shadow rays, that are what `prior` has on average.
+    /// Shrinks towards `prior`: adds `samples` samples, pairs and shadow rays that are what `prior` has on average.
     pub(super) fn shrink(&mut self, prior: &Self, samples: f64) {
         if prior.count > 0.0 {
             let own = *self;
@@ -166,7 +167,7 @@ impl BinSums {
         }
     }
 
-    /// Square root of the share of shadow rays that met nothing, in 255ths, rounded up; 255 where none is known.
+    /// Square root of the share of unoccluded shadow rays, in 255ths, rounded up; 255 where none was traced.
     fn visibility(&self) -> u8 {
         let share = self.visible / self.rays;
         if share < 1.0 {
@@ -187,38 +188,38 @@ impl BinSums {
         self.count += f64::from(r.count);
         self.pairs += f64::from(r.pairs);
         self.cost += f64::from(r.cost);
-        self.light += f64::from(r.light);
+        self.nee += f64::from(r.nee);
         for (a, b) in [(&mut self.sum, r.sum), (&mut self.sqr, r.sqr), (&mut self.pair, r.pair)] {
             a.iter_mut().zip(b).for_each(|(a, b)| *a += f64::from(b));
         }
     }
 }
 
-/// What look-ups read: all numbers finite, none negative. One row of eight words, half a cache line: a render reads one
-/// at every vertex, so colours are [`short`].
+/// Statistics that look-ups read: all numbers finite, none negative. One row of eight words, half a cache line: a
+/// render reads one at every vertex, so colours are [`short`].
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C, align(32))]
-pub(super) struct Frozen {
+pub(super) struct FrozenBin {
     count: f32,
     cost: f32,
     /// Mean, moment, variance, rgb each: two [`short`]s a word, the first below.
     colors: [u32; 5],
-    /// See [`Local8::nee_share`].
+    /// Share of next event estimation ([`Local8::nee_share`]).
     nee_share: f32,
 }
 
-/// `x`, between 0 and `max`; a NaN is 0.
+/// Number clamped to [0, `max`]; a NaN is 0.
 fn saturate(x: f64, max: f32) -> f32 {
     if x > 0.0 { x.min(f64::from(max)) as f32 } else { 0.0 }
 }
 
-/// The upper half of a number that is finite and not negative: 8 significant bits. Rounded towards 0: above 1e-38 by
-/// less than 2^-7 of it.
+/// Upper half of a number that is finite and not negative: 8 significant bits, rounded towards 0. The relative error is
+/// below 2^-7 for numbers above 1e-38.
 fn short(x: f32) -> u32 {
     x.to_bits() >> 16
 }
 
-/// Rounded up. [`MAX_SQUARE`] is a power of two, which stays what it is.
+/// [`short`] of the number rounded up. [`MAX_SQUARE`] is a power of two, which stays as it is.
 fn short_above(x: f32) -> u32 {
     short(f32::from_bits(x.to_bits() + 0xffff))
 }
@@ -227,10 +228,10 @@ fn long(x: u32) -> f32 {
     f32::from_bits(x << 16)
 }
 
-impl Frozen {
+impl FrozenBin {
     pub(super) const ZERO: Self = Self { count: 0.0, cost: 0.0, colors: [0; 5], nee_share: 0.0 };
 
-    /// What is known of one sample with the sums `s`.
+    /// Statistics of one sample with the sums `s`.
     fn of(s: &BinSums) -> Self {
         let mut f = Self::ZERO;
         let n = s.count.max(1e-300);
@@ -248,16 +249,17 @@ impl Frozen {
         }
         let ([a, b, c], [d, e, g], [h, i, j]) = (mean, moment, variance);
         let squares: f64 = s.sqr.iter().sum();
-        f.nee_share = saturate(s.light / squares.max(f64::MIN_POSITIVE), 1.0);
+        f.nee_share = saturate(s.nee / squares.max(f64::MIN_POSITIVE), 1.0);
         f.colors = [a | b << 16, c | d << 16, e | g << 16, h | i << 16, j];
         f
     }
 }
 
-/// What look-ups read of one leaf, whose surroundings have the sums `prior`. Without samples all `count` are 0.
+/// Computes what look-ups read of one leaf, whose surroundings have the sums `prior`. Without samples all `count` are
+/// 0.
 pub(super) fn freeze_leaf(
     sums: &[BinSums],
-    frozen: &mut [Frozen],
+    frozen: &mut [FrozenBin],
     visibility: &mut [u8],
     prior: &BinSums,
     samples: f64,
@@ -271,13 +273,13 @@ pub(super) fn freeze_leaf(
         let own = b.count;
         b.shrink(&leaf, samples);
         *visibility = b.visibility();
-        *f = if known { Frozen::of(&b) } else { Frozen::ZERO };
+        *f = if known { FrozenBin::of(&b) } else { FrozenBin::ZERO };
         f.count = saturate(own, MAX_VALUE);
     }
 }
 
-impl Frozen {
-    /// Rows of eight bins, one per lane.
+impl FrozenBin {
+    /// Statistics of eight bins, one per lane.
     #[inline(always)]
     pub(super) fn transpose(rows: [&Self; 8]) -> Local8 {
         let row = |f: &Self| F32x8::new(*bytemuck::cast_ref::<_, [f32; 8]>(f));

@@ -33,7 +33,7 @@ kinds! {
 pub struct VertexKind8(U32x8);
 
 impl VertexKind8 {
-    /// The same kind in all lanes.
+    /// One kind in all lanes.
     pub fn splat(kind: VertexKind) -> Self {
         Self(U32x8::splat(kind as u32))
     }

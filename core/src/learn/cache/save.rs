@@ -6,13 +6,13 @@
 //! | nodes, padded to a multiple of 8 | shape: a byte per node, 1 inner, 0 leaf; parents first, children in order |
 //! | 1920 per leaf | sums of the leaves in the order of the shape |
 //!
-//! All numbers are little-endian. The header says what the sums hang on: the bounds, which place the cells, and the
-//! objective, because values of [first vertices](super::VertexKind::FirstDiffuse) are in units of their pixel under the
-//! relative one, and radiance under the absolute one. Nothing else has to agree: after a change of strategy, norm,
-//! depth, camera or scene the sums are what they were of a render alike, in the same units, and fade as new ones come.
+//! All numbers are little-endian. The header states what the sums depend on: the bounds, which determine the cells, and
+//! the objective, because values of [first vertices](super::VertexKind::FirstDiffuse) are in units of their pixel under
+//! the relative one, and radiance under the absolute one. Nothing else has to agree: after a change of strategy, norm,
+//! depth, camera or scene the sums have the same units, and decay as new ones are added.
 //!
 //! There are no indices, so bytes cannot describe anything but a tree: what is left to check is that the shape ends
-//! where it says, how deep it goes, and the numbers. Bytes are checked as a whole before anything is changed.
+//! where the header says, how deep it goes, and the numbers. All bytes are checked before anything is changed.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use super::bins::{BINS, BinSums};
@@ -25,9 +25,9 @@ use core::fmt;
 
 /// First bytes of a saved cache.
 const MAGIC: u64 = u64::from_le_bytes(*b"CRPCACHE");
-/// Version of the format.
+/// Version of the format, which covers the layout of the sums too.
 const VERSION: u32 = 4;
-/// Largest sum: adding up such files, or squaring their means, stays finite.
+/// Largest sum that is accepted: sums of such files, and squares of their means, stay finite.
 const MAX_SUM: f64 = 1e100;
 
 // Any of these is part of the layout: another number of octrees, bins or sums needs another version.
@@ -45,14 +45,14 @@ struct Header {
     version: u32,
     nodes: u32,
     leaves: u32,
-    /// Bits of the cube's smallest corner and edge.
+    /// Cube around the bounds: bits of its smallest corner and of its edge.
     cube: [u32; 4],
-    /// An [`Objective`].
+    /// [`Objective`] as a number.
     objective: u32,
     reserved: [u32; 4],
 }
 
-/// Why bytes are not a cache that can be loaded, or a cache cannot be saved.
+/// Reason why bytes cannot be loaded as a cache, or a cache cannot be saved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum CacheError {
@@ -63,58 +63,58 @@ pub enum CacheError {
         /// Bytes given.
         given: usize,
     },
-    /// Not a saved cache: its first eight bytes.
+    /// Not a saved cache; the first eight bytes.
     Magic(u64),
     /// A version of the format that is not known.
     Version(u32),
     /// The hash of the contents is not the one stored.
     Hash {
-        /// Stored.
+        /// Hash in the header.
         stored: u64,
-        /// Of the bytes.
+        /// Hash of the bytes.
         found: u64,
     },
-    /// Of other bounds than this cache.
+    /// A cache over other bounds.
     Bounds {
         /// 0 to 2: smallest corner of the cube; 3: its edge.
         index: u32,
-        /// Of this cache.
+        /// Value of this cache.
         expected: f32,
-        /// Of the bytes.
+        /// Value in the header.
         found: f32,
     },
-    /// Of renders with another objective.
+    /// A cache of renders with another objective.
     Objective {
-        /// Of this cache.
+        /// Objective of this cache.
         expected: Objective,
-        /// Of the bytes: an [`Objective`] as a number.
+        /// Objective in the header, as a number.
         found: u32,
     },
     /// A node that is neither 0 nor 1, or an inner one at the depth limit.
     OctreeNode {
-        /// Its place in the shape.
+        /// Number of the node in the order of the shape.
         index: u32,
-        /// Its byte.
+        /// Byte of the node.
         found: u8,
-        /// Its depth.
+        /// Depth of the node.
         depth: u32,
     },
     /// The shape has other numbers of nodes and leaves than the header.
     Shape {
-        /// Nodes and leaves of the header.
+        /// Nodes and leaves in the header.
         expected: [u32; 2],
-        /// Nodes and leaves met.
+        /// Nodes and leaves in the shape.
         found: [u32; 2],
     },
     /// A sum that is negative, not finite or above 1e100.
     Sum {
-        /// Leaf, in the order of the shape.
+        /// Leaf in the order of the shape.
         leaf: u32,
-        /// Bin of the leaf.
+        /// Direction bin of the leaf.
         bin: u32,
-        /// Number of the bin.
+        /// Number of the sum within the bin.
         field: u32,
-        /// Its value.
+        /// Value of the sum.
         found: f64,
     },
     /// More leaves than there is room for.
@@ -157,8 +157,8 @@ impl fmt::Display for CacheError {
 
 impl core::error::Error for CacheError {}
 
-/// Shape and sums that were checked.
-struct Saved<'b> {
+/// Shape and sums of a saved cache, checked.
+struct SavedCache<'b> {
     shape: &'b [u8],
     sums: &'b [u8],
     leaves: u32,
@@ -168,7 +168,7 @@ fn padded(nodes: u32) -> usize {
     (nodes as usize).saturating_add(7) & !7
 }
 
-/// Bytes of a saved cache.
+/// Length of a saved cache, bytes.
 fn length(nodes: u32, leaves: u32) -> usize {
     (leaves as usize).saturating_mul(LEAF_BYTES).saturating_add(HEADER).saturating_add(padded(nodes))
 }
@@ -181,7 +181,7 @@ fn read_sums(bytes: &[u8]) -> BinSums {
     sums
 }
 
-impl<'b> Saved<'b> {
+impl<'b> SavedCache<'b> {
     fn check(bytes: &'b [u8], cache: &Cache<'_>) -> Result<Self, CacheError> {
         let given = bytes.len();
         let (header, body) = bytes.split_at_checked(HEADER).ok_or(CacheError::Length { needed: HEADER, given })?;
@@ -234,7 +234,7 @@ impl<'b> Saved<'b> {
     }
 }
 
-/// Are there trees, one after the other, in exactly these bytes?
+/// Checks that the shape is one tree after the other, as many as there are kinds of vertices.
 fn check_shape(shape: &[u8], expected: [u32; 2]) -> Result<(), CacheError> {
     // nodes still to come at every depth
     let mut open = [0u32; MAX_DEPTH as usize + 1];
@@ -266,7 +266,7 @@ fn check_shape(shape: &[u8], expected: [u32; 2]) -> Result<(), CacheError> {
     Ok(())
 }
 
-/// Numbers of a header between the machine's byte order and little-endian.
+/// Header converted between the machine's byte order and little-endian.
 fn words_to_native(h: Header) -> Header {
     Header {
         magic: u64::from_le(h.magic),
@@ -280,15 +280,15 @@ fn words_to_native(h: Header) -> Header {
     }
 }
 
-/// The next node and the next leaf of a [`Saved`].
+/// Next node and next leaf of a [`SavedCache`].
 #[derive(Default)]
-struct Cursor {
+struct SavedCursor {
     node: usize,
     leaf: u32,
 }
 
 impl Cache<'_> {
-    /// Bytes that [`Self::save`] writes.
+    /// Length of what [`Self::save`] writes, bytes.
     pub fn saved_len(&self) -> usize {
         length(self.nodes(), self.leaves())
     }
@@ -334,11 +334,11 @@ impl Cache<'_> {
         Ok(needed)
     }
 
-    /// Takes over a saved cache of the same bounds and objective, in place of what it has. Bytes with more leaves than
-    /// there is room for are refused; [`Self::merge`] into an empty cache takes what fits. After an error the cache is
-    /// as before.
+    /// Replaces all statistics by a saved cache of the same bounds and objective. Bytes with more leaves than there is
+    /// room for are refused; [`Self::merge`] into an empty cache takes what fits. After an error the cache is as
+    /// before.
     pub fn load(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
-        let saved = Saved::check(bytes, self)?;
+        let saved = SavedCache::check(bytes, self)?;
         let room = self.size.leaves();
         if saved.leaves > room {
             return Err(CacheError::Full { needed: saved.leaves, room });
@@ -352,19 +352,19 @@ impl Cache<'_> {
     /// room, else the finer sums join in one leaf; where it is coarser, leaves get an eighth per level. After an error
     /// the cache is as before.
     pub fn merge(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
-        let saved = Saved::check(bytes, self)?;
+        let saved = SavedCache::check(bytes, self)?;
         self.add(&saved);
         Ok(())
     }
 
-    fn add(&mut self, saved: &Saved<'_>) {
-        let mut at = Cursor::default();
+    fn add(&mut self, saved: &SavedCache<'_>) {
+        let mut at = SavedCursor::default();
         (0..ROOTS).for_each(|root| self.add_node(root, saved, &mut at));
         self.refresh();
     }
 
     /// Adds the next saved node and all below it to a node of this tree. Recursion ends at the depth limit.
-    fn add_node(&mut self, index: u32, saved: &Saved<'_>, at: &mut Cursor) {
+    fn add_node(&mut self, index: u32, saved: &SavedCache<'_>, at: &mut SavedCursor) {
         let inner = saved.shape.get(at.node) == Some(&1);
         at.node += 1;
         if !inner {

@@ -1,7 +1,7 @@
 //! The side of the cache that all shards look up in.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
-use super::bins::{BINS, BinSums, Frozen, NO_BIN, freeze_leaf};
+use super::bins::{BINS, BinSums, FrozenBin, NO_BIN, freeze_leaf};
 use super::kind::VertexKind8;
 use super::size::CacheSize;
 use super::training::Training;
@@ -15,14 +15,14 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 const PRIOR_SAMPLES: f64 = 4.0;
 
 impl CacheSize {
-    /// The largest cache whose shared side and `shards` training sides fit in `bytes` together; `None` if none does.
-    /// The smallest, four leaves that never grow, takes 9.7 KiB and 3.25 KiB more for each shard.
+    /// Capacity of the largest cache whose shared side and `shards` training sides fit in `bytes` together; `None` if
+    /// none fits. The smallest, four leaves that never grow, takes 9.7 KiB and 3.25 KiB more for each shard.
     pub fn within(bytes: usize, shards: u32) -> Option<Self> {
         let fits = |subdivisions: u32| Self { subdivisions }.bytes(shards).is_some_and(|b| b <= bytes);
         if !fits(0) {
             return None;
         }
-        // largest that fits, by bisection; `fits(low)` always holds
+        // the largest that fits, by bisection; `fits(low)` always holds
         let (mut low, mut high) = (0, Self::MAX_SUBDIVISIONS + 1);
         while high - low > 1 {
             let middle = low + (high - low) / 2;
@@ -31,36 +31,36 @@ impl CacheSize {
         Some(Self { subdivisions: low })
     }
 
-    /// Bytes of the shared side and of `shards` training sides.
+    /// Memory of the shared side and of `shards` training sides, bytes.
     pub fn bytes(self, shards: u32) -> Option<usize> {
         let training = Training::layout(self)?.size.checked_mul(shards as usize)?;
         Cache::layout(self)?.size.checked_add(training)
     }
 }
 
-/// The shared side: frozen while shards work, changed between iterations.
+/// Shared side of the statistics: frozen while shards work, changed between iterations.
 #[derive(Debug)]
 pub struct Cache<'m> {
     pub(super) tree: Tree<'m>,
     pub(super) sums: &'m mut [BinSums],
-    frozen: &'m mut [Frozen],
-    /// Roots of visibilities in 255ths, dense: they are read for other bins than `frozen` is.
+    frozen: &'m mut [FrozenBin],
+    /// Square roots of visibilities in 255ths, apart from `frozen` because they are read for other bins.
     visibility: &'m mut [u8],
     pub(super) size: CacheSize,
-    /// What the units of first vertices hang on.
+    /// Objective, on which the units of first vertices depend.
     pub(super) objective: Objective,
     subdivisions_refused: u64,
-    /// Leaves of a cache without a tree.
+    /// Number of leaves of a cache without a tree.
     flat: Option<u32>,
 }
 
 impl<'m> Cache<'m> {
-    /// The block that [`Self::new`] needs; `None` if it cannot be addressed.
+    /// Size and alignment of the block that [`Self::new`] needs; `None` if it cannot be addressed.
     pub fn layout(size: CacheSize) -> Option<Layout> {
         Self::measure(Measure::new(), size).layout()
     }
 
-    /// An empty cache in a block of its own, over the bounds `lo` to `hi`, world space, for the values of renders with
+    /// Empty cache in a block of its own, over the bounds `lo` to `hi`, world space, for the values of renders with
     /// this objective.
     pub fn new(
         size: CacheSize,
@@ -76,7 +76,7 @@ impl<'m> Cache<'m> {
     pub(crate) fn measure(m: Measure, size: CacheSize) -> Measure {
         Tree::measure(m, Tree::nodes_for(size.subdivisions), size.leaves())
             .add::<BinSums>(size.bins())
-            .add::<Frozen>(size.bins())
+            .add::<FrozenBin>(size.bins())
             .add::<u8>(size.bins())
     }
 
@@ -94,15 +94,15 @@ impl<'m> Cache<'m> {
         Ok(cache)
     }
 
-    /// The bins of eight vertices, [`NO_BIN`] in inactive lanes. `dir`: unit vectors, world space. Places outside
-    /// the bounds belong to the nearest leaf.
+    /// Bins of eight vertices, [`NO_BIN`] in inactive lanes. `p`: positions, world space; those outside the bounds
+    /// belong to the nearest leaf. `dir`: unit vectors, world space.
     #[inline]
     pub fn find(&self, kind: VertexKind8, p: Vec3x8, dir: Vec3x8, active: Mask8) -> U32x8 {
         self.bins_of(self.tree.find(kind, p, None), dir, active)
     }
 
-    /// As [`Self::find`], of places moved by `jitter - 0.5` of the edge of their leaf, `jitter` in [0, 1). So what is
-    /// looked up has no visible borders: it is a box filter over the leaves, by sampling.
+    /// Bins as of [`Self::find`], of positions moved by `jitter - 0.5` of the edge of their leaf, `jitter` in [0, 1): a
+    /// stochastic box filter, so that borders of leaves are not visible.
     #[inline]
     pub fn find_jittered(&self, kind: VertexKind8, p: Vec3x8, dir: Vec3x8, jitter: [F32x8; 3], active: Mask8) -> U32x8 {
         self.bins_of(self.tree.find(kind, p, Some(jitter)), dir, active)
@@ -113,7 +113,7 @@ impl<'m> Cache<'m> {
         U32x8::select(active, first + direction_bin(dir), U32x8::splat(NO_BIN))
     }
 
-    /// The bins of the same leaves as `bin` for other directions: unit vectors `dir`, world space. [`NO_BIN`] in
+    /// Bins in the leaves of `bin` for other directions: unit vectors `dir`, world space. [`NO_BIN`] in
     /// inactive lanes and where `bin` is no bin.
     #[inline]
     pub fn bins_towards(&self, bin: U32x8, dir: Vec3x8, active: Mask8) -> U32x8 {
@@ -121,8 +121,8 @@ impl<'m> Cache<'m> {
         self.bins_of(bin & U32x8::splat(!(BINS as u32 - 1)), dir, known)
     }
 
-    /// Square root of the chance that a shadow ray from the leaf of a bin towards its directions meets nothing, rounded
-    /// up to 255ths; 1 where nothing is known and for bins that are not in use.
+    /// Square root of the probability that a shadow ray from the leaf of a bin towards the bin's directions is
+    /// unoccluded, rounded up to 255ths; 1 where nothing is known and for bins that are not in use.
     #[inline]
     pub fn visibility_root(&self, bin: U32x8) -> F32x8 {
         let used = self.visibility.get(..self.bins() as usize).unwrap_or(&[]);
@@ -130,42 +130,44 @@ impl<'m> Cache<'m> {
         F32x8::new(bin.to_array().map(one)) / F32x8::splat(255.0)
     }
 
-    /// What is known of eight bins; all 0 in inactive lanes, for bins that are not in use and in leaves without samples.
+    /// Statistics of eight bins; all 0 in inactive lanes, for bins that are not in use and in leaves without samples.
     /// Values are those that were logged. Means and variances are up to 2^-7 (0.8 %) too small, moments too large.
-    /// `count` has the samples of the bin itself; its surroundings, which the other numbers lean on, do not count.
+    /// `count` has the samples of the bin itself, without those of its surroundings that the others are shrunk towards.
     #[inline]
     pub fn local(&self, bin: U32x8, active: Mask8) -> Local8 {
         // beyond the bins in use lies whatever the caller's memory held
         let used = self.frozen.get(..self.bins() as usize).unwrap_or(&[]);
-        let row = |b: u32| used.get(b as usize).unwrap_or(&Frozen::ZERO);
+        let row = |b: u32| used.get(b as usize).unwrap_or(&FrozenBin::ZERO);
         let [a, b, c, d, e, f, g, h] = U32x8::select(active, bin, U32x8::splat(NO_BIN)).to_array();
-        Frozen::transpose([row(a), row(b), row(c), row(d), row(e), row(f), row(g), row(h)])
+        FrozenBin::transpose([row(a), row(b), row(c), row(d), row(e), row(f), row(g), row(h)])
     }
 
-    /// Begins the end of an iteration: everything so far counts `keep` times as much, 0 to 1.
+    /// Begins the end of an iteration: all sums so far are multiplied by `keep`, 0 to 1.
     pub fn begin_merge(&mut self, keep: f64) {
         let keep = if keep >= 0.0 { keep.min(1.0) } else { 0.0 };
         self.used_mut().iter_mut().for_each(|b| b.scale(keep));
     }
 
-    /// Adds what a shard gathered. Shards in order, so that the sums have the same bits whoever worked when.
+    /// Adds the sums of one shard. The order of shards must be fixed: the bits of the sums depend on it.
     pub fn absorb(&mut self, t: &Training<'_>) {
         self.used_mut().iter_mut().zip(t.records()).for_each(|(b, r)| b.absorb(r));
         self.used_mut().iter_mut().zip(t.shadows()).for_each(|(b, s)| b.absorb_shadows(s));
     }
 
-    /// Ends the end of an iteration: subdivides leaves of more than `subdivide_count` samples (taken as at least 1), then
-    /// computes what look-ups read. Bins may have new numbers afterwards.
+    /// Completes the end of an iteration: subdivides leaves of more than `subdivide_count` samples (taken as at least
+    /// 1), then computes what look-ups read. Bins may have new numbers afterwards.
     ///
-    /// Children inherit an eighth of their parent's sums each, and are split again while that is still too many. When
-    /// leaves run out, those with most samples have been split first; the rest is counted by [`Self::subdivisions_refused`].
+    /// Children inherit an eighth of their parent's sums each, and are subdivided again while that is still too many.
+    /// If leaves run out, those with most samples have been subdivided first; [`Self::subdivisions_refused`] counts the
+    /// rest.
     pub fn freeze(&mut self, subdivide_count: f64) {
         if self.flat.is_some() {
             return self.refresh();
         }
         let limit = if subdivide_count.is_nan() { f64::INFINITY } else { subdivide_count.max(1.0) };
         let mut threshold = f64::INFINITY;
-        // A pass subdivides what is above its threshold and finds the largest leaf that is left, for the next threshold.
+        // A pass subdivides what is above its threshold and finds the largest leaf that is left, for the next
+        // threshold.
         loop {
             let (largest, full) = self.subdivide_above(threshold);
             if full {
@@ -181,7 +183,8 @@ impl<'m> Cache<'m> {
         self.refresh();
     }
 
-    /// Samples of the largest leaf that is left and may be split, and whether one was refused.
+    /// Subdivides leaves of more than `threshold` samples. Samples of the largest leaf left that may be subdivided, and
+    /// whether one was refused.
     fn subdivide_above(&mut self, threshold: f64) -> (f64, bool) {
         let (mut largest, mut full) = (0.0f64, false);
         for index in self.tree.indices() {
@@ -199,7 +202,7 @@ impl<'m> Cache<'m> {
         (largest, full)
     }
 
-    /// Samples of a leaf above the depth limit.
+    /// Number of samples of a leaf that is above the depth limit.
     fn may_subdivide(&self, index: u32) -> Option<f64> {
         match self.tree.node(index) {
             OctreeNode::Leaf { number, depth } if depth < MAX_DEPTH => {
@@ -209,7 +212,7 @@ impl<'m> Cache<'m> {
         }
     }
 
-    /// Splits a leaf; `false` if there is no room or it is too deep.
+    /// Subdivides a leaf; `false` if there is no room or it is too deep.
     pub(super) fn subdivide(&mut self, index: u32) -> bool {
         let OctreeNode::Leaf { number, .. } = self.tree.node(index) else { return false };
         let Some(first) = self.tree.subdivide(index) else { return false };
@@ -221,8 +224,8 @@ impl<'m> Cache<'m> {
         true
     }
 
-    /// Computes what look-ups read: every node is shrunk towards its parent, so that rare bright samples, which a cell
-    /// has not met yet but its surroundings have, are reckoned with.
+    /// Computes what look-ups read. Every node is shrunk towards its parent, so that rare bright samples of the
+    /// surroundings count in a cell that has not met one yet.
     pub(super) fn refresh(&mut self) {
         self.tree.refresh();
         if let Some(leaves) = self.flat {
@@ -257,7 +260,7 @@ impl<'m> Cache<'m> {
         }
     }
 
-    /// Forgets everything, the tree included.
+    /// Forgets all statistics and the tree.
     pub fn reset(&mut self) {
         self.used_mut().fill(BinSums::ZERO);
         self.tree.reset();
@@ -278,39 +281,38 @@ impl<'m> Cache<'m> {
         self.sums.get_mut(..self.leaves() as usize * BINS).unwrap_or(&mut [])
     }
 
-    /// Bins in use; look-ups give smaller numbers. [`Training::clear`] wants it.
+    /// Number of bins in use, for [`Training::clear`]; look-ups give smaller numbers.
     pub fn bins(&self) -> u32 {
         self.leaves() * BINS as u32
     }
 
-    /// Leaves in use, of all octrees.
+    /// Number of leaves in use, of all octrees.
     pub fn leaves(&self) -> u32 {
         self.flat.unwrap_or_else(|| self.tree.leaves())
     }
 
-    /// Uses the first `leaves` leaves without a tree: the caller numbers the bins. There is room for no more than
-    /// [`CacheSize::leaves`].
+    /// Gives up the tree for the first `leaves` leaves, at most [`CacheSize::leaves`]: the caller numbers the bins.
     pub(crate) fn flatten(&mut self, leaves: u32) {
         self.flat = Some(leaves.min(self.size.leaves()));
         self.reset();
     }
 
-    /// Does the caller number the bins?
+    /// Does the cache have no tree, so that the caller numbers the bins?
     pub(crate) fn is_flat(&self) -> bool {
         self.flat.is_some()
     }
 
-    /// Nodes in use, leaves included.
+    /// Number of nodes in use, leaves included.
     pub fn nodes(&self) -> u32 {
         self.tree.nodes()
     }
 
-    /// What there is room for.
+    /// Capacity.
     pub fn size(&self) -> CacheSize {
         self.size
     }
 
-    /// Splits that found no room: leaves too large at a [`Self::freeze`], inner nodes of what was merged.
+    /// Number of subdivisions that found no room: leaves too large at a [`Self::freeze`], inner nodes of merged caches.
     pub fn subdivisions_refused(&self) -> u64 {
         self.subdivisions_refused
     }

@@ -3,20 +3,20 @@
 use super::bins::BINS;
 use super::tree::{MAX_LEAVES, ROOTS};
 
-/// How many nodes and leaves there is room for.
+/// Capacity of a cache: nodes and leaves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CacheSize {
     pub(super) subdivisions: u32,
 }
 
 impl CacheSize {
-    /// Trees that never grow.
+    /// Capacity of the roots alone: trees that never grow.
     pub const SMALLEST: Self = Self { subdivisions: 0 };
 
-    /// Most subdivisions whose leaves have numbers.
+    /// Largest number of subdivisions: more leaves would have no numbers.
     pub(super) const MAX_SUBDIVISIONS: u32 = (MAX_LEAVES - ROOTS) / 7;
 
-    /// Leaves of all octrees.
+    /// Number of leaves, of all octrees.
     pub fn leaves(self) -> u32 {
         ROOTS + 7 * self.subdivisions
     }

@@ -1,11 +1,11 @@
-//! A shard's side of the cache: what it has gathered in the current iteration.
+//! One shard's side of the cache: sums of the current iteration.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use super::bins::{BinRecord, ShadowRecord};
 use super::size::CacheSize;
 use crate::memory::{Carver, Layout, Measure, MemoryError};
 
-/// Records of one shard, one for every bin that the cache may ever have.
+/// Sums of one shard in the current iteration, a record for every bin that there is room for.
 #[derive(Debug)]
 pub struct Training<'m> {
     records: &'m mut [BinRecord],
@@ -14,12 +14,12 @@ pub struct Training<'m> {
 }
 
 impl<'m> Training<'m> {
-    /// The block that [`Self::new`] needs; `None` if it cannot be addressed.
+    /// Size and alignment of the block that [`Self::new`] needs; `None` if it cannot be addressed.
     pub fn layout(size: CacheSize) -> Option<Layout> {
         Self::measure(Measure::new(), size).layout()
     }
 
-    /// A training side in a block of its own, without bins until [`Self::clear`].
+    /// Training side in a block of its own, without bins until [`Self::clear`].
     pub fn new(size: CacheSize, block: &'m mut [u8]) -> Result<Self, MemoryError> {
         let given = block.len();
         let layout = Self::layout(size).ok_or(MemoryError::TooSmall { needed: usize::MAX, given })?;
@@ -34,7 +34,7 @@ impl<'m> Training<'m> {
         Ok(Self { records: c.take_unset(size.bins())?, shadows: c.take_unset(size.bins())?, used: 0 })
     }
 
-    /// Forgets everything and takes samples of bins below `used_bins` ([`super::Cache::bins`]).
+    /// Forgets all sums and takes samples of bins below `used_bins` ([`super::Cache::bins`]).
     pub fn clear(&mut self, used_bins: u32) {
         self.used = (used_bins as usize).min(self.records.len());
         self.used_mut().fill(bytemuck::Zeroable::zeroed());
@@ -44,36 +44,38 @@ impl<'m> Training<'m> {
     /// Adds a sample. Negative values count as 0, values above [`MAX_VALUE`](super::MAX_VALUE) as that.
     ///
     /// `false` if it was not taken: the bin does not exist, a number is not finite, or the bin has
-    /// [`BIN_LIMIT`](super::BIN_LIMIT) samples of this iteration. A full bin keeps the first ones, so what it says leans to
-    /// the tiles that the shard begins with; factors, and so the noise, are a little off then, but no picture is
-    /// biased. [`crate::Counters::samples_refused`] counts them.
+    /// [`BIN_LIMIT`](super::BIN_LIMIT) samples of this iteration. A full bin keeps the first ones, so it represents the
+    /// tiles that the shard begins with: factors, and so the noise, are a little off then, but no picture is biased.
+    /// [`crate::Counters::samples_refused`] counts them.
     #[inline]
     pub fn log(&mut self, bin: u32, x: [f32; 3], cost: f32) -> bool {
         let finite = x.iter().all(|x| x.is_finite()) && cost.is_finite();
         finite && self.used_mut().get_mut(bin as usize).is_some_and(|r| r.add(x, cost))
     }
 
-    /// Adds half the squared difference of two samples of one vertex, per channel: of two that both drew a light sample
-    /// or both did not, an unbiased estimate of what varies if their numbers do not. Limits as in [`Self::log`].
+    /// Adds half the squared difference of two samples of one vertex, per channel. Of two samples that both used next
+    /// event estimation, or both did not, it is an unbiased estimate of their variance. Limits as in [`Self::log`].
     #[inline]
     pub fn log_pair(&mut self, bin: u32, half_squared_difference: [f32; 3]) -> bool {
         let finite = half_squared_difference.iter().all(|x| x.is_finite());
         finite && self.used_mut().get_mut(bin as usize).is_some_and(|r| r.add_pair(half_squared_difference))
     }
 
-    /// Adds what the light sample of a sample of `bin` gave, divided by the chance `drawn` that it was drawn; limits as
-    /// in [`Self::log`]. Its square counts `drawn` times, as if every sample had drawn one and none were divided.
+    /// Adds the contribution of next event estimation to a sample of `bin`, divided by the probability that it is used;
+    /// limits as in [`Self::log`]. The square has that probability as its weight, so that the sum is the one of samples
+    /// that all use it and are not divided.
     #[inline]
-    pub fn log_light(&mut self, bin: u32, x: [f32; 3], drawn: f32) {
-        let finite = x.iter().all(|x| x.is_finite()) && drawn.is_finite();
+    pub fn log_nee(&mut self, bin: u32, x: [f32; 3], nee_probability: f32) {
+        let finite = x.iter().all(|x| x.is_finite()) && nee_probability.is_finite();
         if let Some(r) = self.used_mut().get_mut(bin as usize).filter(|_| finite) {
-            r.add_light(x, drawn);
+            r.add_nee(x, nee_probability);
         }
     }
 
-    /// Adds a shadow ray from a vertex in the leaf of `bin` towards its directions
-    /// ([`super::Cache::bins_towards`]), and whether it met nothing. `false` if it was not taken: the bin does
-    /// not exist or has [`BIN_LIMIT`](super::BIN_LIMIT) of this iteration, the first ones; [`crate::Counters::shadows_refused`] counts them.
+    /// Adds a shadow ray from a vertex in the leaf of `bin` towards the bin's directions
+    /// ([`super::Cache::bins_towards`]), and whether it was unoccluded. `false` if it was not taken: the bin does not
+    /// exist or has [`BIN_LIMIT`](super::BIN_LIMIT) of this iteration, the first ones;
+    /// [`crate::Counters::shadows_refused`] counts them.
     #[inline]
     pub fn log_shadow(&mut self, bin: u32, visible: bool) -> bool {
         self.shadows_mut().get_mut(bin as usize).is_some_and(|s| s.add(visible))

@@ -1,11 +1,11 @@
-//! The octree: which leaf a place belongs to.
+//! Octrees over the scene: the leaf that a position lies in.
 //!
-//! A node is one word. A leaf's has the high bit, its depth and its number; an inner node's is the index of the first
-//! of its eight children, which lie together. Places are numbers of cells on a grid of 2^16 per axis in a cube around
-//! the bounds; bit `15 - d` of the three numbers picks the child at depth `d`. So a descent compares no floats, and
-//! eight lanes go down in lockstep with their loads overlapping.
+//! A node is one word. A leaf's word has the high bit, its depth and its number; an inner node's word is the index of
+//! the first of its eight children, which are adjacent. Positions are quantised to a grid of 2^16 cells per axis in a
+//! cube around the bounds; bit `15 - d` of the three coordinates selects the child at depth `d`. So a descent compares
+//! no floats, and eight lanes descend in lockstep with their loads overlapping.
 //!
-//! The first levels of a large tree are also kept as one table, a coarse grid, where a descent starts: a jittered
+//! The first levels of a large tree are also stored as one table, a coarse grid, where a descent starts: a jittered
 //! look-up needs two descents.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
@@ -14,11 +14,11 @@ use super::kind::{VertexKind, VertexKind8};
 use crate::memory::{Carver, Measure, MemoryError};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
-/// Deepest leaf.
+/// Depth of the deepest leaf.
 pub(super) const MAX_DEPTH: u32 = 16;
-/// Most leaves: their numbers have 26 bits.
+/// Largest number of leaves: their numbers have 26 bits.
 pub(super) const MAX_LEAVES: u32 = 1 << 26;
-/// Octrees: one for each kind of vertex. Their roots are the first nodes.
+/// Number of octrees, one for each kind of vertex. Their roots are the first nodes.
 pub(super) const ROOTS: u32 = VertexKind::ALL.len() as u32;
 /// Children lie at multiples of 8, so the roots have eight words as well.
 const FIRST_CHILD: u32 = 8;
@@ -33,7 +33,7 @@ const CELLS: f32 = 65_536.0;
 /// Largest float below [`CELLS`].
 const LAST: f32 = 65_535.996;
 
-/// What a node's word says.
+/// Decoded word of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum OctreeNode {
     Inner { child: u32 },
@@ -86,14 +86,14 @@ impl<'m> Tree<'m> {
         Ok(tree)
     }
 
-    /// The roots, all leaves.
+    /// Makes all roots leaves.
     pub(super) fn reset(&mut self) {
         self.nodes.iter_mut().zip(0..ROOTS).for_each(|(n, root)| *n = LEAF | root);
         (self.used, self.leaves) = (FIRST_CHILD, ROOTS);
         self.refresh();
     }
 
-    /// Fills the grid. Until then look-ups give the leaves' old numbers, which are still theirs or a child's.
+    /// Fills the grid. Until then look-ups give the old numbers of leaves, which are still theirs or a child's.
     pub(super) fn refresh(&mut self) {
         let bits = self.grid_bits;
         for (i, word) in (0u32..).zip(self.grid.iter_mut()) {
@@ -112,12 +112,12 @@ impl<'m> Tree<'m> {
         self.leaves
     }
 
-    /// Nodes that can be reached from the roots.
+    /// Number of nodes that can be reached from the roots.
     pub(super) fn nodes(&self) -> u32 {
         self.used - FIRST_CHILD + ROOTS
     }
 
-    /// Indices of all nodes so far.
+    /// Indices of all nodes.
     pub(super) fn indices(&self) -> impl Iterator<Item = u32> + use<> {
         (0..ROOTS).chain(FIRST_CHILD..self.used)
     }
@@ -131,8 +131,8 @@ impl<'m> Tree<'m> {
         }
     }
 
-    /// Makes a leaf an inner node. The first child keeps its number; the first of the seven new numbers is returned.
-    /// `None` if there is no room, or the leaf has [`MAX_DEPTH`].
+    /// Makes a leaf an inner node. The first child keeps the leaf's number; returns the first of the seven new numbers,
+    /// `None` if there is no room or the leaf is at [`MAX_DEPTH`].
     pub(super) fn subdivide(&mut self, index: u32) -> Option<u32> {
         let OctreeNode::Leaf { number, depth } = self.node(index) else { return None };
         if depth >= MAX_DEPTH || self.max_leaves - self.leaves < 7 {
@@ -157,17 +157,17 @@ impl<'m> Tree<'m> {
         }
     }
 
-    /// Places on the grid, in [0, 2^16). Those outside the cube move to its faces, NaN to the first cell.
+    /// Positions on the grid, in [0, 2^16). Those outside the cube move to its faces, NaN to the first cell.
     #[inline(always)]
-    fn place(&self, p: Vec3x8) -> [F32x8; 3] {
+    fn grid_position(&self, p: Vec3x8) -> [F32x8; 3] {
         let [x, y, z, _] = self.cube;
         [p.x - x, p.y - y, p.z - z].map(|d| (d * self.scale).clamp(0.0, LAST))
     }
 
-    /// The words of the leaves around eight places.
+    /// Words of the leaves around eight grid positions.
     #[inline(always)]
-    fn descend(&self, root: U32x8, place: [F32x8; 3]) -> U32x8 {
-        let [x, y, z] = place.map(|c| c.to_i32().to_u32());
+    fn descend(&self, root: U32x8, position: [F32x8; 3]) -> U32x8 {
+        let [x, y, z] = position.map(|c| c.to_i32().to_u32());
         let load = |table: &[u32], index: U32x8| {
             U32x8::new(index.to_array().map(|i| table.get(i as usize).copied().unwrap_or(LEAF)))
         };
@@ -182,24 +182,24 @@ impl<'m> Tree<'m> {
             }
             let one = U32x8::splat(1);
             let octant = (x >> bit & one) | (y >> bit & one) << 1 | (z >> bit & one) << 2;
-            // lanes that have arrived load the first node, so that no bounds check is ever mispredicted
+            // lanes at a leaf load the first node, so that no bounds check is mispredicted
             let next = load(self.nodes, U32x8::select(leaf, U32x8::splat(0), word + octant));
             word = U32x8::select(leaf, word, next);
         }
         word
     }
 
-    /// First bin of the leaf per lane. With `jitter` in [0, 1) of the leaf around a place that was moved by
+    /// First bin of the leaf around each position. With `jitter` in [0, 1): of the leaf around the position moved by
     /// `jitter - 0.5` of the edge of its own leaf, but not out of the cube.
     #[inline(always)]
     pub(super) fn find(&self, kind: VertexKind8, p: Vec3x8, jitter: Option<[F32x8; 3]>) -> U32x8 {
         let root = kind.octree();
-        let place = self.place(p);
-        let mut word = self.descend(root, place);
+        let position = self.grid_position(p);
+        let mut word = self.descend(root, position);
         if let Some([a, b, c]) = jitter {
             // 2^(16 - depth), built from its exponent.
             let edge = F32x8::from_bits((U32x8::splat(127 + MAX_DEPTH) - (word >> 26 & U32x8::splat(31))) << 23);
-            let [x, y, z] = place;
+            let [x, y, z] = position;
             let moved = [(x, a), (y, b), (z, c)].map(|(q, u)| (q + (u - 0.5) * edge).clamp(0.0, LAST));
             word = self.descend(root, moved);
         }
@@ -207,7 +207,7 @@ impl<'m> Tree<'m> {
     }
 }
 
-/// Levels that the grid stands for: none in small trees, whose memory it would take.
+/// Levels that the grid replaces: none in small trees, where it would take more memory than they do.
 fn grid_bits(max_leaves: u32) -> u32 {
     match max_leaves {
         0..512 => 0,
@@ -220,7 +220,7 @@ fn grid_len(max_leaves: u32) -> usize {
     (ROOTS as usize) << (3 * grid_bits(max_leaves))
 }
 
-/// Smallest corner and edge of a cube around the bounds; the unit cube's where those are not finite.
+/// Smallest corner and edge of a cube around the bounds, world units; the unit cube where bounds are not finite.
 fn cube(lo: [f32; 3], hi: [f32; 3]) -> [f32; 4] {
     let [x, y, z] = lo.map(|x| if x.is_finite() { x } else { 0.0 });
     let extent = lo.iter().zip(&hi).map(|(l, h)| h - l).fold(0.0, f32::max);
@@ -229,10 +229,10 @@ fn cube(lo: [f32; 3], hi: [f32; 3]) -> [f32; 4] {
     [x, y, z, if edge.is_finite() && edge > 1e-30 { edge } else { 1.0 }]
 }
 
-/// Which of a leaf's 16 bins a unit vector belongs to.
+/// Direction bin of a unit vector, 0 to 15.
 ///
-/// Bins have equal areas: four slabs of the height, each cut into quadrants by the signs of the two other
-/// coordinates. The sphere is turned first, by a matrix of thirds: axis-parallel directions, which normals often have,
+/// Bins have equal solid angles: four slabs of the height, each divided into quadrants by the signs of the two other
+/// coordinates. The sphere is rotated first, by a matrix of thirds: axis-parallel directions, which normals often have,
 /// lie at least 10 degrees inside their bins, and no two of them share one.
 #[inline(always)]
 pub(super) fn direction_bin(d: Vec3x8) -> U32x8 {

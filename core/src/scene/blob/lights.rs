@@ -1,7 +1,7 @@
 //! Lights, the environment and alias tables: the records, and the tables of what readers and writers of a blob know
 //! about each kind.
 //!
-//! A light is a row of [`light_table`] here, a file `light/NAME.rs`, and a row of `models!` in `light/mod.rs`. From the
+//! A light is a row of `light_table` here, a file `light/NAME.rs`, and a row of `models!` in `light/mod.rs`. From the
 //! row here follow its effects and the validator's checks.
 
 use bytemuck::{Pod, Zeroable};
@@ -14,9 +14,9 @@ pub const MAX_EMISSION: f32 = 1e18;
 macro_rules! light_table {
     ($then:ident) => {
         $then! {
-            /// An emitting triangle (its front side).
+            /// Emitting triangle (its front side).
             Area = 0, "area", [AREA_LIGHTS], [Triangle, Emission];
-            /// The environment, map or constant.
+            /// Environment, map or constant.
             Environment = 1, "environment", [ENVIRONMENT, CONSTANT], [Environment];
             /// Isotropic point.
             Point = 2, "point", [DELTA_LIGHTS], [Position, Emission];
@@ -32,7 +32,7 @@ pub(crate) use light_table;
 macro_rules! environment_table {
     ($then:ident) => {
         $then! {
-            /// The same radiance from everywhere.
+            /// Constant radiance.
             Constant = 0, "constant", CONSTANT;
             /// Lat-long map.
             Map = 1, "envmap", ENVIRONMENT;
@@ -68,7 +68,7 @@ macro_rules! define_environments {
 }
 environment_table!(define_environments);
 
-/// What a light kind may use of a [`Light`], a closed set.
+/// Fields of a [`Light`] that a kind may use, a closed set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightField {
     /// `triangle` and `area`: a triangle that refers back, and its area.
@@ -89,9 +89,9 @@ pub enum LightField {
 pub struct Light {
     /// [`LightKind`].
     pub kind: u32,
-    /// Area: the triangle.
+    /// Area: index of the triangle.
     pub triangle: u32,
-    /// Area: the triangle's area.
+    /// Area: area of the triangle.
     pub area: f32,
     /// Zero.
     pub reserved: u32,
@@ -112,19 +112,19 @@ pub struct Light {
 pub struct Alias {
     /// Keep slot i below this.
     pub threshold: u32,
-    /// The other item.
+    /// Item that is picked instead of i.
     pub alias: u32,
     /// Probability of item i over all slots.
     pub probability: f32,
 }
 
-/// The environment.
+/// Environment of the scene.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Environment {
     /// [`EnvironmentKind`].
     pub kind: u32,
-    /// Index of its light.
+    /// Index of the environment's light.
     pub light: u32,
     /// Map: columns, >= 1.
     pub width: u32,

@@ -1,6 +1,6 @@
 //! Materials and textures: the records, and the table of what readers and writers of a blob know about each kind.
 //!
-//! A scattering model is a row of [`material_table`] here, a kernel `bsdf/NAME.rs`, and a row of `models!` in
+//! A scattering model is a row of `material_table` here, a kernel `bsdf/NAME.rs`, and a row of `models!` in
 //! `bsdf/mod.rs`. From the row here follow its effect and the effect's name, the validator's checks, what the host's
 //! baker asks for and derives, and the keys in scene files. A parameter that no model has yet is a [`Parameter`] more;
 //! every place that must know it then fails to compile.
@@ -57,7 +57,7 @@ macro_rules! material_table {
 }
 pub(crate) use material_table;
 
-/// Row of [`material_table`]: the facts of a kind that do not depend on its kernel.
+/// Row of the table of material kinds: the facts that do not depend on the kernel.
 #[derive(Clone, Copy, Debug)]
 pub struct MaterialFacts {
     /// Light passes it: it scatters from behind as well, and being two-sided means nothing.

@@ -5,7 +5,7 @@ use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError, SectionFault};
 use crate::scene::{Effects, Records};
 
-/// What a sound environment calls for, and whether it emits.
+/// Effects of a sound environment, and whether it emits.
 #[derive(Default)]
 pub(super) struct Found {
     pub effects: Effects,

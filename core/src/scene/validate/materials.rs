@@ -68,7 +68,7 @@ fn parameter(scene: &Records<'_>, at: Record, m: &Material, parameter: Parameter
     }
 }
 
-/// What a surface of this (validated) material calls for.
+/// Effects of a surface of a validated material.
 pub(super) fn effects(m: &Material) -> Effects {
     let kind = MaterialKind::from_u32(m.kind).map(Effects::of_material).unwrap_or_default();
     if m.texture == NONE { kind } else { kind.with(Effects::TEXTURES) }

@@ -1,4 +1,4 @@
-//! Proves once what everything downstream relies on. Linear in the bytes, iterative, no allocation.
+//! Validation: proves once what everything downstream relies on. Linear in the bytes, iterative, no allocation.
 //!
 //! Order matters: references are checked before anything follows them.
 
@@ -13,7 +13,7 @@ use super::blob::*;
 use super::error::{Field, SceneError};
 use super::{Effects, Records};
 
-/// Validates all records of a scene whose sections are sound; returns what it calls for.
+/// Validates all records of a scene whose sections are sound; returns the effects that it calls for.
 pub(super) fn scene(scene: &Records<'_>) -> Result<Effects, SceneError> {
     info(scene.info)?;
     let lens = camera(scene.camera)?;

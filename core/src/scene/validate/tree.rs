@@ -18,7 +18,7 @@ struct Bounds {
 }
 
 impl Bounds {
-    /// Of a node's child.
+    /// Bounds of a node's child.
     fn of_child(node: &Node, slot: usize) -> Self {
         let [x0, y0, z0, x1, y1, z1] = node.bounds.map(|row| row.get(slot).copied().unwrap_or(f32::NAN));
         Self { min: [x0, y0, z0], max: [x1, y1, z1] }
@@ -57,7 +57,7 @@ struct Step {
     bounds: Bounds,
 }
 
-/// What the walk has met.
+/// Counts of what the walk has met.
 #[derive(Default)]
 struct Met {
     nodes: u32,

@@ -2,8 +2,8 @@
 
 use super::BakeError;
 use crate::description::Camera;
-use croupier::scene::blob;
-use croupier::scene::blob::{MAX_COORDINATE, MAX_SIDE};
+use croupier::unstable::scene::blob;
+use croupier::unstable::scene::blob::{MAX_COORDINATE, MAX_SIDE};
 use glam::DVec3;
 
 /// Right and down reach from the image centre to the edges at distance 1: `tan(vfov / 2)` downwards, times

@@ -1,8 +1,8 @@
-//! Why a description cannot be baked.
+//! Errors of baking.
 
 use std::{error, fmt};
 
-/// What is wrong with a [`crate::description::SceneDescription`]; every text names the object.
+/// Error in a [`crate::description::SceneDescription`]; every text names the object.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum BakeError {
@@ -14,7 +14,7 @@ pub enum BakeError {
         vertex: u32,
         /// `position`, `normal` or `texture coordinate`.
         what: &'static str,
-        /// The number.
+        /// Value found.
         found: f32,
     },
     /// A triangle that refers to a vertex or material that is not there.
@@ -25,18 +25,18 @@ pub enum BakeError {
         triangle: u32,
         /// `vertex` or `material`.
         what: &'static str,
-        /// The index.
+        /// Index found.
         found: u32,
-        /// How many there are.
+        /// Number of those that exist.
         count: usize,
     },
     /// A parameter of a material out of range.
     Material {
-        /// Name.
+        /// Name of the material.
         material: String,
         /// Parameter.
         what: &'static str,
-        /// The number.
+        /// Value found.
         found: f32,
         /// Range allowed.
         range: [f32; 2],
@@ -45,14 +45,14 @@ pub enum BakeError {
     TextureIndex {
         /// Name of the material.
         material: String,
-        /// The index.
+        /// Index found.
         found: u32,
-        /// How many there are.
+        /// Number of those that exist.
         count: usize,
     },
     /// A texture or environment map whose size is not allowed or not that of its texels.
     Image {
-        /// Name.
+        /// Name of the image.
         image: String,
         /// Columns and rows.
         size: [u32; 2],
@@ -61,36 +61,36 @@ pub enum BakeError {
     },
     /// A number of an emitter or of the environment.
     Emitter {
-        /// Which.
+        /// Position and type of the emitter.
         emitter: String,
         /// `radiance`, `position`, ...
         what: &'static str,
-        /// The number.
+        /// Value found.
         found: f32,
     },
     /// An area emitter on a material that is not there or that already has one.
     EmitterMaterial {
-        /// Which.
+        /// Position and type of the emitter.
         emitter: String,
         /// Material index.
         found: u32,
-        /// Is it the second one?
+        /// Whether it is the second emitter of the material.
         repeated: bool,
     },
     /// The environment's `to_world` is not a rotation.
     Rotation,
     /// A number of the camera.
     Camera {
-        /// Which.
+        /// Name of the number.
         what: &'static str,
-        /// The number.
+        /// Value found.
         found: f64,
     },
     /// More of something than indices of 31 bits can tell apart.
     TooMany {
-        /// Of what.
+        /// Plural of the thing.
         what: &'static str,
-        /// How many.
+        /// Count found.
         count: usize,
     },
 }

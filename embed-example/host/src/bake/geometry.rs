@@ -2,8 +2,8 @@
 
 use super::BakeError;
 use crate::description::{SceneDescription, Triangle, Vertex};
-use croupier::scene::blob::MAX_COORDINATE;
-use croupier::scene::blob::{self, NONE, TRIANGLE_SMOOTH};
+use croupier::unstable::scene::blob::MAX_COORDINATE;
+use croupier::unstable::scene::blob::{self, NONE, TRIANGLE_SMOOTH};
 use glam::Vec3;
 
 /// Geometry of the blob, and what else baking needs of it.
@@ -108,7 +108,7 @@ impl Geometry {
     }
 
     /// Half the diagonal of the bounds.
-    pub fn radius(&self) -> f64 {
+    pub(crate) fn radius(&self) -> f64 {
         let [lo, hi] = self.bounds.map(|p| Vec3::from_array(p).as_dvec3());
         (hi - lo).length() / 2.0
     }

@@ -5,8 +5,8 @@ use super::geometry::{Geometry, area};
 use crate::description::{Emitter, Environment, SceneDescription};
 use crate::{alias, environment};
 use bytemuck::Zeroable;
-use croupier::scene::blob::{self, Alias, EnvironmentKind, Light, LightKind};
-use croupier::scene::blob::{MAX_COORDINATE, MAX_EMISSION, MAX_SIDE};
+use croupier::unstable::scene::blob::{self, Alias, EnvironmentKind, Light, LightKind};
+use croupier::unstable::scene::blob::{MAX_COORDINATE, MAX_EMISSION, MAX_SIDE};
 use glam::Vec3;
 
 /// Sections of the blob.

@@ -4,7 +4,7 @@ use super::BakeError;
 use crate::description::{ModelParameters, Reflectance, SceneDescription};
 use crate::microfacet;
 use bytemuck::Zeroable;
-use croupier::scene::blob::{self, MATERIAL_TWO_SIDED, MAX_SIDE, MIN_CONDUCTOR, NONE, Parameter};
+use croupier::unstable::scene::blob::{self, MATERIAL_TWO_SIDED, MAX_SIDE, MIN_CONDUCTOR, NONE, Parameter};
 use std::collections::HashMap;
 
 /// Sections of the blob.

@@ -6,7 +6,7 @@
 
 use super::binary::{Binary, Bounds};
 use bytemuck::Zeroable;
-use croupier::scene::blob::{LEAF_BIT, Leaf, MAX_TREE_DEPTH, NONE, Node};
+use croupier::unstable::scene::blob::{LEAF_BIT, Leaf, MAX_TREE_DEPTH, NONE, Node};
 
 /// Cost of a visited node per half area; measured, in units of a leaf's eight-triangle test.
 const NODE_COST: f32 = 1.0;

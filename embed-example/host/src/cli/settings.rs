@@ -1,8 +1,9 @@
 //! Flags of the core's settings: one for each row of their table.
 
 use clap::{Arg, ArgMatches, Command, FromArgMatches, error::ErrorKind};
-use croupier::learn::Learning;
-use croupier::{MAX_PATH_LENGTH, SettingError, SettingInfo, SettingRange, Settings, Strategy};
+use croupier::unstable::learn::Learning;
+use croupier::unstable::{MAX_PATH_LENGTH, SettingInfo, SettingRange};
+use croupier::{SettingError, Settings, Strategy};
 use croupier_host::render::RenderOptions;
 use std::fmt::Write;
 

@@ -3,8 +3,8 @@
 
 use crate::blob::AlignedBytes;
 use croupier::Scene;
-use croupier::learn::cache::{Cache, Training, VertexKind, VertexKind8};
-use croupier::simd::{F32x8, Mask8, Vec3x8};
+use croupier::unstable::learn::cache::{Cache, Training, VertexKind, VertexKind8};
+use croupier::unstable::simd::{F32x8, Mask8, Vec3x8};
 use std::hint::black_box;
 use std::time::Instant;
 

@@ -1,6 +1,6 @@
 //! Errors of a render.
 
-use croupier::learn::cache::CacheError;
+use croupier::unstable::learn::cache::CacheError;
 use croupier::{SceneError, SessionError, SettingsError, ShardError};
 use std::fmt;
 

@@ -2,8 +2,8 @@
 
 use super::calibrate::Calibration;
 use super::schedule::Work;
-use croupier::film::{PixelAov, PixelStats};
-use croupier::learn::PictureStatistics;
+use croupier::unstable::film::{PixelAov, PixelStats};
+use croupier::unstable::learn::PictureStatistics;
 use croupier::{Counters, ErrorEstimate};
 
 /// One finished iteration.
@@ -91,6 +91,6 @@ impl Rendered {
     /// Order-sensitive hash of the picture's bits: equal for any number of threads and any instruction set.
     pub fn hash(&self) -> u64 {
         let image = self.image();
-        croupier::scene::blob::content_hash(bytemuck::cast_slice(&image))
+        croupier::unstable::scene::blob::content_hash(bytemuck::cast_slice(&image))
     }
 }

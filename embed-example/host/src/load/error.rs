@@ -1,9 +1,9 @@
-//! Why a scene cannot be loaded.
+//! Errors of loading.
 
 use std::path::{Path, PathBuf};
 use std::{error, fmt, io};
 
-/// What is wrong with a scene's files; every text names the file, and where in it.
+/// Error in the files of a scene; every text names the file, and where in it.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum LoadError {
@@ -13,7 +13,7 @@ pub enum LoadError {
         path: PathBuf,
         /// Place that names it: file and line, or file and value.
         referrer: Option<String>,
-        /// The system's reason.
+        /// Reason given by the operating system.
         source: io::Error,
     },
     /// Neither a folder nor a file that scenes come in.
@@ -27,7 +27,7 @@ pub enum LoadError {
         path: PathBuf,
         /// Line, from 1.
         line: u32,
-        /// Why.
+        /// Fault, in words.
         what: String,
     },
     /// A value of a JSON file, or its syntax.
@@ -36,7 +36,7 @@ pub enum LoadError {
         path: PathBuf,
         /// Path of the value, such as `materials.Glass.int_ior`; of a syntax error line and column.
         at: String,
-        /// Why.
+        /// Fault, in words.
         what: String,
     },
     /// An image that cannot be decoded.
@@ -45,16 +45,16 @@ pub enum LoadError {
         path: PathBuf,
         /// Place that names it: file and line, or file and value.
         referrer: String,
-        /// Why.
+        /// Fault, in words.
         what: String,
     },
     /// The scene needs participating media.
     Medium {
         /// File.
         path: PathBuf,
-        /// Position in `media`.
+        /// Index in `media`.
         index: usize,
-        /// Its name.
+        /// Name of the medium.
         name: String,
     },
 }

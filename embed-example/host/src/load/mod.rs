@@ -6,7 +6,7 @@
 //! | `obj` | geometry: Wavefront OBJ |
 //! | `mtl` | materials of a bare OBJ |
 //! | `images` | PNG and JPEG textures, EXR environment maps |
-//! | `json` | values of a JSON document that know their place |
+//! | `json` | values of a JSON document with their paths |
 
 mod error;
 mod images;
@@ -22,7 +22,7 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What loading found, beside the scene.
+/// Report of loading, besides the scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LoadReport {
     /// Files read.
@@ -31,7 +31,7 @@ pub struct LoadReport {
     pub polygons: u32,
     /// Points and lines, left out.
     pub skipped_elements: u32,
-    /// What was assumed or ignored, one sentence each.
+    /// Notes of what was assumed or ignored, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -53,7 +53,7 @@ pub fn load(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
     Ok((scene, loader.report))
 }
 
-/// What is common to all files of one scene.
+/// State that the files of one scene share.
 #[derive(Default)]
 struct Loader {
     report: LoadReport,

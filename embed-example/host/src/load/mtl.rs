@@ -20,7 +20,7 @@ use super::LoadError;
 use crate::description::{Material, Model, Reflectance};
 use std::path::{Path, PathBuf};
 
-/// What a face without a material is made of.
+/// Model of faces without a material.
 pub(super) const GREY: Model = Model::Diffuse { reflectance: Reflectance::Constant([0.5; 3]) };
 
 /// Widths below this are taken as smooth.
@@ -33,7 +33,7 @@ pub(super) struct Definition {
     pub texture: Option<(String, u32)>,
 }
 
-/// What a definition becomes.
+/// Material and emission of a definition.
 pub(super) struct Mapped {
     pub material: Material,
     pub radiance: Option<[f32; 3]>,
@@ -147,7 +147,7 @@ pub(super) fn map(definition: &Definition, texture: Option<u32>) -> Mapped {
     let black = |rgb: Option<[f32; 3]>| rgb.is_none_or(|c| c.iter().all(|x| *x <= 1e-3));
     let diffuse = match (texture, m.diffuse) {
         (Some(texture), _) => Reflectance::Texture(texture),
-        // A lamp that does not say what it reflects reflects nothing.
+        // An emitter that states no reflectance reflects nothing.
         (None, None) if !black(m.emissive) => Reflectance::Constant([0.0; 3]),
         (None, rgb) => Reflectance::Constant(limited(rgb.unwrap_or([0.5; 3]), &mut notes)),
     };
@@ -190,11 +190,11 @@ pub(super) fn map(definition: &Definition, texture: Option<u32>) -> Mapped {
     Mapped { material, radiance, notes }
 }
 
-/// Does it have a glossy coat?
+/// Whether the material has a glossy coat.
 fn coated(m: &tobj::Material, roughness: Option<f32>) -> bool {
-    let shiny = match m.specular {
+    let glossy = match m.specular {
         Some(rgb) => rgb.iter().any(|x| *x > 0.01),
         None => m.optical_density.is_some_and(|n| n > 1.0 + 1e-3),
     };
-    roughness.map_or(shiny, |r| r < 1.0)
+    roughness.map_or(glossy, |r| r < 1.0)
 }

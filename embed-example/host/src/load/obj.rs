@@ -28,7 +28,7 @@ struct Prepared {
     skipped_elements: u32,
 }
 
-/// What a face's corners have beside positions.
+/// Data of a face's corners besides positions.
 #[derive(Clone, Copy, PartialEq, Eq, Default)]
 struct Form {
     uv: bool,
@@ -40,7 +40,7 @@ struct Checker<'t> {
     path: &'t Path,
     line: u32,
     out: Prepared,
-    /// How many `v`, `vt`, `vn` so far.
+    /// Numbers of `v`, `vt`, `vn` so far.
     counts: [usize; 3],
     numbers: HashMap<String, usize>,
     material: String,
@@ -185,7 +185,7 @@ impl Checker<'_> {
     }
 }
 
-/// What follows the keyword.
+/// Text after the keyword.
 fn rest<'t>(line: &'t str, keyword: &str) -> &'t str {
     line.trim().get(keyword.len()..).unwrap_or_default().trim()
 }
@@ -303,7 +303,8 @@ pub(super) fn load_geometry(
     append(path, scene, prepared, &materials)
 }
 
-/// Loads a bare OBJ file with its material libraries. Without lights it gets a sky; the camera sees all of it.
+/// Loads a bare OBJ file with its material libraries. Without lights it gets the sky of [`builtin::sky`]; the camera
+/// sees the whole scene.
 pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescription, LoadError> {
     let mut scene = SceneDescription::default();
     let prepared = read(loader, path, None)?;

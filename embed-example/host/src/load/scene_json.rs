@@ -5,7 +5,7 @@ use super::{LoadError, Loader, obj};
 use crate::description::{
     Camera, Emitter, Environment, Material, Model, ParameterSource, Reflectance, SceneDescription, ThinLens,
 };
-use croupier::scene::blob::MaterialKind;
+use croupier::unstable::scene::blob::{EnvironmentKind, LightKind, MaterialKind};
 use std::path::Path;
 
 pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription, LoadError> {
@@ -132,33 +132,40 @@ fn reflectance(
 
 fn emitter(loader: &mut Loader, scene: &mut SceneDescription, folder: &Path, e: &Place<'_>) -> Result<(), LoadError> {
     let kind = e.get("type")?;
-    let environment = match kind.text()? {
-        "area" => {
-            let place = e.get("material")?;
-            let name = place.text()?;
-            let index = scene.materials.iter().position(|m| m.name == name);
-            let index = index.ok_or_else(|| place.error(format!("there is no material `{name}`")))?;
-            scene.emitters.push(Emitter::Area { material: index as u32, radiance: e.get("radiance")?.rgb()? });
-            return Ok(());
+    let name = kind.text()?;
+    let emitter = match LightKind::from_name(name) {
+        Some(LightKind::Area) => {
+            Emitter::Area { material: material_index(scene, e)?, radiance: e.get("radiance")?.rgb()? }
         }
-        "point" => {
-            let (position, intensity) = (e.get("position")?.rgb()?, e.get("intensity")?.rgb()?);
-            scene.emitters.push(Emitter::Point { position, intensity });
-            return Ok(());
+        Some(LightKind::Point) => {
+            Emitter::Point { position: e.get("position")?.rgb()?, intensity: e.get("intensity")?.rgb()? }
         }
-        "directional" => {
-            let (direction, irradiance) = (e.get("direction")?.rgb()?, e.get("irradiance")?.rgb()?);
-            scene.emitters.push(Emitter::Directional { direction, irradiance });
-            return Ok(());
+        Some(LightKind::Directional) => {
+            Emitter::Directional { direction: e.get("direction")?.rgb()?, irradiance: e.get("irradiance")?.rgb()? }
         }
-        "constant" => Environment::Constant { radiance: e.get("radiance")?.rgb()? },
-        "envmap" => envmap(loader, folder, e)?,
-        other => return Err(kind.error(format!("unknown emitter type `{other}`"))),
+        // An environment's type is that of its own kind.
+        Some(LightKind::Environment) | None => {
+            let environment = match EnvironmentKind::from_name(name) {
+                Some(EnvironmentKind::Constant) => Environment::Constant { radiance: e.get("radiance")?.rgb()? },
+                Some(EnvironmentKind::Map) => envmap(loader, folder, e)?,
+                None => return Err(kind.error(format!("unknown emitter type `{name}`"))),
+            };
+            return match scene.environment.replace(environment) {
+                None => Ok(()),
+                Some(_) => Err(e.error("there is already an environment")),
+            };
+        }
     };
-    if scene.environment.replace(environment).is_some() {
-        return Err(e.error("there is already an environment"));
-    }
+    scene.emitters.push(emitter);
     Ok(())
+}
+
+/// Index of the material that an area emitter names.
+fn material_index(scene: &SceneDescription, e: &Place<'_>) -> Result<u32, LoadError> {
+    let place = e.get("material")?;
+    let name = place.text()?;
+    let index = scene.materials.iter().position(|m| m.name == name);
+    index.map(|i| i as u32).ok_or_else(|| place.error(format!("there is no material `{name}`")))
 }
 
 fn envmap(loader: &mut Loader, folder: &Path, e: &Place<'_>) -> Result<Environment, LoadError> {
