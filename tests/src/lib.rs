@@ -3,6 +3,7 @@
 pub mod blob;
 pub mod bsdf;
 pub mod cache;
+pub mod documents;
 pub mod geometry;
 pub mod hit;
 pub mod jacobian;
