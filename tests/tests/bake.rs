@@ -40,7 +40,7 @@ fn the_blob_is_laid_out_as_its_header_says() {
     let header: &Header = bytemuck::from_bytes(head);
     assert_eq!((header.length, header.hash), (first.bytes.len() as u64, content_hash(rest)));
     let table: &[Section] = bytemuck::cast_slice(&rest[..header.sections as usize * size_of::<Section>()]);
-    let mut end = (size_of::<Header>() + std::mem::size_of_val(table)) as u64;
+    let mut end = (size_of::<Header>() + size_of_val(table)) as u64;
     for s in table {
         assert!(s.offset % ALIGN as u64 == 0 && s.offset >= end && s.count > 0, "{s:?}");
         end = s.offset + s.count * u64::from(s.stride);

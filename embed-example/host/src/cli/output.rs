@@ -127,7 +127,7 @@ mod tests {
             let (png, false_color) = (names[2].clone(), names[3..].to_vec());
             let outputs = Outputs { exr: &names[0], png, cache: Some(&names[1]), false_color };
             assert!(outputs.check().unwrap_err().contains("not a folder"));
-            assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+            assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
             let written = outputs.write(&picture, Some(&[7]), "", 0.0);
             assert!(written.error.unwrap().to_string().contains(&format!("where/{i}")));
             names.remove(i);

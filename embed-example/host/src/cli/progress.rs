@@ -48,6 +48,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 impl Rendering {
     pub(crate) fn start(target: Target) -> Self {
         // Fails only if a handler is there already; then that one decides.
+        #[expect(clippy::disallowed_methods, reason = "the user asked twice for the end, whatever is written")]
         let _ = ctrlc::set_handler(|| {
             if STOP.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);
