@@ -6,6 +6,7 @@ pub mod cache;
 pub mod documents;
 pub mod geometry;
 pub mod hit;
+pub mod imports;
 pub mod jacobian;
 pub mod light_oracle;
 pub mod light_scene;
@@ -17,6 +18,7 @@ pub mod runner;
 pub mod scenes;
 pub mod stats;
 pub mod texture_oracle;
+pub mod tokens;
 pub mod walk;
 
 /// The README's Rust code, compiled and run.

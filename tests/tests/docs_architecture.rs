@@ -1,9 +1,10 @@
 //! `docs/ARCHITECTURE.md` says what the code is: layers, sizes, and which files a new thing touches. Paths and tests that
 //! any document cites exist.
 
-use croupier::film::{PixelAov, PixelStats};
-use croupier::learn::cache::{CacheSize, Training};
-use croupier::{BYTES_PER_PATH, Plan, Settings, Strategy};
+use croupier::unstable::BYTES_PER_PATH;
+use croupier::unstable::film::{PixelAov, PixelStats};
+use croupier::unstable::learn::cache::{CacheSize, Training};
+use croupier::{Plan, Settings, Strategy};
 use croupier_tests::documents::{FOLDERS, Rows, document, documents, prose, quoted, read, root, sources, tables};
 use std::collections::{BTreeSet, HashMap};
 
