@@ -9,7 +9,7 @@
 //! 3. a parent that uses a child which implements a trait of that parent: contract and table of implementations in
 //!    `x.rs`, one implementation each in `x/name.rs`.
 
-use crate::tokens::{Token, tokens, without_tests};
+use crate::source::Module;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt;
 use std::path::Path;
@@ -30,30 +30,6 @@ impl fmt::Display for Import {
         let names: Vec<_> = self.names.iter().map(String::as_str).collect();
         write!(f, "{} -> {}: {}", self.from, self.to, names.join(", "))
     }
-}
-
-/// One `use` of one name.
-struct Use {
-    path: Vec<String>,
-    /// Name in this file; `*` for all names.
-    alias: String,
-    /// Other files see the name.
-    public: bool,
-}
-
-/// One file.
-struct Module {
-    file: String,
-    path: Vec<String>,
-    children: Vec<String>,
-    uses: Vec<Use>,
-    /// Paths outside `use`, of two names at least, and single names.
-    paths: Vec<Vec<String>>,
-    /// Names defined outside any braces; within braces.
-    items: [BTreeSet<String>; 2],
-    traits: BTreeSet<String>,
-    /// Traits that types of this file implement.
-    implements: BTreeSet<String>,
 }
 
 /// Sources of a crate.
@@ -282,126 +258,4 @@ fn table(root: &str) -> Result<Vec<Row>, String> {
         Ok((layer, column.map(|c| row.get(c).map(|c| names(c)).unwrap_or_default())))
     })
     .collect()
-}
-
-impl Module {
-    fn new(file: &str, text: &str) -> Self {
-        let path = file.trim_end_matches(".rs").trim_end_matches("/mod").split('/').filter(|s| *s != "lib");
-        let mut m = Self {
-            file: file.to_owned(),
-            path: path.map(str::to_owned).collect(),
-            children: vec![],
-            uses: vec![],
-            paths: vec![],
-            items: [BTreeSet::new(), BTreeSet::new()],
-            traits: BTreeSet::new(),
-            implements: BTreeSet::new(),
-        };
-        m.collect(&without_tests(tokens(text)));
-        m
-    }
-
-    fn collect(&mut self, tokens: &[Token]) {
-        let word = |i: usize| tokens.get(i).and_then(Token::word);
-        let sign = |i: usize| tokens.get(i).and_then(Token::sign);
-        let (mut i, mut braces) = (0usize, 0usize);
-        while i < tokens.len() {
-            match &tokens[i] {
-                Token::Sign('{') => braces += 1,
-                Token::Sign('}') => braces = braces.saturating_sub(1),
-                Token::Word(w) if w == "use" && sign(i + 1) != Some('<') => {
-                    let public = i > 0 && (word(i - 1) == Some("pub") || sign(i - 1) == Some(')'));
-                    let end = (i..tokens.len()).find(|k| sign(*k) == Some(';')).unwrap_or(tokens.len());
-                    let mut at = i + 1;
-                    while at < end {
-                        at = self.add_uses(&tokens[..end], at, &[], public);
-                    }
-                    i = end;
-                }
-                Token::Word(w) if w == "mod" && sign(i + 2) == Some(';') => {
-                    self.children.extend(word(i + 1).map(str::to_owned));
-                    i += 2;
-                }
-                Token::Word(w) => {
-                    let name = if w == "macro_rules" { word(i + 2) } else { word(i + 1) };
-                    let defines = matches!(
-                        w.as_str(),
-                        "fn" | "struct"
-                            | "enum"
-                            | "union"
-                            | "trait"
-                            | "type"
-                            | "const"
-                            | "static"
-                            | "mod"
-                            | "macro_rules"
-                    );
-                    if let Some(name) = name.filter(|_| defines) {
-                        self.items[usize::from(braces > 0)].insert(name.to_owned());
-                        if w == "trait" && braces == 0 {
-                            self.traits.insert(name.to_owned());
-                        }
-                    }
-                    if w == "for" && i > 0 {
-                        self.implements.extend(implemented(&tokens[..i]));
-                    }
-                    let mut path = vec![w.clone()];
-                    while sign(i + 1) == Some(':') && sign(i + 2) == Some(':') && word(i + 3).is_some() {
-                        path.extend(word(i + 3).map(str::to_owned));
-                        i += 3;
-                    }
-                    self.paths.push(path);
-                }
-                Token::Sign(_) => {}
-            }
-            i += 1;
-        }
-    }
-
-    /// One tree of a `use` from token `at`; returns the token behind it.
-    fn add_uses(&mut self, tokens: &[Token], mut at: usize, prefix: &[String], public: bool) -> usize {
-        let mut path = prefix.to_vec();
-        let mut alias = None;
-        while let Some(token) = tokens.get(at) {
-            at += 1;
-            match token {
-                Token::Word(w) if w == "as" => alias = tokens.get(at).and_then(Token::word).map(str::to_owned),
-                Token::Word(w) if alias.is_none() => path.push(w.clone()),
-                Token::Sign('*') => alias = Some("*".to_owned()),
-                Token::Sign('{') => {
-                    while tokens.get(at).is_some_and(|t| t.sign() != Some('}')) {
-                        at = self.add_uses(tokens, at, &path, public);
-                    }
-                    return at + 1 + usize::from(tokens.get(at + 1).is_some_and(|t| t.sign() == Some(',')));
-                }
-                Token::Sign(',') => break,
-                Token::Sign('}') => {
-                    at -= 1;
-                    break;
-                }
-                _ => {}
-            }
-        }
-        if path.len() > prefix.len() && path.last().is_some_and(|l| l == "self") {
-            path.pop();
-        }
-        let alias = alias.or_else(|| path.last().cloned());
-        self.uses.extend(alias.map(|alias| Use { path, alias, public }));
-        at
-    }
-}
-
-/// The trait in `impl Trait<..> for`, if tokens end so.
-fn implemented(tokens: &[Token]) -> Option<String> {
-    let mut angles = 0usize;
-    for t in tokens.iter().rev() {
-        match t {
-            Token::Sign('>') => angles += 1,
-            Token::Sign('<') => angles = angles.checked_sub(1)?,
-            Token::Word(w) if angles == 0 => return Some(w.clone()),
-            Token::Sign('\'' | ',') | Token::Word(_) if angles > 0 => {}
-            _ => return None,
-        }
-    }
-    None
 }

@@ -16,6 +16,7 @@ pub mod quadrature;
 pub mod replay;
 pub mod runner;
 pub mod scenes;
+mod source;
 pub mod stats;
 pub mod texture_oracle;
 pub mod tokens;
