@@ -157,42 +157,14 @@ fn material_kinds_are_named_in_tables_only() {
     }
 }
 
-/// Layers of a document, lowest first, with what is said of them.
-fn layers(text: &str) -> Vec<Vec<String>> {
-    tables(text, "layer").concat()
-}
-
-/// Modules of the crate that a source uses.
-fn uses(text: &str) -> Vec<String> {
-    text.split("crate::")
-        .skip(1)
-        .filter(|rest| !rest.starts_with('{'))
-        .map(|rest| rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect())
-        .collect()
-}
-
-/// Every layer uses itself and rows above. Killed by: a `use` of a layer below, a module without a row, a row without a
-/// module, imports in braces, which this test would not read, a table that differs from that of the crate's own
-/// documentation.
+/// Killed by: a layer that only one of the two tables has, or describes as the other does not. `layers.rs` compares the
+/// imports.
 #[test]
-fn layers_use_what_is_above_them() {
-    let layers = layers(&document(ARCHITECTURE));
-    assert_eq!(layers, self::layers(&document("core/src/lib.rs")));
-    let names: Vec<&str> = layers.iter().map(|r| r[0].trim_matches(['`', '[', ']'])).collect();
-    let row_of = |name: &str| names.iter().position(|n| *n == name);
-    let mut met = BTreeSet::new();
-    for (path, text) in core() {
-        let own = path.strip_prefix("core/src/").unwrap().split(['/', '.']).next().unwrap();
-        let row = row_of(own).unwrap_or_else(|| panic!("{ARCHITECTURE} has no layer for {path}"));
-        met.insert(row);
-        assert!(!text.contains("crate::{"), "{path} imports in braces from the crate");
-        for used in uses(&text) {
-            let below = row_of(&used).is_some_and(|other| other > row);
-            assert!(!below, "{path} uses {used}, which the table has below {own}");
-        }
-    }
-    let without: Vec<_> = names.iter().enumerate().filter(|(i, _)| !met.contains(i)).collect();
-    assert!(without.is_empty(), "layers without a file: {without:?}");
+fn layers_are_those_of_the_crate() {
+    let of = |path: &str| tables(&document(path), "layer").concat();
+    let layers = of(ARCHITECTURE);
+    assert!(layers.len() > 20);
+    assert_eq!(layers, of("core/src/lib.rs"));
 }
 
 /// Number of bytes that the table of memory states for a row.

@@ -8,10 +8,12 @@
 pub mod blob;
 mod effects;
 mod error;
+mod records;
 mod sections;
 mod validate;
 mod view;
 
 pub use effects::Effects;
 pub use error::{ChildFault, Field, SceneError, SectionFault, SlotFault};
-pub use view::{Records, Scene};
+pub use records::Records;
+pub use view::Scene;

@@ -1,9 +1,11 @@
 //! A validated scene: slices into the caller's bytes.
 
 use super::blob::*;
+use super::effects::Effects;
 use super::error::{SceneError, SectionFault};
+use super::records::Records;
 use super::sections::Sections;
-use super::{Effects, validate};
+use super::validate;
 use core::ops::Deref;
 
 /// A validated scene: its [`Records`], to be read and not to be changed. [`Scene::from_bytes`] makes one if all of this
@@ -15,47 +17,6 @@ use core::ops::Deref;
 /// * every number that a formula reads is finite and in the range that [`super::Field`] states.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'s>(Records<'s>);
-
-/// The sections of a scene blob.
-#[derive(Clone, Copy, Debug)]
-pub struct Records<'s> {
-    /// Facts about the whole scene.
-    pub info: &'s SceneInfo,
-    /// Nodes of the tree.
-    pub nodes: &'s [Node],
-    /// Leaves of the tree.
-    pub leaves: &'s [Leaf],
-    /// Triangles.
-    pub triangles: &'s [Triangle],
-    /// Vertices.
-    pub vertices: &'s [Vertex],
-    /// Materials.
-    pub materials: &'s [Material],
-    /// Textures.
-    pub textures: &'s [Texture],
-    /// sRGB texels.
-    pub texels: &'s [u32],
-    /// Tables that materials refer to.
-    pub tables: &'s [f32],
-    /// Lights.
-    pub lights: &'s [Light],
-    /// Alias table over the lights; may be empty if no light emits.
-    pub light_alias: &'s [Alias],
-    /// Environment, if any.
-    pub environment: Option<&'s Environment>,
-    /// Radiance of the environment map.
-    pub env_texels: &'s [[f32; 3]],
-    /// Alias tables of the environment map; empty if it is black.
-    pub env_alias: &'s [Alias],
-    /// Camera.
-    pub camera: &'s Camera,
-    /// Material names, newline-separated; see [`Scene::material_name`].
-    pub names: &'s [u8],
-    /// Effects that the scene calls for: of the materials that triangles use, of lights and camera.
-    pub effects: Effects,
-    /// [`content_hash`] of the blob.
-    pub hash: u64,
-}
 
 impl<'s> Deref for Scene<'s> {
     type Target = Records<'s>;

@@ -1,6 +1,6 @@
 //! Alias tables: what picking does against what the stated probabilities say.
 
-use super::{Record, mark};
+use super::record::{Record, mark};
 use crate::scene::blob::{Alias, SectionKind};
 use crate::scene::error::{Field, SceneError};
 

@@ -1,6 +1,7 @@
 //! The environment, its map and the tables that sample it.
 
-use super::{Record, alias, dot};
+use super::alias;
+use super::record::{Record, dot, records};
 use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError, SectionFault};
 use crate::scene::{Effects, Records};
@@ -68,7 +69,7 @@ fn rotation(at: Record, e: &Environment) -> Result<(), SceneError> {
 /// Texels, and the brightest under the largest scale, are legal radiances. Returns the brightest of each channel.
 fn radiance(scene: &Records<'_>, e: &Environment) -> Result<[f32; 3], SceneError> {
     let mut brightest = [0.0f32; 3];
-    for (at, texel) in super::records(SectionKind::EnvTexels, scene.env_texels) {
+    for (at, texel) in records(SectionKind::EnvTexels, scene.env_texels) {
         at.all_within(Field::Emission, texel, 0.0, MAX_EMISSION)?;
         brightest.iter_mut().zip(texel).for_each(|(b, x)| *b = b.max(*x));
     }

@@ -1,6 +1,7 @@
 //! Vertices and triangles.
 
-use super::{materials, records};
+use super::materials;
+use super::record::{Record, records};
 use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError};
 use crate::scene::{Effects, Records};
@@ -27,7 +28,7 @@ pub(super) fn triangles(scene: &Records<'_>) -> Result<Effects, SceneError> {
         for v in t.vertex {
             let vertex = at.follow(SectionKind::Vertices, v, scene.vertices)?;
             if smooth {
-                super::Record { of: SectionKind::Vertices, index: v as usize }.unit(vertex.n)?;
+                Record { of: SectionKind::Vertices, index: v as usize }.unit(vertex.n)?;
             }
         }
         let material = at.follow(SectionKind::Materials, t.material, scene.materials)?;

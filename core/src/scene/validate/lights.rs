@@ -1,6 +1,7 @@
 //! Lights and the table that chooses among them.
 
-use super::{Record, alias, cross, dot64, records};
+use super::alias;
+use super::record::{Record, cross, dot64, records};
 use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError, SectionFault};
 use crate::scene::{Effects, Records};

@@ -1,6 +1,6 @@
 //! Materials, their textures and tables.
 
-use super::{Record, records};
+use super::record::{Record, records};
 use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError};
 use crate::scene::{Effects, Records};

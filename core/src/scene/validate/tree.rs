@@ -5,7 +5,7 @@
 //! after at most as many steps as there are child slots, no record is met twice (neither cycles nor sharing), and the
 //! counters at the end say whether all were met. The stack is the path to the current node.
 
-use super::mark;
+use super::record::mark;
 use crate::scene::Records;
 use crate::scene::blob::*;
 use crate::scene::error::{ChildFault, SceneError, SlotFault};

@@ -6,34 +6,23 @@
 //! | `obj` | geometry: Wavefront OBJ |
 //! | `mtl` | materials of a bare OBJ |
 //! | `images` | PNG and JPEG textures, EXR environment maps |
+//! | `loader` | the files that all of them ask for, each once |
 //! | `json` | values of a JSON document with their paths |
 
 mod error;
 mod images;
 mod json;
+mod loader;
 mod mtl;
 mod obj;
 mod scene_json;
 
 pub use error::LoadError;
+pub use loader::LoadReport;
 
-use crate::description::{Environment, SceneDescription, Texture};
-use std::collections::HashMap;
-use std::fs;
-use std::path::{Path, PathBuf};
-
-/// Report of loading, besides the scene.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct LoadReport {
-    /// Files read.
-    pub files: Vec<PathBuf>,
-    /// Faces of more than three corners, split into fans.
-    pub polygons: u32,
-    /// Points and lines, left out.
-    pub skipped_elements: u32,
-    /// Notes of what was assumed or ignored, one sentence each.
-    pub notes: Vec<String>,
-}
+use crate::description::SceneDescription;
+use loader::Loader;
+use std::path::Path;
 
 /// Loads a folder with a `scene.json`, that `scene.json` itself, or a bare `.obj` file.
 pub fn load(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
@@ -51,58 +40,4 @@ pub fn load(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
         }
     };
     Ok((scene, loader.report))
-}
-
-/// State that the files of one scene share.
-#[derive(Default)]
-struct Loader {
-    report: LoadReport,
-    /// Textures by path: a file that several materials use is decoded once.
-    textures: HashMap<PathBuf, u32>,
-}
-
-impl Loader {
-    /// Reads a whole file; `referrer` is the place that names it.
-    fn read(&mut self, path: &Path, referrer: Option<&str>) -> Result<Vec<u8>, LoadError> {
-        let bytes = fs::read(path).map_err(|source| LoadError::Read {
-            path: path.into(),
-            referrer: referrer.map(Into::into),
-            source,
-        })?;
-        self.report.files.push(path.into());
-        Ok(bytes)
-    }
-
-    /// As [`Loader::read`]; bytes that are not UTF-8 (old exporters' comments) become replacement characters.
-    fn read_text(&mut self, path: &Path, referrer: Option<&str>) -> Result<String, LoadError> {
-        let bytes = self.read(path, referrer)?;
-        Ok(String::from_utf8(bytes).unwrap_or_else(|e| String::from_utf8_lossy(e.as_bytes()).into_owned()))
-    }
-
-    /// Index of the texture in `path`, decoded at its first use.
-    fn texture(&mut self, scene: &mut SceneDescription, path: &Path, referrer: &str) -> Result<u32, LoadError> {
-        if let Some(index) = self.textures.get(path) {
-            return Ok(*index);
-        }
-        let bytes = self.read(path, Some(referrer))?;
-        let image = images::texture(&bytes).map_err(|what| LoadError::image(path, referrer, what))?;
-        let index = scene.textures.len() as u32;
-        scene.textures.push(Texture { name: path.display().to_string(), ..image });
-        self.textures.insert(path.into(), index);
-        Ok(index)
-    }
-
-    /// The environment map in `path`, unscaled and unrotated.
-    fn environment(&mut self, path: &Path, referrer: &str) -> Result<Environment, LoadError> {
-        let bytes = self.read(path, Some(referrer))?;
-        let (map, clamped) = images::exr(&bytes).map_err(|what| LoadError::image(path, referrer, what))?;
-        if clamped > 0 {
-            self.note(format!("{}: {clamped} negative or NaN numbers were taken as 0", path.display()));
-        }
-        Ok(map)
-    }
-
-    fn note(&mut self, text: String) {
-        self.report.notes.push(text);
-    }
 }

@@ -7,7 +7,8 @@
 //! out then has normals for all faces or for none, and `tobj` has nothing left to refuse.
 
 use super::json::Place;
-use super::{LoadError, Loader, mtl};
+use super::loader::Loader;
+use super::{LoadError, mtl};
 use crate::builtin;
 use crate::description::{Camera, Emitter, Object, SceneDescription, Triangle, Vertex};
 use std::collections::HashMap;

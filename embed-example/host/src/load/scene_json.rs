@@ -1,7 +1,8 @@
 //! `scene.json`: every key, its unit and what is refused are in docs/SCENES.md.
 
 use super::json::{self, Place};
-use super::{LoadError, Loader, obj};
+use super::loader::Loader;
+use super::{LoadError, obj};
 use crate::description::{
     Camera, Emitter, Environment, Material, Model, ParameterSource, Reflectance, SceneDescription, ThinLens,
 };

@@ -1,0 +1,45 @@
+//! The sections of a scene blob as slices.
+
+use super::blob::*;
+use super::effects::Effects;
+
+/// The sections of a scene blob.
+#[derive(Clone, Copy, Debug)]
+pub struct Records<'s> {
+    /// Facts about the whole scene.
+    pub info: &'s SceneInfo,
+    /// Nodes of the tree.
+    pub nodes: &'s [Node],
+    /// Leaves of the tree.
+    pub leaves: &'s [Leaf],
+    /// Triangles.
+    pub triangles: &'s [Triangle],
+    /// Vertices.
+    pub vertices: &'s [Vertex],
+    /// Materials.
+    pub materials: &'s [Material],
+    /// Textures.
+    pub textures: &'s [Texture],
+    /// sRGB texels.
+    pub texels: &'s [u32],
+    /// Tables that materials refer to.
+    pub tables: &'s [f32],
+    /// Lights.
+    pub lights: &'s [Light],
+    /// Alias table over the lights; may be empty if no light emits.
+    pub light_alias: &'s [Alias],
+    /// Environment, if any.
+    pub environment: Option<&'s Environment>,
+    /// Radiance of the environment map.
+    pub env_texels: &'s [[f32; 3]],
+    /// Alias tables of the environment map; empty if it is black.
+    pub env_alias: &'s [Alias],
+    /// Camera.
+    pub camera: &'s Camera,
+    /// Material names, newline-separated; see [`super::Scene::material_name`].
+    pub names: &'s [u8],
+    /// Effects that the scene calls for: of the materials that triangles use, of lights and camera.
+    pub effects: Effects,
+    /// [`content_hash`] of the blob.
+    pub hash: u64,
+}
