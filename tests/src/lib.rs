@@ -19,7 +19,6 @@ pub mod scenes;
 mod source;
 pub mod stats;
 pub mod texture_oracle;
-pub mod tokens;
 pub mod walk;
 
 /// The README's Rust code, compiled and run.
