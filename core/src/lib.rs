@@ -8,6 +8,7 @@
 //! | layer | knows | must not know |
 //! |---|---|---|
 //! | `memory` | sizes first, then one carve | what is stored |
+//! | `bits` | sets, one bit each | what is in them |
 //! | `names` | enumerations with names | what they stand for |
 //! | `cost` | counted cost of rays | clocks |
 //! | `counters` | what happened, bounds met | why |
@@ -66,6 +67,7 @@
 #![deny(clippy::expect_used, clippy::panic, clippy::unreachable, clippy::unwrap_used)]
 
 mod accel;
+mod bits;
 mod bsdf;
 mod camera;
 mod cost;

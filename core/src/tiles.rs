@@ -87,9 +87,20 @@ pub(crate) struct Tiles {
 }
 
 /// Bits 0, 2, 4 of `x`, packed.
-fn even_bits(x: u32) -> u32 {
+const fn even_bits(x: u32) -> u32 {
     x & 1 | x >> 1 & 2 | x >> 2 & 4
 }
+
+/// Column and row of each slot within its tile.
+const SLOTS: [[u8; 2]; TILE_PIXELS as usize] = {
+    let mut slots = [[0; 2]; TILE_PIXELS as usize];
+    let mut i = 0;
+    while i < TILE_PIXELS {
+        slots[i as usize] = [even_bits(i) as u8, even_bits(i >> 1) as u8];
+        i += 1;
+    }
+    slots
+};
 
 impl Tiles {
     pub(crate) fn new(size: [u32; 2], shards: u32) -> Self {
@@ -123,7 +134,8 @@ impl Tiles {
     /// Column and row of slot `slot` (Morton order) of the tile that starts at `[x, y]`, if inside the picture.
     #[inline]
     pub(crate) fn pixel(&self, [x, y]: [u32; 2], slot: u32) -> Option<[u32; 2]> {
-        let (x, y) = (x + even_bits(slot), y + even_bits(slot >> 1));
+        let [dx, dy] = SLOTS[(slot % TILE_PIXELS) as usize].map(u32::from);
+        let (x, y) = (x + dx, y + dy);
         (x < self.size[0] && y < self.size[1]).then_some([x, y])
     }
 

@@ -1,8 +1,9 @@
 //! Surfaces and emitters asked about by triangle, as tests know them.
 
+use croupier::Scene;
+use croupier::unstable::Effects;
 use croupier::unstable::geometry::{self, Hit8, SurfaceHit8, SurfacePoint8};
-use croupier::unstable::light::{self, LightSelector};
-use croupier::unstable::scene::Scene;
+use croupier::unstable::light::{self, LightSample8, LightSelector};
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Hits of the triangles at parameter `t` and weights `u`, `v`, in the lanes of `mask`.
@@ -36,4 +37,16 @@ pub fn area_pdf<S: LightSelector>(
 pub fn area_radiance(scene: &Scene<'_>, triangle: U32x8, dir: Vec3x8, ng: Vec3x8, mask: Mask8) -> Vec3x8 {
     let hit = hit(scene, triangle, F32x8::ZERO, F32x8::ZERO, F32x8::ZERO, mask);
     light::area_radiance(scene, &hit, dir, ng, mask)
+}
+
+/// [`light::sample_of`] with every kind of light.
+pub fn sample<S: LightSelector>(
+    scene: &Scene<'_>,
+    selector: &S,
+    p: Vec3x8,
+    n: Vec3x8,
+    words: [U32x8; 4],
+    mask: Mask8,
+) -> LightSample8 {
+    light::sample_of(Effects(u32::MAX), scene, selector, p, n, words, mask)
 }

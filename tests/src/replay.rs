@@ -5,7 +5,7 @@
 //! For flat-shaded scenes of area lights without textures, lens and environment, and the absolute objective.
 
 use crate::cache::Sums;
-use crate::hit::{area_pdf, area_radiance, surface_point};
+use crate::hit::{area_pdf, area_radiance, sample, surface_point};
 use croupier::Scene;
 use croupier::unstable::accel::{Intersector, WideBvh};
 use croupier::unstable::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
@@ -13,7 +13,7 @@ use croupier::unstable::camera;
 use croupier::unstable::cost::COST_SHADOW;
 use croupier::unstable::geometry::{Ray8, offset, shadow_ray};
 use croupier::unstable::learn::cache::{Cache, VertexKind, VertexKind8};
-use croupier::unstable::light::{LightSample8, PowerSelector, power_heuristic, sample};
+use croupier::unstable::light::{LightSample8, PowerSelector, power_heuristic};
 use croupier::unstable::rng::Key8;
 use croupier::unstable::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind};
 use croupier::unstable::simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};

@@ -4,11 +4,12 @@
 //! density varies fast.
 
 use croupier::unstable::camera;
-use croupier::unstable::light::{PowerSelector, sample};
+use croupier::unstable::light::PowerSelector;
 use croupier::unstable::scene::Effects;
 use croupier::unstable::scene::blob::{Camera, LightKind, MaterialKind};
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_tests::bsdf::{Case, assert_every_kind, at_angle, cases, has_density, lane, splat};
+use croupier_tests::hit::sample;
 use croupier_tests::jacobian::{Deviation, V, deviation};
 use croupier_tests::light_scene::{IDENTITY, LightScene};
 

@@ -1,9 +1,9 @@
 //! Area, point and directional lights.
 
-use croupier::unstable::light::{LightSample8, PowerSelector, power_heuristic, sample};
+use croupier::unstable::light::{LightSample8, PowerSelector, power_heuristic};
 use croupier::unstable::scene::blob::LightKind;
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
-use croupier_tests::hit::{area_pdf, area_radiance};
+use croupier_tests::hit::{area_pdf, area_radiance, sample};
 use croupier_tests::light_oracle as oracle;
 use croupier_tests::light_oracle::{cross, dot, length, sub, unit, wide};
 use croupier_tests::light_scene::LightScene;

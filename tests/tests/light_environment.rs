@@ -1,7 +1,8 @@
 //! Environment maps and the constant environment against the f64 oracle.
 
-use croupier::unstable::light::{LightSample8, PowerSelector, environment_pdf, environment_radiance, sample};
+use croupier::unstable::light::{LightSample8, PowerSelector, environment_pdf, environment_radiance};
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier_tests::hit::sample;
 use croupier_tests::light_oracle::{Map, V, dot, length, luminance, wide};
 use croupier_tests::light_scene::{IDENTITY, LightScene};
 use croupier_tests::stats::{SplitMix, chi_square_in_order};

@@ -1,10 +1,11 @@
 //! Every kind of light under one contract: what its samples add up to is the irradiance by an independent formula, and
 //! they say of themselves what the table of kinds says. A kind without an example does not compile.
 
-use croupier::unstable::light::{LightSample8, PowerSelector, sample};
+use croupier::unstable::light::{LightSample8, PowerSelector};
 use croupier::unstable::scene::Effects;
 use croupier::unstable::scene::blob::{EnvironmentKind, LightKind};
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier_tests::hit::sample;
 use croupier_tests::light_oracle::{V, cross, dot, length, sub, wide};
 use croupier_tests::light_scene::{IDENTITY, LightScene};
 use croupier_tests::stats::{Mean, SplitMix};

@@ -6,7 +6,7 @@
 //! | `eta[0]` | int_ior / ext_ior; +z is the exterior | `ETA_RANGE` |
 
 use super::fresnel::{self, Index8};
-use super::{Bsdf, CacheDirection, Eval8, Inputs8, Lobes, Materials8, Sample8, lobes, mirrored};
+use super::{Bsdf, CacheDirection, Eval8, Inputs8, Lobes, Sample8, lobes, mirrored};
 use crate::scene::Scene;
 use crate::scene::blob::Material;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
@@ -23,7 +23,7 @@ impl Bsdf<'_> for Dielectric {
 
     #[inline(always)]
     fn gather(scene: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
-        Self { index: Index8::new(Materials8::new(scene, inputs, active).get(|m| m.eta[0])) }
+        Self { index: Index8::gather(scene, inputs, active) }
     }
 
     #[inline(always)]

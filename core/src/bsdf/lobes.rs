@@ -1,8 +1,12 @@
 //! Facts of a model, known without running it.
 
+use crate::bits::bit_set;
+
 /// A set of lobes, one bit each, as pbrt's `BxDFFlags`: on which side of the surface the model scatters, and how wide.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Lobes(pub u32);
+
+bit_set!(Lobes);
 
 impl Lobes {
     /// Scatters to the side of `wo`.
@@ -15,21 +19,6 @@ impl Lobes {
     pub const GLOSSY: Self = Self(8);
     /// Delta lobes: scatters to single directions, at least in some lanes.
     pub const SPECULAR: Self = Self(16);
-
-    /// Union.
-    pub const fn with(self, o: Self) -> Self {
-        Self(self.0 | o.0)
-    }
-
-    /// Whether every lobe of `o` is in `self`.
-    pub const fn contains(self, o: Self) -> bool {
-        self.0 & o.0 == o.0
-    }
-
-    /// Whether any lobe of `o` is in `self`.
-    pub const fn intersects(self, o: Self) -> bool {
-        self.0 & o.0 != 0
-    }
 
     /// Whether there are delta lobes only: light samples are of no use then.
     pub const fn delta_only(self) -> bool {

@@ -290,6 +290,14 @@ impl<'s> Materials8<'s> {
     }
 }
 
+impl fresnel::Index8 {
+    /// Relative indices of the materials of the lanes in `active`.
+    #[inline(always)]
+    fn gather(scene: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
+        Self::new(Materials8::new(scene, inputs, active).get(|m| m.eta[0]))
+    }
+}
+
 /// `wo` mirrored at the normal.
 #[inline(always)]
 fn mirrored(wo: Vec3x8) -> Vec3x8 {

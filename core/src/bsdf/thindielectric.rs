@@ -6,16 +6,14 @@
 //! | `eta[0]` | int_ior / ext_ior | `ETA_RANGE` |
 
 use super::fresnel::{self, Index8};
-use super::{Bsdf, CacheDirection, Eval8, Inputs8, Lobes, Materials8, Sample8, lobes, mirrored};
+use super::{Bsdf, CacheDirection, Eval8, Inputs8, Lobes, Sample8, lobes, mirrored};
 use crate::scene::Scene;
 use crate::scene::blob::Material;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
 /// Thin dielectric sheet.
 #[derive(Clone, Copy, Debug)]
-pub struct ThinDielectric {
-    index: Index8,
-}
+pub struct ThinDielectric(Index8);
 
 impl Bsdf<'_> for ThinDielectric {
     const LOBES: Lobes = Lobes::REFLECTION.with(Lobes::TRANSMISSION).with(Lobes::SPECULAR);
@@ -23,7 +21,7 @@ impl Bsdf<'_> for ThinDielectric {
 
     #[inline(always)]
     fn gather(scene: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
-        Self { index: Index8::new(Materials8::new(scene, inputs, active).get(|m| m.eta[0])) }
+        Self(Index8::gather(scene, inputs, active))
     }
 
     #[inline(always)]
@@ -34,7 +32,7 @@ impl Bsdf<'_> for ThinDielectric {
     #[inline(always)]
     fn sample(&self, wo: Vec3x8, [_, _, u]: [F32x8; 3]) -> Sample8 {
         let cos = wo.z.abs();
-        let r = fresnel::dielectric(cos, self.index).reflectance;
+        let r = fresnel::dielectric(cos, self.0).reflectance;
         let reflect = u.lt((r + r) / (1.0 + r));
         Sample8::delta(Vec3x8::select(reflect, mirrored(wo), -wo), Vec3x8::ONE, cos.gt(F32x8::ZERO))
     }

@@ -103,7 +103,7 @@ impl LightModel for Area {
     }
 }
 
-/// Density with which [`super::sample`] at `p`, `n` chooses the unit directions `dir` that have met the triangles of
+/// Density with which [`super::sample_of`] at `p`, `n` chooses the unit directions `dir` that have met the triangles of
 /// `hit`: selection probability times solid-angle density. 0 outside `mask`, for triangles that do not emit, from
 /// behind, and where the sampler gives up.
 #[inline(always)]

@@ -275,7 +275,7 @@ pub fn environment_radiance(scene: &Scene<'_>, dir: Vec3x8, mask: Mask8) -> Vec3
     (bilinear(corners(scene, e, &at, mask), at.x, at.y) * radiance).zero_unless(mask)
 }
 
-/// Density with which [`super::sample`] at `p`, `n` chooses the unit world direction `dir` to the environment:
+/// Density with which [`super::sample_of`] at `p`, `n` chooses the unit world direction `dir` to the environment:
 /// selection probability times solid-angle density. 0 outside `mask` and where the map is black.
 #[inline(always)]
 pub fn environment_pdf<S: LightSelector>(

@@ -10,7 +10,7 @@
 //! | directional | `directional.rs` | the direction | delta | pi R^2 E |
 //!
 //! A light is chosen by a [`LightSelector`] (power-weighted: `power.rs`); every density stated here contains the
-//! selection probability. What [`sample`] states for a direction is what [`area_pdf`] and [`environment_pdf`] give for
+//! selection probability. What [`sample_of`] states for a direction is what [`area_pdf`] and [`environment_pdf`] give for
 //! a scattered ray that finds the same light (NUMERICS MIS-3): for the environment bit for bit, for triangles up to the
 //! rounding of the hit. Densities are finite and never NaN; where one would be infinite (edge-on or touching) both
 //! the sampler and the density function give the direction up, and the scattered ray has it alone.
@@ -246,20 +246,8 @@ const _: () = {
 /// dropped, since surfaces may transmit). `words` are four independent 32-bit random numbers: the first chooses the
 /// light, the others the position on it. Lanes that come out not `valid` scatter no direct light in this sample: black,
 /// edge-on, behind the light, touching it, or at a distance whose square overflows.
-#[inline(always)]
-pub fn sample<S: LightSelector>(
-    scene: &Scene<'_>,
-    selector: &S,
-    p: Vec3x8,
-    n: Vec3x8,
-    words: [U32x8; 4],
-    active: Mask8,
-) -> LightSample8 {
-    sample_of(Effects(u32::MAX), scene, selector, p, n, words, active)
-}
-
-/// [`sample`] for a kernel profile: lights that need an effect outside the constant `profile` are not compiled in, and
-/// give no sample.
+///
+/// Lights that need an effect outside the constant `profile` are not compiled in, and give no sample.
 #[inline(always)]
 pub fn sample_of<S: LightSelector>(
     profile: Effects,

@@ -1,6 +1,6 @@
 //! Efficiency-aware roulette (EARS, SIGGRAPH 2022): [`super::Ears`] without splitting.
 
-use super::{RrsStrategy, Space, Vertices8, ears};
+use super::{Ears, RrsStrategy, Space, Vertices8, ears};
 use core::fmt;
 use croupier_simd::F32x8;
 
@@ -18,12 +18,12 @@ impl Ear {
 }
 
 impl RrsStrategy for Ear {
-    const NEEDS_ALBEDO: bool = true;
-    const EFFICIENCY_AWARE: bool = true;
-    const SPACE: Option<Space> = Some(Space::Scene);
+    const NEEDS_ALBEDO: bool = Ears::NEEDS_ALBEDO;
+    const EFFICIENCY_AWARE: bool = Ears::EFFICIENCY_AWARE;
+    const SPACE: Option<Space> = Ears::SPACE;
 
     fn write_options(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if self.plain { "plain" } else { "" })
+        Ears { plain: self.plain }.write_options(f)
     }
 
     #[inline(always)]

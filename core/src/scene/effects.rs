@@ -2,6 +2,7 @@
 //! [`super::blob`].
 
 use super::blob::{EnvironmentKind, LightKind, MaterialKind, environment_table, light_table, material_table};
+use crate::bits::bit_set;
 
 /// A set of effects, one bit each; bits 0..16 are material kinds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -13,7 +14,9 @@ const MATERIAL_BITS: usize = 16;
 macro_rules! materials {
     ($($(#[$doc:meta])* $kind:ident = $number:literal, $name:literal, $effect:ident,
         transmissive: $transmissive:literal, delta: $delta:literal, [$($parameter:ident),*];)*) => {
-        impl Effects {
+        bit_set!(Effects);
+
+impl Effects {
             $($(#[$doc])* pub const $effect: Self = Self(1 << $number);)*
         }
 
@@ -103,21 +106,6 @@ const _: () = {
 impl Effects {
     /// Every effect with its name.
     pub const NAMES: &'static [(Self, &'static str)] = &NAMES;
-
-    /// Union.
-    pub const fn with(self, o: Self) -> Self {
-        Self(self.0 | o.0)
-    }
-
-    /// Whether every effect of `o` is in `self`.
-    pub const fn contains(self, o: Self) -> bool {
-        self.0 & o.0 == o.0
-    }
-
-    /// Whether any effect of `o` is in `self`.
-    pub const fn intersects(self, o: Self) -> bool {
-        self.0 & o.0 != 0
-    }
 
     /// The effect of a material kind.
     pub const fn of_material(kind: MaterialKind) -> Self {
