@@ -70,7 +70,7 @@ pub struct Counters {
     pub ledger_full: u64,
     /// Vertices whose factor was not a finite number and became 1.
     pub factors_not_finite: u64,
-    /// Hits at which a path ended because of the longest path length ([`crate::MAX_PATH_LENGTH`]) before its
+    /// Hits at which a path ended because of the longest path length ([`crate::unstable::MAX_PATH_LENGTH`]) before its
     /// `max_depth`.
     pub max_length_reached: u64,
     /// Light samples so near to a point light that the distance was clamped to a larger one (NUMERICS SOL-5).

@@ -19,7 +19,7 @@ pub struct PictureStatistics {
     pub variance: f64,
     /// The outliers' part of that mean.
     pub outliers: f64,
-    /// Mean counted cost (eq. 33), in scattered rays ([`crate::cost`]).
+    /// Mean counted cost (eq. 33), in scattered rays ([`crate::unstable::cost`]).
     pub cost: f64,
     /// Weighted squared error at which one sample makes its pixel an outlier.
     pub limit: f64,

@@ -363,7 +363,7 @@ mod tests {
     /// Random trees, several at a time, in random order, through slabs that suffice and slabs that do not: what is
     /// logged is what recursion gives, for complete samples and for no others, and every slot comes back. Killed by:
     /// values times the child's own scale, pairs of a sample with light and one without, `inner` left out or applied
-    /// twice, rays that stay with the child, a pair with a sample of another vertex, a spoiled sample whose parents are
+    /// twice, rays that stay with the child, a pair with a sample of another vertex, an incomplete sample whose parents are
     /// not, a drained vertex that counts on, a slot not given back.
     #[test]
     fn what_is_logged_is_what_recursion_gives() {
