@@ -12,10 +12,10 @@
 //! vertex after vertex, so that siblings share material and texture and one kernel runs full lanes. Every slot is in
 //! one queue or free, so a queue costs no memory of its own: another class leaves the bytes per path as they are.
 //!
-//! **Order.** The newest vertex of a queue leaves first ([`NEWEST_FIRST`]). Newest first follows paths to their ends and
-//! keeps few vertices waiting; oldest first visits all paths of a depth before the next. Both fill packets alike as soon
-//! as the ring does not limit them; `cargo run --release -p croupier-benches --bin machine`, with the constant set to
-//! either value, shows lanes and the most vertices that waited (figures in docs/ARCHITECTURE.md).
+//! **Order.** The newest vertex of a queue leaves first ([`NEWEST_FIRST`]): paths are followed to their ends before
+//! others begin. Oldest first fills packets alike, but with splitting up to six times as many vertices wait, and a ring of
+//! two packets gets stuck behind a vertex with several samples left (figures: docs/ARCHITECTURE.md, "The order of the
+//! refill ring").
 //!
 //! **Bounded.** What a packet may take depends on the free slots ([`Ring::take`]), and vertices that may start while
 //! [`RESERVE`] slots stay free can always run their packet to its end: the ring can neither overflow nor get stuck.
