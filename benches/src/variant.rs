@@ -7,7 +7,7 @@ use croupier::{Settings, Strategy};
 pub const MODIFIERS: &[(&str, &str)] = &[
     ("adaptive", "adaptive sampling"),
     ("shadow", "roulette of light samples and their rays"),
-    ("constant", "the cached mean stands in for what roulette skips"),
+    ("constant", "the cached mean as control variate of roulette"),
     ("small", "one shard, and less than 256 KiB for all that is learned"),
     ("truth", "strategies that learn are told the true pixels instead of denoised ones"),
     ("idle", "learned factors are all 1: what learning costs where paths are as with `classic:200`"),

@@ -35,19 +35,19 @@ pub enum SessionError {
     },
     /// This shard has not finished the iteration.
     Unfinished {
-        /// Its index.
+        /// Index of the shard.
         shard: u32,
     },
     /// This shard was made for other settings.
     Plan {
-        /// Its index.
+        /// Index of the shard.
         shard: u32,
     },
     /// No iteration has begun.
     NoIteration,
     /// An estimate of the pixels that does not fit.
     Estimate {
-        /// Its values.
+        /// Number of values given.
         given: usize,
     },
 }

@@ -129,7 +129,7 @@ pub enum SettingsError {
     Range {
         /// The setting.
         setting: &'static SettingInfo,
-        /// Its value.
+        /// Value that was given.
         value: SettingValue,
     },
     /// Fewer bytes for the cache than the roots of its trees need in the session and in every shard.

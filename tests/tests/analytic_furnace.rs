@@ -265,7 +265,7 @@ fn a_closed_sphere_sums_the_geometric_series() {
 /// A closed white box without light ends: every path has exactly 200 segments. Killed by: no hard stop, one off by one,
 /// a setting that lifts it, a stop that is not counted.
 #[test]
-fn white_boxes_end_at_the_hard_stop() {
+fn white_boxes_end_at_the_longest_path_length() {
     let scene = blob(&glowing_box(1.0, 0.0, [4, 4]));
     for (strategy, max_depth) in [("none", u32::MAX), ("none", 200), ("classic", 1000), ("contribution", 201)] {
         let c = render(&scene, &Settings { max_depth, ..settings(&scene, strategy) }, 4).counters;

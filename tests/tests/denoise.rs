@@ -151,10 +151,10 @@ fn a_picture_without_noise_comes_back() {
 /// reaches its rim only. Killed by: the weight `noisy` of the correction set to 1.
 #[test]
 fn an_emitter_keeps_its_value() {
-    let lamp = |x: usize, y: usize| (30..40).contains(&x) && (10..20).contains(&y);
-    let truth = Picture::exact([70, 50], |x, y| if lamp(x, y) { [50.0; 3] } else { [0.2; 3] });
+    let emitter = |x: usize, y: usize| (30..40).contains(&x) && (10..20).contains(&y);
+    let truth = Picture::exact([70, 50], |x, y| if emitter(x, y) { [50.0; 3] } else { [0.2; 3] });
     let mut noisy = truth.clone().noisy(4, 13);
-    let inside = |i: usize| lamp(i % 70, i / 70);
+    let inside = |i: usize| emitter(i % 70, i / 70);
     for i in (0..70 * 50).filter(|&i| inside(i)) {
         (noisy.color[i], noisy.variance[i]) = ([50.0; 3], [0.0; 3]);
     }
@@ -163,7 +163,7 @@ fn an_emitter_keeps_its_value() {
             let rim = !((31..39).contains(&(i % 70)) && (11..19).contains(&(i / 70)));
             assert!((pixel[0] - 50.0).abs() < if rim { 5e-2 } else { 5e-5 }, "{}", pixel[0]);
         } else {
-            assert!(pixel[0] < 1.0, "the lamp bleeds: {} at {:?}", pixel[0], (i % 70, i / 70));
+            assert!(pixel[0] < 1.0, "the emitter bleeds: {} at {:?}", pixel[0], (i % 70, i / 70));
         }
     }
 }

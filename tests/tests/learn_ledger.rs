@@ -146,12 +146,12 @@ fn check(what: &str, b: &Both) {
 /// weight of the path before them, emission without its MIS weight, the first camera ray charged to a sample.
 #[test]
 fn single_samples_are_logged_as_recursion_has_them() {
-    for (name, scene) in [("lamp", box_with_emitter()), ("mirror and glass", mirror_and_glass())] {
+    for (name, scene) in [("emitter", box_with_emitter()), ("mirror and glass", mirror_and_glass())] {
         for max_depth in [2, 3, 5] {
             let b = both(&scene, max_depth, &[200]);
             let used = b.oracle.iter().filter(|s| s[0] > 0.0).count();
             println!("{name}, depth {max_depth}: {} samples in {used} bins", b.counted[0][1]);
-            assert!(b.counted[0][1] > 3000 && used > if max_depth > 2 && name != "lamp" { 8 } else { 2 });
+            assert!(b.counted[0][1] > 3000 && used > if max_depth > 2 && name != "emitter" { 8 } else { 2 });
             check(&format!("{name}, depth {max_depth}"), &b);
         }
     }
@@ -161,7 +161,7 @@ fn single_samples_are_logged_as_recursion_has_them() {
 /// vertex whose cost is counted once, a sum that is folded into the parent before it is complete.
 #[test]
 fn nested_splits_are_logged_as_recursion_has_them() {
-    for (name, scene) in [("lamp", box_with_emitter()), ("mirror and glass", mirror_and_glass())] {
+    for (name, scene) in [("emitter", box_with_emitter()), ("mirror and glass", mirror_and_glass())] {
         for (max_depth, spp) in [(2, 12), (3, 8), (4, 1)] {
             let b = both(&scene, max_depth, &[4, spp]);
             println!(

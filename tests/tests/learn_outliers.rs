@@ -16,14 +16,14 @@ const FIRST_MATTE: u32 = 2;
 /// Picture of an environment of radiance 1 with emitters of 1e4 that cover a quarter of a pixel each.
 fn starry(stars: usize) -> SceneDescription {
     let mut s = in_white_environment(camera([0.0; 3], [0.0, 0.0, -1.0], 90.0, [64, 64]));
-    let lamp = s.add_material("lamp", grey(0.0));
+    let emitter = s.add_material("emitter", grey(0.0));
     for star in 0..stars {
         // pixels are 1/32 wide where the emitters are
         let centre = [3 + 7 * (star % 8), 3 + 7 * (star / 8)].map(|i| (i as f32 + 0.5) / 32.0 - 1.0);
         let corners = facing_z(1.0 / 128.0, -1.0, 1.0).map(|[x, y, z]| [x + centre[0], y + centre[1], z]);
-        add_quad(&mut s, "lamp", lamp, corners);
+        add_quad(&mut s, "emitter", emitter, corners);
     }
-    s.emitters.push(Emitter::Area { material: lamp, radiance: [1e4; 3] });
+    s.emitters.push(Emitter::Area { material: emitter, radiance: [1e4; 3] });
     s
 }
 

@@ -124,7 +124,7 @@ fn mtl_materials_become_models() {
     assert!(report.notes.iter().any(|n| n.contains("limited")), "{report:?}");
 }
 
-/// Faces without a material, no light, no camera: grey, a sky, and all corners inside the picture.
+/// Faces without a material, no light, no camera: grey, an environment, and all corners inside the picture.
 #[test]
 fn a_bare_obj_can_be_seen() {
     let (scene, report) = load_obj("v 10 0 0\nv 14 0 0\nv 10 3 0\nf 1 2 3\n", "");

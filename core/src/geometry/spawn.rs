@@ -37,9 +37,9 @@ pub fn surface_point([a, b, c]: [Vec3x8; 3], u: F32x8, v: F32x8) -> SurfacePoint
     SurfacePoint8 { p: pa + pb + pc, ng, error: sum.dot(ng.abs()) * OFFSET_BOUND }
 }
 
-/// Geometric normal of `[a, b, c]`, as long as twice the area, from the two shorter edges: of a needle the two long ones are nearly parallel, and
-/// the roundings of their cross product would tilt it. If all three are nearly parallel (an obtuse needle) it may be
-/// tilted by some 2^-24 of length over width.
+/// Geometric normal of `[a, b, c]`, as long as twice the area, from the two shorter edges: of a needle the two long ones
+/// are nearly parallel, and the roundings of their cross product would tilt it. If all three are nearly parallel (an
+/// obtuse needle) it may be tilted by some 2^-24 of length over width.
 pub fn triangle_normal(a: Vec3x8, b: Vec3x8, c: Vec3x8) -> Vec3x8 {
     let (ab, bc, ca) = (b - a, c - b, a - c);
     let (x, y, z) = (ab.length_sqr(), bc.length_sqr(), ca.length_sqr());

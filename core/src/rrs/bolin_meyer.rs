@@ -33,6 +33,6 @@ impl RrsStrategy for BolinMeyer {
 
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
-        ears::grown(v, ears::split_or_kill(&v.learned, v.beta), self.plain)
+        ears::grown(v, ears::efficient_factor(&v.learned, v.beta), self.plain)
     }
 }

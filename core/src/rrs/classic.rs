@@ -44,7 +44,7 @@ impl RrsStrategy for Classic {
         write!(f, "{}{}", self.start, if self.relative { ":relative" } else { "" })
     }
 
-    fn plays_relative(&self) -> bool {
+    fn reads_image(&self) -> bool {
         self.relative
     }
 

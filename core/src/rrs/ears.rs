@@ -48,7 +48,7 @@ pub(super) fn parse_plain(options: &str) -> Option<bool> {
 /// Factor of eq. 27, robust where moment and variance disagree: roulette by the moment, splitting by the variance, else
 /// 1.
 #[inline(always)]
-pub(super) fn split_or_kill(l: &Learned8, beta: Vec3x8) -> F32x8 {
+pub(super) fn efficient_factor(l: &Learned8, beta: Vec3x8) -> F32x8 {
     let one = F32x8::ONE;
     let (roulette, splitting) = (l.efficient_square(beta, l.local.moment), l.efficient_square(beta, l.local.variance));
     roulette.le(one).select(roulette, splitting.max(one)).sqrt()
@@ -105,6 +105,6 @@ impl RrsStrategy for Ears {
 
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
-        grown(v, split_or_kill(&v.learned, v.beta), self.plain)
+        grown(v, efficient_factor(&v.learned, v.beta), self.plain)
     }
 }

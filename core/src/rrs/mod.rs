@@ -78,6 +78,9 @@ pub trait RrsStrategy {
     /// estimation ([`crate::Settings::shadow_roulette`])?
     const EFFICIENCY_AWARE: bool = false;
 
+    /// May the factor be 0, so that paths that count end and the picture is biased?
+    const BIASED: bool = false;
+
     /// Does [`Self::factor`] read the picture's part of `learned`?
     const NEEDS_IMAGE: bool = false;
 
@@ -85,7 +88,7 @@ pub trait RrsStrategy {
     const SPACE: Option<Space> = Option::None;
 
     /// With these options, is the picture's part of `learned` needed ([`Self::NEEDS_IMAGE`])?
-    fn plays_relative(&self) -> bool {
+    fn reads_image(&self) -> bool {
         true
     }
 
@@ -124,7 +127,8 @@ macro_rules! strategies {
 
             /// Does the factor depend on the albedo ([`RrsStrategy::NEEDS_ALBEDO`])?
             pub fn needs_albedo(&self) -> bool {
-                match self { $(Self::$name(_) => <$name as RrsStrategy>::NEEDS_ALBEDO),* }
+                // samples are logged over the albedo
+                self.space().is_some() || match self { $(Self::$name(_) => <$name as RrsStrategy>::NEEDS_ALBEDO),* }
             }
 
             /// Does the factor depend on the shininess ([`RrsStrategy::NEEDS_SHININESS`])?
@@ -135,7 +139,7 @@ macro_rules! strategies {
             /// Does the factor depend on statistics of the picture?
             pub fn needs_image(&self) -> bool {
                 self.space().is_some() || match self {
-                    $(Self::$name(x) => <$name as RrsStrategy>::NEEDS_IMAGE && x.plays_relative()),*
+                    $(Self::$name(x) => <$name as RrsStrategy>::NEEDS_IMAGE && x.reads_image()),*
                 }
             }
 
@@ -151,7 +155,7 @@ macro_rules! strategies {
 
             /// May the factor be 0, so that the picture is biased?
             pub const fn is_biased(&self) -> bool {
-                matches!(self, Self::Threshold(_))
+                match self { $(Self::$name(_) => <$name as RrsStrategy>::BIASED),* }
             }
 
             /// Factor per lane: unbiased strategies are clamped to [[`MIN_FACTOR`], [`MAX_FACTOR`]], and a factor

@@ -22,6 +22,8 @@ impl Threshold {
 }
 
 impl RrsStrategy for Threshold {
+    const BIASED: bool = true;
+
     fn write_options(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.eps)
     }

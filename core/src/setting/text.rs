@@ -21,9 +21,9 @@ pub(crate) trait Value: Copy {
 /// Why a text is no value of a type.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Unreadable {
-    /// It is not written as the type's values are.
+    /// Text that no value of the type is written as.
     Text,
-    /// It is no roulette strategy.
+    /// Text that is no roulette strategy.
     Strategy(ParseError),
 }
 

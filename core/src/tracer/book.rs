@@ -10,7 +10,7 @@
 //! | counters | what happened | the session's counters |
 
 use super::job::Job;
-use super::ledger::{Ledger, NO_BIN, NO_RECORD};
+use super::ledger::{Ledger, NO_RECORD};
 use super::packets::{Contribution8, Samples8, ShadowRays8};
 use super::path::Path8;
 use super::root::{PixelTarget, Roots};
@@ -18,6 +18,7 @@ use super::vertex::PathVertex;
 use crate::counters::Counters;
 use crate::film::{PixelAov, PixelSums, REL_MSE_EPSILON};
 use crate::learn::LearnedState;
+use crate::learn::cache::NO_BIN;
 use crate::learn::cache::Training;
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::rrs::Norm;
@@ -164,7 +165,8 @@ impl<'m> Bookkeeping<'m> {
     fn firefly_scale(&self, mask: Mask8, radiance: Vec3x8, root: U32x8) -> F32x8 {
         let limit = F32x8::splat(self.outlier);
         let square = radiance * radiance;
-        // the error weight of a channel is at most that of a black pixel
+        // the error weight of a channel is at most that of a black pixel, unless adaptive sampling gives a pixel few samples:
+        // then a firefly below this bound keeps its size
         let most = square.max_component() * F32x8::splat(1.0 / REL_MSE_EPSILON as f32);
         if (mask & most.gt(limit)).none() {
             return F32x8::ONE;

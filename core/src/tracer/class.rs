@@ -52,7 +52,7 @@ impl Queue {
         })
     }
 
-    /// Its number, below [`Self::COUNT`].
+    /// Number of the queue, below [`Self::COUNT`].
     pub(crate) fn index(self) -> usize {
         self.0 as usize
     }
@@ -62,7 +62,7 @@ impl Queue {
         PacketClass(self.0 % PacketClass::COUNT as u8)
     }
 
-    /// Do its samples draw light samples?
+    /// Do the samples in it have next event estimation?
     pub(crate) fn with_nee(self) -> bool {
         self.index() < PacketClass::COUNT
     }

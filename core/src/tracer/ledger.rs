@@ -11,7 +11,6 @@
 //! contain it are incomplete, so they are not logged either. Nothing else changes; the image never passes through here.
 
 use super::free_list::FreeList;
-pub(crate) use crate::learn::cache::NO_BIN;
 use crate::memory::{Carver, Measure, MemoryError};
 use bytemuck::{Pod, Zeroable};
 
@@ -22,9 +21,9 @@ pub(crate) const NO_RECORD: u32 = u32::MAX;
 const INCOMPLETE: u32 = 1 << 31;
 /// `last` holds a finished sample of the vertex.
 const HAS_LAST: u32 = 1 << 30;
-/// The sample draws a light sample.
+/// The sample has next event estimation.
 const WITH_NEE: u32 = 1 << 29;
-/// That in `last` drew one.
+/// The sample in `last` had next event estimation.
 const LAST_WITH_NEE: u32 = 1 << 28;
 /// Bits of `open` that count.
 const OPEN: u32 = LAST_WITH_NEE - 1;
@@ -43,7 +42,7 @@ struct LedgerRecord {
     parent: u32,
     /// Samples of the vertex at the end of the bounce are logged times this.
     scale: [f32; 3],
-    /// Their bin.
+    /// Bin of the samples of that vertex.
     bin: u32,
     /// The one finished last, scaled.
     last: [f32; 3],

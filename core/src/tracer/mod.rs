@@ -14,6 +14,7 @@
 //! | `settle` | vertices go to the ring, finished paths to the books |
 //! | `vertex`, `ring`, `class` | path vertices, and the fixed ring in which they wait by class |
 //! | `book`, `root`, `ledger` | radiance and cost of camera samples and of learned samples in flight |
+//! | `free_list` | free slots of slabs |
 //! | `packets`, `path` | what stages hand to each other |
 //! | `shard`, `state`, `job` | one unit of parallel work, what it keeps, and what all of them share |
 

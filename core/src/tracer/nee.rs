@@ -2,10 +2,10 @@
 //! roulette for its shadow ray.
 
 use super::book::Bookkeeping;
-use super::ledger::NO_BIN;
 use super::packets::{Contribution8, Samples8, ShadowRays8};
 use crate::bsdf::{self, Eval8};
 use crate::geometry::{self, Ray8};
+use crate::learn::cache::NO_BIN;
 use crate::light::{self, LightSample8, power_heuristic};
 use crate::world::World;
 use croupier_simd::{F32x8, U32x8, Vec3x8};

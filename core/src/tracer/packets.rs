@@ -66,7 +66,7 @@ pub(crate) struct ShadowRays8 {
     pub path: Path8,
     /// What counts where the light sample is visible.
     pub found: Contribution8,
-    /// Bins of the statistics of visibility, [`NO_BIN`](super::ledger::NO_BIN) where nothing is learned.
+    /// Bins of the statistics of visibility, [`NO_BIN`](crate::learn::cache::NO_BIN) where nothing is learned.
     pub towards: U32x8,
 }
 

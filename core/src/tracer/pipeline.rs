@@ -5,7 +5,7 @@
 //!  refill ---+                                                               +--> trace --> emission --+
 //!            +--> camera rays -----------------------------------------------+                         |
 //!    ^                                                                                                 v
-//!    +------------------------------------ settle <-- roulette <-- aov <-- surface --------------------+
+//!    +------------------------------------ settle <-- roulette <-- aov <-- shading --------------------+
 //! ```
 //!
 //! Stages compute packets from packets and read nothing but the [`World`]; what outlives the packet goes to the books

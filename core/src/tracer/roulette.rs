@@ -4,12 +4,12 @@
 
 use super::book::Bookkeeping;
 use super::cache_key::cache_lookup;
-use super::ledger::NO_BIN;
 use super::packets::Contribution8;
 use super::ring::RESERVE;
 use super::shading::Arrival8;
 use super::vertex::pack_samples;
 use crate::bsdf;
+use crate::learn::cache::NO_BIN;
 use crate::rrs::{self, Learned8, Vertices8};
 use crate::scene::Scene;
 use crate::scene::blob::MaterialKind;
@@ -104,9 +104,9 @@ pub(crate) fn roulette<W: World>(
         book.arrive(active, &v.path, k.bin, k.scale, a.weight / s);
     }
     let beta = v.beta / s;
-    let plays = settings.shadow_roulette && key.is_some();
-    let nee_probability = if plays { learned.nee_probability(beta, a.albedo) } else { F32x8::ONE };
-    let with_nee = if plays { samples_with_nee(comb, n, nee_probability, a) } else { n };
+    let nee_roulette = settings.shadow_roulette && key.is_some();
+    let nee_probability = if nee_roulette { learned.nee_probability(beta, a.albedo) } else { F32x8::ONE };
+    let with_nee = if nee_roulette { samples_with_nee(comb, n, nee_probability, a) } else { n };
     let v = &mut a.vertex;
     v.beta = beta;
     v.nee_probability = nee_probability;
@@ -119,8 +119,8 @@ pub(crate) fn roulette<W: World>(
 /// How many of the `n` samples of each vertex draw a light sample, if each does with probability `nee_probability`: one
 /// more comb. Delta vertices, which draw none anyway, keep n, so that all wait in one queue.
 fn samples_with_nee(comb: &mut CombNumbers, n: [u32; 8], nee_probability: F32x8, a: &Arrival8) -> [u32; 8] {
-    let delta = (0..8).fold(0, |m, i| m | (bsdf::delta_kinds() >> a.kind[i] & 1) << i);
-    let play = (a.active & nee_probability.lt(F32x8::ONE)).and_not(Mask8::from_bits(delta));
+    let delta = bsdf::lanes_of(bsdf::delta_kinds(), &a.kind);
+    let play = (a.active & nee_probability.lt(F32x8::ONE)).and_not(delta);
     if play.none() {
         return n;
     }

@@ -1,10 +1,10 @@
-//! Stage `surface`: the vertices that hits become, with material, shading normal and texture.
+//! Stage `shading`: the vertices that hits become, with material, shading normal and texture.
 
-use super::ledger::NO_BIN;
 use super::packets::RayState8;
 use super::vertex::PathVertex8;
 use crate::bsdf::{self, Bsdf, Inputs8, Visitor};
 use crate::geometry::{SurfaceHit8, SurfacePoint8};
+use crate::learn::cache::NO_BIN;
 use crate::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind, NONE};
 use crate::scene::{Effects, Scene};
 use crate::texture;

@@ -6,7 +6,7 @@ use super::cache_key::cache_lookup;
 use super::camera_rays::{CameraCursor, camera_rays};
 use super::class::PacketClass;
 use super::emission;
-use super::ledger::{NO_BIN, NO_RECORD};
+use super::ledger::NO_RECORD;
 use super::nee::{sample_lights, shadow_rays};
 use super::occlude::occlude;
 use super::packets::Contribution8;
@@ -25,6 +25,7 @@ use super::state::State;
 use super::trace::trace;
 use super::vertex::PathVertex8;
 use crate::geometry::{Ray8, SurfaceHit8};
+use crate::learn::cache::NO_BIN;
 use crate::light::power_heuristic;
 use crate::rng::Key8;
 use crate::rrs::{Space, Strategy};
@@ -244,7 +245,7 @@ fn only_samples_with_nee_draw_light_samples() {
 }
 
 /// What shadow rays bring: beta f L w / (p q), q the probability of drawing a light sample. Killed by: any of the
-/// factors left out, a ray that ends beyond its light, roulette without its weight.
+/// factors left out, a ray that ends beyond its light.
 #[test]
 fn shadow_rays_bring_weighted_radiance() {
     world(

@@ -37,11 +37,11 @@ pub(crate) struct PathVertex8 {
     pub key: Key8,
     /// Product of the albedos of the vertices before this one, mean over rgb.
     pub albedo_product: F32x8,
-    /// Samples left, the number of the next one, and how many of those left draw a light sample: see [`pack_samples`].
+    /// Samples left, the number of the next one, and how many of those left have next event estimation: see [`pack_samples`].
     pub samples: U32x8,
-    /// Probability that a sample draws a light sample ([`crate::rrs::Learned8::nee_probability`]).
+    /// Probability that a sample has next event estimation ([`crate::rrs::Learned8::nee_probability`]).
     pub nee_probability: F32x8,
-    /// Bin of the learned statistics, [`NO_BIN`](super::ledger::NO_BIN) if there is none.
+    /// Bin of the learned statistics, [`NO_BIN`](crate::learn::cache::NO_BIN) if there is none.
     pub bin: U32x8,
     /// See [`PixelTarget::error_weight`](super::root::PixelTarget::error_weight).
     pub error_weight: Vec3x8,
@@ -71,7 +71,7 @@ impl PathVertex {
         self.samples() & 0xff
     }
 
-    /// Samples left that draw a light sample. They come first.
+    /// Samples left that have next event estimation. They come first.
     pub(crate) fn with_nee(&self) -> u32 {
         self.samples() >> 16
     }

@@ -1,7 +1,7 @@
 //! Rays per second of the built-in traversal beside obvhs's own Bvh2 and CwBvh traversals, on identical ray arrays.
 //!
 //! Sets: primary rays, first and third diffuse bounce, shadow rays from primary and from first-bounce hits towards a
-//! square lamp below the top of the scene. Kernels take turns inside each round; the table shows medians over the
+//! square emitter below the top of the scene. Kernels take turns inside each round; the table shows medians over the
 //! rounds, the spread between the quartiles, and the ratio to Bvh2. Times are CPU times of this thread where the system
 //! tells them. Answers are checked against each other first.
 //!

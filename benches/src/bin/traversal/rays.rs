@@ -176,9 +176,9 @@ fn bounce(points: &[(Vec3, Vec3)], r: &mut Random) -> Vec<One> {
     points.iter().map(sample).collect()
 }
 
-fn shadow(points: &[(Vec3, Vec3)], lamp: (Vec3, f32), r: &mut Random) -> Vec<One> {
+fn shadow(points: &[(Vec3, Vec3)], emitter: (Vec3, f32), r: &mut Random) -> Vec<One> {
     let towards = |&(o, _): &(Vec3, Vec3)| {
-        let q = lamp.0 + Vec3::new(r.unit() - 0.5, 0.0, r.unit() - 0.5) * lamp.1;
+        let q = emitter.0 + Vec3::new(r.unit() - 0.5, 0.0, r.unit() - 0.5) * emitter.1;
         One { o, d: q - o, tmax: 0.999 }
     };
     points.iter().map(towards).collect()
@@ -206,14 +206,14 @@ pub(crate) fn sets(wide: &WideBvh<'_>, triangles: &[Tri], camera: &Camera, width
     let mut r = Random(3);
     let (lo, hi) = bounds(triangles);
     let size = hi - lo;
-    let lamp = (Vec3::new(0.5 * (lo.x + hi.x), hi.y - 0.05 * size.y, 0.5 * (lo.z + hi.z)), 0.1 * size.x);
+    let emitter = (Vec3::new(0.5 * (lo.x + hi.x), hi.y - 0.05 * size.y, 0.5 * (lo.z + hi.z)), 0.1 * size.x);
     let p = primary(camera, width);
     let first = hits(wide, triangles, &p);
     let d1 = bounce(&first, &mut r);
     let second = hits(wide, triangles, &d1);
     let d2 = bounce(&second, &mut r);
     let d3 = bounce(&hits(wide, triangles, &d2), &mut r);
-    let (s1, s2) = (shadow(&first, lamp, &mut r), shadow(&second, lamp, &mut r));
+    let (s1, s2) = (shadow(&first, emitter, &mut r), shadow(&second, emitter, &mut r));
     [
         Set::new("primary", false, &p),
         Set::new("bounce 1", false, &d1),

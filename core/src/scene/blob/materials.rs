@@ -60,11 +60,11 @@ pub(crate) use material_table;
 /// Row of the table of material kinds: the facts that do not depend on the kernel.
 #[derive(Clone, Copy, Debug)]
 pub struct MaterialFacts {
-    /// Light passes it: it scatters from behind as well, and being two-sided means nothing.
+    /// Light passes through: the surface scatters from behind as well, and being two-sided means nothing.
     pub transmissive: bool,
-    /// It has delta lobes only.
+    /// All lobes are delta lobes.
     pub delta: bool,
-    /// Parameters that it uses.
+    /// Parameters that the model uses.
     pub parameters: &'static [Parameter],
 }
 

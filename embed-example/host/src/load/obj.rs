@@ -350,7 +350,7 @@ pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescrip
     loader.note("the file has no camera: it was framed to show everything".into());
     if scene.emitters.is_empty() {
         scene.environment = Some(builtin::sky());
-        loader.note("the file has no light: a sky was added".into());
+        loader.note("the file has no light: an environment was added".into());
     }
     Ok(scene)
 }
