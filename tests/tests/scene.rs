@@ -1,4 +1,5 @@
-//! The one door from bytes to a scene: what is valid passes, each fault has its error, no bytes do harm.
+//! The one door from bytes to a scene: what is valid passes, each fault has its error, no bytes do harm. More than 600
+//! lines, because all faults share the same few helpers and a reader looks for them in one place.
 
 use croupier::Scene;
 use croupier::unstable::scene::blob::*;
