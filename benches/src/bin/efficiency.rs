@@ -398,7 +398,7 @@ impl Report<'_> {
     }
 }
 
-/// A strategy's name. What ends paths for ever is quick, and its relMSE hides that while noise is larger.
+/// A strategy's name. A strategy that cuts paths is quick, and its relMSE hides that while noise is larger.
 fn marked(variant: &Variant) -> String {
     format!("{}{}", variant.name, if variant.strategy.is_biased() { " (biased)" } else { "" })
 }
