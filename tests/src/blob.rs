@@ -71,6 +71,9 @@ pub struct Parts {
     pub env_texels: Vec<[f32; 3]>,
     pub env_alias: Vec<Alias>,
     pub cameras: Vec<Camera>,
+    pub media: Vec<Medium>,
+    pub densities: Vec<f32>,
+    pub majorants: Vec<f32>,
     pub names: Vec<u8>,
 }
 
@@ -100,7 +103,8 @@ impl Parts {
             vertices Vertices Vertex, materials Materials Material, textures Textures Texture, texels Texels u32,
             tables Tables f32, lights Lights Light, light_alias LightAlias Alias,
             environment Environment Environment, env_texels EnvTexels [f32; 3], env_alias EnvAlias Alias,
-            cameras Cameras Camera, names Names u8);
+            cameras Cameras Camera, media Media Medium, densities Densities f32, majorants Majorants f32,
+            names Names u8);
         let header = Header {
             magic: MAGIC,
             version: VERSION,
@@ -149,6 +153,7 @@ impl Parts {
             eta: [1.5, 0.2, 1.1],
             fdr: 0.5963,
             k: [3.0, 2.5, 2.0],
+            medium: NONE,
             ..Material::zeroed()
         };
         let mut materials: Vec<_> = MaterialKind::ALL.iter().map(material).collect();
@@ -203,6 +208,9 @@ impl Parts {
                 focus_distance: 6.0,
                 size: [64, 64],
             }],
+            media: Vec::new(),
+            densities: Vec::new(),
+            majorants: Vec::new(),
             names: MaterialKind::ALL.iter().flat_map(|k| format!("{}\n", k.name()).into_bytes()).collect(),
         };
         parts.bounds();

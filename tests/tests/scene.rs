@@ -193,7 +193,10 @@ fn every_fault_of_the_records_has_its_error() {
     let materials: &[Corruption] = &[
         (|p| p.materials[3].kind = KINDS, SceneError::Kind { of: S::Materials, index: 3, found: KINDS }),
         (|p| p.materials[3].flags = 2, SceneError::Reserved { of: S::Materials, index: 3 }),
-        (|p| p.materials[3].reserved = NAN, SceneError::Reserved { of: S::Materials, index: 3 }),
+        (
+            |p| p.materials[3].medium = 0,
+            SceneError::Reference { of: S::Materials, index: 3, to: S::Media, found: 0, count: 0 },
+        ),
         (|p| p.materials[3].texture = 1, reference(S::Materials, 3, S::Textures, 1, 1)),
         (|p| p.materials[3].table = 0, reference(S::Materials, 3, S::Tables, 0, 64)),
         (|p| p.materials[8].table = 1, reference(S::Materials, 8, S::Tables, 1, 64)),

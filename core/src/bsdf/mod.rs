@@ -258,7 +258,7 @@ const IDLE: &Material = &Material {
     eta: [1.5; 3],
     fdr: 0.5,
     k: [0.0; 3],
-    reserved: 0.0,
+    medium: NONE,
 };
 
 /// The materials of eight lanes.

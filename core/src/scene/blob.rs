@@ -1,6 +1,6 @@
-//! The layout of a scene blob, version 2. Little-endian, position-independent, every record Pod.
+//! The layout of a scene blob, version 3. Little-endian, position-independent, every record Pod.
 //!
-//! Materials and lights, with the tables of their kinds, are in `blob/`.
+//! Materials, lights and media, with the tables of their kinds, are in `blob/`.
 //!
 //! A blob is a [`Header`], a table of [`Section`]s, then the sections, each at an offset that is a multiple of
 //! [`ALIGN`]. Indices are `u32`; [`NONE`] is absence. Bytes become a [`super::Scene`] through
@@ -11,7 +11,7 @@ use bytemuck::{Pod, Zeroable};
 /// First bytes of every blob.
 pub const MAGIC: [u8; 8] = *b"CROUPIER";
 /// Version of this layout.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 /// Sections start at multiples of this many bytes; a blob aligned to it traverses fastest (4 is enough).
 pub const ALIGN: usize = 64;
 /// "No such index".
@@ -59,9 +59,11 @@ macro_rules! kinds {
 
 mod lights;
 mod materials;
+mod media;
 
 pub use lights::*;
 pub use materials::*;
+pub use media::*;
 
 kinds! {
     /// Kinds of sections.
@@ -80,7 +82,7 @@ kinds! {
         Materials = 5, "materials";
         /// [`Texture`]s.
         Textures = 6, "textures";
-        /// `u32` texels: bytes r, g, b, unused; sRGB-encoded.
+        /// `u32` texels: bytes r, g, b, alpha; r, g, b sRGB-encoded.
         Texels = 7, "texels";
         /// `f32` tables that materials refer to.
         Tables = 8, "tables";
@@ -99,6 +101,12 @@ kinds! {
         Cameras = 14, "camera";
         /// Bytes: material names, each ended by a newline, in material order, UTF-8; or nothing.
         Names = 15, "names";
+        /// [`Medium`]s, at most [`MAX_MEDIA`], those of higher priority first.
+        Media = 16, "media";
+        /// `f32` densities of grid media.
+        Densities = 17, "densities";
+        /// `f32` majorants of grid media.
+        Majorants = 18, "majorants";
     }
 }
 

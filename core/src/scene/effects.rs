@@ -50,6 +50,14 @@ effects! {
     LENS = 21, "thin lens";
     /// Interpolated shading normals.
     SMOOTH_NORMALS = 22, "shading normals";
+    /// Participating media.
+    MEDIA = 23, "media";
+    /// Media with density grids.
+    GRID_MEDIA = 24, "density grids";
+    /// Textures whose alpha cuts holes.
+    ALPHA = 25, "alpha cut-outs";
+    /// Compensation of the energy that rough surfaces lose.
+    MULTIPLE_SCATTERING = 26, "multiple scattering";
 }
 
 macro_rules! lights {

@@ -36,6 +36,12 @@ pub struct Records<'s> {
     pub env_alias: &'s [Alias],
     /// Camera.
     pub camera: &'s Camera,
+    /// Media, those of higher priority first.
+    pub media: &'s [Medium],
+    /// Densities of grid media.
+    pub densities: &'s [f32],
+    /// Majorants of grid media.
+    pub majorants: &'s [f32],
     /// Material names, newline-separated; see [`super::Scene::material_name`].
     pub names: &'s [u8],
     /// Effects that the scene calls for: of the materials that triangles use, of lights and camera.

@@ -48,7 +48,7 @@ impl<'s> Sections<'s> {
         if header.sections as usize > KINDS {
             return Err(SceneError::SectionCount(header.sections));
         }
-        // At most 16 entries: no overflow.
+        // At most an entry per kind: no overflow.
         let table_bytes = (header.sections as usize).saturating_mul(size_of::<Section>());
         let table_end = table_bytes.saturating_add(size_of::<Header>()) as u64;
         let table = content.get(..table_bytes);

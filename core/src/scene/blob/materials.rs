@@ -149,7 +149,7 @@ impl Parameter {
 pub struct Material {
     /// [`MaterialKind`].
     pub kind: u32,
-    /// [`MATERIAL_TWO_SIDED`].
+    /// [`MATERIAL_TWO_SIDED`], [`MATERIAL_CUTOUT`], [`MATERIAL_COMPENSATED`].
     pub flags: u32,
     /// Texture index that replaces `reflectance`, or [`NONE`](super::NONE).
     pub texture: u32,
@@ -165,12 +165,18 @@ pub struct Material {
     pub fdr: f32,
     /// Conductors: extinction per channel.
     pub k: [f32; 3],
-    /// Zero.
-    pub reserved: f32,
+    /// Index of the medium behind the front side, or [`NONE`](super::NONE): the surface bounds no medium.
+    pub medium: u32,
 }
 
 /// Both sides behave like the front.
 pub const MATERIAL_TWO_SIDED: u32 = 1;
+/// The texture's alpha is the share of light that meets the surface; the rest passes straight through.
+pub const MATERIAL_CUTOUT: u32 = 2;
+/// Rough models give back what single scattering between microfacets loses.
+pub const MATERIAL_COMPENSATED: u32 = 4;
+/// Every flag of a material.
+pub const MATERIAL_FLAGS: u32 = MATERIAL_TWO_SIDED | MATERIAL_CUTOUT | MATERIAL_COMPENSATED;
 
 /// One texture: `width * height` texels from `first` in the texels section; row 0 is the top (v = 1).
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]

@@ -25,13 +25,14 @@ pub(super) fn materials(scene: &Records<'_>) -> Result<(), SceneError> {
     for (at, m) in records(SectionKind::Materials, scene.materials) {
         let kind = MaterialKind::from_u32(m.kind);
         let kind = kind.ok_or(SceneError::Kind { of: at.of, index: at.index(), found: m.kind })?;
-        at.zero(m.flags & !MATERIAL_TWO_SIDED == 0 && m.reserved == 0.0)?;
+        at.zero(m.flags & !MATERIAL_FLAGS == 0)?;
         at.finite(Field::Alpha, &[m.alpha])?;
         at.finite(Field::Eta, &m.eta)?;
         at.finite(Field::Extinction, &m.k)?;
         at.finite(Field::InternalReflectance, &[m.fdr])?;
         // What arrives at a surface reads these before it looks at the kind.
         at.follow_if_any(SectionKind::Textures, m.texture, scene.textures)?;
+        at.follow_if_any(SectionKind::Media, m.medium, scene.media)?;
         parameter(scene, at, m, Parameter::Reflectance)?;
         let used = kind.facts().parameters;
         used.iter().try_for_each(|p| parameter(scene, at, m, *p))?;
@@ -71,5 +72,11 @@ fn parameter(scene: &Records<'_>, at: Record, m: &Material, parameter: Parameter
 /// Effects of a surface of a validated material.
 pub(super) fn effects(m: &Material) -> Effects {
     let kind = MaterialKind::from_u32(m.kind).map(Effects::of_material).unwrap_or_default();
-    if m.texture == NONE { kind } else { kind.with(Effects::TEXTURES) }
+    let textured = m.texture != NONE;
+    let also = [
+        (textured, Effects::TEXTURES),
+        (textured && m.flags & MATERIAL_CUTOUT != 0, Effects::ALPHA),
+        (m.flags & MATERIAL_COMPENSATED != 0, Effects::MULTIPLE_SCATTERING),
+    ];
+    also.iter().filter(|(present, _)| *present).fold(kind, |all, (_, effect)| all.with(*effect))
 }

@@ -124,7 +124,8 @@ pub(super) fn bake(scene: &SceneDescription) -> Result<Materials, BakeError> {
         let (kind, parameters) = (m.model.kind(), m.model.parameters());
         let facts = kind.facts();
         let flags = if m.two_sided && !facts.transmissive { MATERIAL_TWO_SIDED } else { 0 };
-        let blank = blob::Material { kind: kind as u32, flags, texture: NONE, table: NONE, ..Zeroable::zeroed() };
+        let blank =
+            blob::Material { kind: kind as u32, flags, texture: NONE, table: NONE, medium: NONE, ..Zeroable::zeroed() };
         let mut draft = Draft { name: &m.name, textures: scene.textures.len(), out: blank, eta: 0.0 };
         facts.parameters.iter().try_for_each(|p| draft.take(*p, &parameters))?;
         coats.derive(facts.parameters, &mut draft);
