@@ -1,6 +1,6 @@
 //! Counts of work, lane utilisation and every event in which a bound was reached.
 
-use crate::cost::{COST_BOUNCE, COST_CAMERA, COST_SHADOW};
+use crate::cost::{COST_BOUNCE, COST_CAMERA, COST_SHADOW, COST_STRAIGHT, MEDIUM_STEPS_PER_RAY};
 
 /// Lane utilisation of a stage: lanes used of lanes offered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,7 +36,11 @@ pub struct Counters {
     pub camera_rays: u64,
     /// Closest-hit rays from scattering.
     pub scatter_rays: u64,
-    /// Shadow rays traced.
+    /// Closest-hit rays that went on straight behind what a ray had passed or the point at which it had stopped.
+    pub straight_rays: u64,
+    /// Steps through media: tentative collisions and bricks of density grids, of rays of all kinds.
+    pub medium_steps: u64,
+    /// Shadow rays traced, counted again behind every surface that they passed.
     pub shadow_rays: u64,
     /// Camera samples finished.
     pub camera_samples: u64,
@@ -75,6 +79,10 @@ pub struct Counters {
     pub max_length_reached: u64,
     /// Light samples so near to a point light that the distance was clamped to a larger one (NUMERICS SOL-5).
     pub distances_clamped: u64,
+    /// Rays whose steps through a medium were so many that roulette decided whether they go on.
+    pub media_roulettes: u64,
+    /// Shadow rays that were taken for blocked behind more surfaces than [`crate::unstable::MAX_PASSED`]; this loses light.
+    pub passages_cut: u64,
     /// Contributions or weights that were not finite and were not added.
     pub non_finite: u64,
     /// Film index of the pixel of the first of them, plus 1; 0 if there is none.
@@ -89,6 +97,8 @@ pub struct Counters {
     pub surface: Utilisation,
     /// Lane utilisation of look-ups in learned statistics.
     pub look_ups: Utilisation,
+    /// Rays that passed surfaces straight on, by packets in which any did.
+    pub passed: Utilisation,
     /// Largest number of vertices that waited at once.
     pub ring_peak: u64,
 }
@@ -96,15 +106,25 @@ pub struct Counters {
 impl Counters {
     /// Number of rays of all kinds.
     pub fn rays(&self) -> u64 {
-        self.camera_rays + self.scatter_rays + self.shadow_rays
+        self.camera_rays + self.scatter_rays + self.straight_rays + self.shadow_rays
+    }
+
+    /// Work in units of a ray: rays, and the steps through media ([`MEDIUM_STEPS_PER_RAY`] count as one).
+    pub fn work(&self) -> u64 {
+        self.rays() + self.medium_steps / MEDIUM_STEPS_PER_RAY
     }
 
     /// Counted cost, by which efficiency is computed: rays, each times its relative cost ([`crate::cost::COST_SHADOW`]
     /// and the like).
     pub fn cost(&self) -> f64 {
-        let parts =
-            [(self.camera_rays, COST_CAMERA), (self.scatter_rays, COST_BOUNCE), (self.shadow_rays, COST_SHADOW)];
-        parts.iter().map(|&(rays, cost)| rays as f64 * f64::from(cost)).sum()
+        let parts = [
+            (self.camera_rays, COST_CAMERA),
+            (self.scatter_rays, COST_BOUNCE),
+            (self.straight_rays, COST_STRAIGHT),
+            (self.shadow_rays, COST_SHADOW),
+        ];
+        let rays: f64 = parts.iter().map(|&(rays, cost)| rays as f64 * f64::from(cost)).sum();
+        rays + self.medium_steps as f64 / MEDIUM_STEPS_PER_RAY as f64
     }
 
     /// Number of paths: camera samples and samples that splitting added.
@@ -116,6 +136,8 @@ impl Counters {
     pub fn merge(&mut self, o: &Self) {
         self.camera_rays += o.camera_rays;
         self.scatter_rays += o.scatter_rays;
+        self.straight_rays += o.straight_rays;
+        self.medium_steps += o.medium_steps;
         self.shadow_rays += o.shadow_rays;
         self.camera_samples += o.camera_samples;
         self.vertex_samples += o.vertex_samples;
@@ -133,6 +155,8 @@ impl Counters {
         self.factors_not_finite += o.factors_not_finite;
         self.max_length_reached += o.max_length_reached;
         self.distances_clamped += o.distances_clamped;
+        self.media_roulettes += o.media_roulettes;
+        self.passages_cut += o.passages_cut;
         self.non_finite += o.non_finite;
         if self.first_non_finite == 0 {
             self.first_non_finite = o.first_non_finite;
@@ -142,6 +166,7 @@ impl Counters {
         self.occlude.merge(&o.occlude);
         self.surface.merge(&o.surface);
         self.look_ups.merge(&o.look_ups);
+        self.passed.merge(&o.passed);
         self.ring_peak = self.ring_peak.max(o.ring_peak);
     }
 }

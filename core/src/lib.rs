@@ -77,6 +77,7 @@ mod film;
 mod geometry;
 mod learn;
 mod light;
+mod media;
 mod memory;
 mod names;
 mod plan;
@@ -117,7 +118,7 @@ pub mod unstable {
     pub use crate::session::{Phase, SessionBuilder};
     pub use crate::setting::{SettingInfo, SettingRange, SettingValue};
     pub use crate::settings::{MAX_PATH_LENGTH, MIN_RING};
-    pub use crate::tracer::BYTES_PER_PATH;
+    pub use crate::tracer::{BYTES_PER_PATH, MAX_PASSED};
     pub use crate::world::{Iteration, World};
     pub use croupier_simd as simd;
 
@@ -156,6 +157,10 @@ pub mod unstable {
     /// Emission and its sampling.
     pub mod light {
         pub use crate::light::*;
+    }
+    /// Participating media.
+    pub mod media {
+        pub use crate::media::*;
     }
     /// Kernel profiles: effects that are compiled in.
     pub mod profile {

@@ -12,6 +12,8 @@ const PIXEL_BLOCK: u32 = 0;
 const SCATTER_BLOCK: u32 = 0;
 const LIGHT_BLOCK: u32 = 1;
 const SHADOW_BLOCK: u32 = 2;
+/// Dimension blocks of a vertex's key.
+const STRAIGHT_BLOCK: u32 = 0;
 
 impl Key8 {
     /// Position in the pixel (two numbers) and on the lens (two).
@@ -50,6 +52,19 @@ impl Key8 {
     pub(crate) fn shadow_roulette(self) -> F32x8 {
         let [u, ..] = self.uniforms(SHADOW_BLOCK);
         u
+    }
+
+    /// Does light pass the surface at which the vertex of this key would be?
+    #[inline(always)]
+    pub(crate) fn straight(self) -> F32x8 {
+        let [u, ..] = self.uniforms(STRAIGHT_BLOCK);
+        u
+    }
+
+    /// Key of the next surface or stretch of a ray that goes straight on.
+    #[inline(always)]
+    pub(crate) fn straight_on(self) -> Self {
+        self.child(U32x8::splat(u32::MAX))
     }
 
     /// Offset of a vertex's look-up in the cache, three numbers: the bits of the key itself, of which everything that

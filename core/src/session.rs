@@ -11,7 +11,7 @@ use crate::plan::Plan;
 use crate::profile::{Full, Profile};
 use crate::scene::{Effects, Scene};
 use crate::settings::MAX_PATH_LENGTH;
-use crate::tracer::Shard;
+use crate::tracer::{Shard, media_at};
 use crate::world::sealed::Sealed;
 use crate::world::{Iteration, World};
 use core::fmt;
@@ -101,6 +101,7 @@ pub struct Session<'s, 'm, P: Profile = Full, I: Intersector = WideBvh<'s>, L: L
     iteration: Iteration,
     running: bool,
     max_depth: u32,
+    camera_media: u32,
     profile: PhantomData<P>,
 }
 
@@ -141,6 +142,8 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector> SessionBuilder<'s, P, I, 
         if !P::EFFECTS.contains(scene.effects) {
             return Err(SessionError::Profile { missing: Effects(scene.effects.0 & !P::EFFECTS.0) });
         }
+        let with_media = P::EFFECTS.contains(Effects::MEDIA) && !scene.media.is_empty();
+        let camera_media = if with_media { media_at(&scene, &intersector, scene.camera.origin) } else { 0 };
         let mut c = Carver::new(block, plan.session()).map_err(SessionError::Memory)?;
         let s = plan.settings();
         let pixels = s.size[0] as usize * s.size[1] as usize;
@@ -159,6 +162,7 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector> SessionBuilder<'s, P, I, 
             iteration: Iteration::default(),
             running: false,
             max_depth: s.max_depth.min(MAX_PATH_LENGTH),
+            camera_media,
             profile,
         })
     }
@@ -216,6 +220,11 @@ impl<P: Profile, I: Intersector, L: LightSelector> World for Session<'_, '_, P, 
     #[inline(always)]
     fn max_depth(&self) -> u32 {
         self.max_depth
+    }
+
+    #[inline(always)]
+    fn camera_media(&self) -> u32 {
+        self.camera_media
     }
 }
 

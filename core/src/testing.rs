@@ -58,6 +58,7 @@ pub(crate) fn scene<R>(f: impl FnOnce(&Scene<'_>) -> R) -> R {
         texture: NONE,
         table: NONE,
         reflectance,
+        medium: NONE,
         ..Zeroable::zeroed()
     };
     let materials = [
@@ -194,6 +195,10 @@ impl<'a> World for TestWorld<'a> {
 
     fn max_depth(&self) -> u32 {
         self.max_depth
+    }
+
+    fn camera_media(&self) -> u32 {
+        0
     }
 }
 

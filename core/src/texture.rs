@@ -46,6 +46,24 @@ fn position(coordinate: F32x8, size: F32x8) -> (F32x8, F32x8) {
 /// that of an integer. The error of the position is half an ulp of the coordinate times the size, in texels. Textures
 /// may have up to 2^24 columns and rows.
 pub fn lookup(scene: &Scene<'_>, texture: U32x8, uv: [F32x8; 2], active: Mask8) -> Vec3x8 {
+    let rgb = |bytes: [u8; 4]| [bytes[0], bytes[1], bytes[2]].map(|b| SRGB_TO_LINEAR[b as usize]);
+    interpolated(scene, texture, uv, active, rgb)
+}
+
+/// Alpha of `texture` at `uv`, 0 to 1, under the conditions of [`lookup`]. Not encoded: alpha is linear.
+pub fn alpha(scene: &Scene<'_>, texture: U32x8, uv: [F32x8; 2], active: Mask8) -> F32x8 {
+    interpolated(scene, texture, uv, active, |bytes| [f32::from(bytes[3]) / 255.0, 0.0, 0.0]).x
+}
+
+/// Bilinear mean of what `value` makes of the texels around `uv`.
+#[inline(always)]
+fn interpolated(
+    scene: &Scene<'_>,
+    texture: U32x8,
+    uv: [F32x8; 2],
+    active: Mask8,
+    value: impl Fn([u8; 4]) -> [f32; 3],
+) -> Vec3x8 {
     const NOTHING: Texture = Texture { first: 0, width: 1, height: 1, reserved: 0 };
     let index = texture.to_array();
     let mut record = [NOTHING; 8];
@@ -64,8 +82,7 @@ pub fn lookup(scene: &Scene<'_>, texture: U32x8, uv: [F32x8; 2], active: Mask8) 
             // The file's row 0 is the top.
             let row = t.height.saturating_sub(1).saturating_sub(rows[c >> 1]) as usize;
             let texel = t.first as usize + row * t.width as usize + columns[c & 1] as usize;
-            let bytes = scene.texels.get(texel).copied().unwrap_or(0).to_le_bytes();
-            out[i] = [bytes[0], bytes[1], bytes[2]].map(|b| SRGB_TO_LINEAR[b as usize]);
+            out[i] = value(scene.texels.get(texel).copied().unwrap_or(0).to_le_bytes());
         }
     }
     let [a, b, c, d] = corner.map(|k| Vec3x8::from_fn(|i| k[i]));

@@ -38,6 +38,8 @@ pub trait World: sealed::Sealed {
     fn iteration(&self) -> Iteration;
     /// Path segments at which every path ends.
     fn max_depth(&self) -> u32;
+    /// Bits of the media that the camera is inside of.
+    fn camera_media(&self) -> u32;
 
     /// What tells a shard that its sums belong here: content hash of the scene, and iteration.
     fn identity(&self) -> (u64, Iteration) {

@@ -20,6 +20,9 @@ impl Lobes {
     /// Delta lobes: scatters to single directions, at least in some lanes.
     pub const SPECULAR: Self = Self(16);
 
+    /// Lets light pass straight on ([`super::Bsdf::straight`]).
+    pub const STRAIGHT: Self = Self(32);
+
     /// Whether there are delta lobes only: light samples are of no use then.
     pub const fn delta_only(self) -> bool {
         !self.intersects(Self::DIFFUSE.with(Self::GLOSSY))

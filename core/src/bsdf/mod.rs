@@ -11,6 +11,7 @@ mod dielectric;
 mod diffuse;
 pub mod fresnel;
 pub mod ggx;
+mod henyey_greenstein;
 mod lobes;
 mod mirror;
 mod null;
@@ -24,6 +25,7 @@ pub mod warp;
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
+pub use henyey_greenstein::HenyeyGreenstein;
 pub use lobes::{CacheDirection, Lobes, MIRROR_SHININESS, ModelFacts};
 pub use mirror::Mirror;
 pub use null::Null;
@@ -125,6 +127,14 @@ pub trait Bsdf<'s>: Copy + 's {
     /// Directional-hemispherical reflectance + transmittance to use in roulette by albedo; an estimate in [0, 1].
     fn albedo(&self, wo: Vec3x8) -> Vec3x8;
 
+    /// Share of the light from `wo` that passes straight on, unscattered, in [0, 1]. The tracer chooses: with this
+    /// probability the path goes on as if nothing were there, else what the other functions describe takes place, which
+    /// is what the model scatters given that light does not pass.
+    #[inline(always)]
+    fn straight(&self, _wo: Vec3x8) -> F32x8 {
+        F32x8::ZERO
+    }
+
     /// Phong exponent of a material of this model, for roulette by shininess: 0 (diffuse) to [`MIRROR_SHININESS`].
     fn shininess(material: &Material) -> f32;
 }
@@ -211,6 +221,12 @@ pub(crate) const fn delta_kinds() -> u32 {
 /// Bits of the kinds that scatter from behind as well.
 pub(crate) const fn transmissive_kinds() -> u32 {
     const KINDS: u32 = kinds_where!(|kind| facts(kind).lobes.contains(Lobes::TRANSMISSION));
+    KINDS
+}
+
+/// Bits of the kinds that light may pass straight on.
+pub(crate) const fn straight_kinds() -> u32 {
+    const KINDS: u32 = kinds_where!(|kind| facts(kind).lobes.contains(Lobes::STRAIGHT));
     KINDS
 }
 

@@ -1,4 +1,4 @@
-//! Index-matched boundary: light passes unchanged. No parameters.
+//! Index-matched boundary: all light passes straight on ([`Bsdf::straight`]), so that nothing is scattered. No parameters.
 
 use super::{Bsdf, CacheDirection, Eval8, Inputs8, Lobes, Sample8, lobes};
 use crate::scene::Scene;
@@ -10,7 +10,7 @@ use croupier_simd::{F32x8, Mask8, Vec3x8};
 pub struct Null;
 
 impl Bsdf<'_> for Null {
-    const LOBES: Lobes = Lobes::TRANSMISSION.with(Lobes::SPECULAR);
+    const LOBES: Lobes = Lobes::TRANSMISSION.with(Lobes::SPECULAR).with(Lobes::STRAIGHT);
     const CACHE_DIRECTION: CacheDirection = CacheDirection::View;
 
     #[inline(always)]
@@ -25,7 +25,13 @@ impl Bsdf<'_> for Null {
 
     #[inline(always)]
     fn sample(&self, wo: Vec3x8, _: [F32x8; 3]) -> Sample8 {
-        Sample8::delta(-wo, Vec3x8::ONE, wo.is_finite())
+        Sample8::delta(-wo, Vec3x8::ZERO, Mask8::NONE)
+    }
+
+    /// 1.
+    #[inline(always)]
+    fn straight(&self, _: Vec3x8) -> F32x8 {
+        F32x8::ONE
     }
 
     /// 1.

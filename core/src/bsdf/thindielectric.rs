@@ -1,5 +1,5 @@
 //! Thin dielectric sheet: both interfaces at once. Summing all inner reflections, it reflects R' = 2R / (1 + R) and
-//! passes the rest straight through; the two 1 / eta^2 factors cancel.
+//! passes the rest straight on ([`Bsdf::straight`]); the two 1 / eta^2 factors cancel.
 //!
 //! | parameter | meaning | range |
 //! |---|---|---|
@@ -16,7 +16,7 @@ use croupier_simd::{F32x8, Mask8, Vec3x8};
 pub struct ThinDielectric(Index8);
 
 impl Bsdf<'_> for ThinDielectric {
-    const LOBES: Lobes = Lobes::REFLECTION.with(Lobes::TRANSMISSION).with(Lobes::SPECULAR);
+    const LOBES: Lobes = Lobes::REFLECTION.with(Lobes::TRANSMISSION).with(Lobes::SPECULAR).with(Lobes::STRAIGHT);
     const CACHE_DIRECTION: CacheDirection = CacheDirection::View;
 
     #[inline(always)]
@@ -30,11 +30,15 @@ impl Bsdf<'_> for ThinDielectric {
     }
 
     #[inline(always)]
-    fn sample(&self, wo: Vec3x8, [_, _, u]: [F32x8; 3]) -> Sample8 {
-        let cos = wo.z.abs();
-        let r = fresnel::dielectric(cos, self.0).reflectance;
-        let reflect = u.lt((r + r) / (1.0 + r));
-        Sample8::delta(Vec3x8::select(reflect, mirrored(wo), -wo), Vec3x8::ONE, cos.gt(F32x8::ZERO))
+    fn sample(&self, wo: Vec3x8, _: [F32x8; 3]) -> Sample8 {
+        Sample8::delta(mirrored(wo), Vec3x8::ONE, wo.z.abs().gt(F32x8::ZERO))
+    }
+
+    /// 1 - R'.
+    #[inline(always)]
+    fn straight(&self, wo: Vec3x8) -> F32x8 {
+        let r = fresnel::dielectric(wo.z.abs(), self.0).reflectance;
+        1.0 - (r + r) / (1.0 + r)
     }
 
     /// 1: no energy is lost.

@@ -12,7 +12,7 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 pub struct SurfaceHit8 {
     /// Lanes that hit.
     pub mask: Mask8,
-    /// Ray parameter.
+    /// Ray parameter; in the tracer, distance from the last vertex.
     pub t: F32x8,
     /// Barycentric weight of vertex b.
     pub u: F32x8,

@@ -115,6 +115,9 @@ impl Effects {
     /// Every effect with its name.
     pub const NAMES: &'static [(Self, &'static str)] = &NAMES;
 
+    /// Effects with which light may pass a surface straight on.
+    pub const STRAIGHT: Self = Self::NULL.with(Self::THIN_DIELECTRIC).with(Self::ALPHA).with(Self::MEDIA);
+
     /// The effect of a material kind.
     pub const fn of_material(kind: MaterialKind) -> Self {
         Self(1 << kind as u32)

@@ -15,6 +15,7 @@ use super::packets::{Contribution8, Samples8, ShadowRays8};
 use super::path::Path8;
 use super::root::{PixelTarget, Roots};
 use super::vertex::PathVertex;
+use crate::cost::MEDIUM_STEPS_PER_RAY;
 use crate::counters::Counters;
 use crate::film::{PixelAov, PixelSums, REL_MSE_EPSILON};
 use crate::learn::LearnedState;
@@ -204,6 +205,18 @@ impl<'m> Bookkeeping<'m> {
             for i in logged.lanes() {
                 self.ledger.charge(record[i], cost);
             }
+        }
+    }
+
+    /// Charges `steps` steps through media to the lanes in `mask`, each its equal share, and counts the lanes of which
+    /// roulette had to decide.
+    pub(super) fn charge_medium(&mut self, mask: Mask8, path: &Path8, steps: u32, roulettes: u32) {
+        self.counters.medium_steps += u64::from(steps);
+        self.counters.media_roulettes += u64::from(roulettes);
+        let logged = mask.and_not(path.record.eq(U32x8::splat(NO_RECORD)));
+        let cost = steps as f32 / (MEDIUM_STEPS_PER_RAY as f32 * mask.count().max(1) as f32);
+        for i in logged.lanes() {
+            self.ledger.charge(path.record.lane(i), cost);
         }
     }
 

@@ -5,8 +5,9 @@ use super::shading::Arrival8;
 use crate::bsdf;
 use crate::learn::cache::VertexKind8;
 use crate::rrs::Space;
+use crate::scene::Effects;
 use crate::world::World;
-use croupier_simd::{F32x8, U32x8, Vec3x8};
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Channels that reflect less than this are not learned from: the quotient would be noise.
 const DARKEST: f32 = 1e-3;
@@ -37,11 +38,13 @@ pub(super) fn cache_lookup<W: World>(world: &W, book: &Bookkeeping<'_>, a: &Arri
         Space::Scene => {
             let mirrored = v.ns * (v.ns.dot(v.wo) * F32x8::splat(2.0)) - v.wo;
             let by_normal = bsdf::lanes_of(bsdf::kinds_keyed_by_normal(), &a.kind);
-            let by_view = bsdf::lanes_of(bsdf::kinds_keyed_by_view(), &a.kind);
+            let in_medium = if W::EFFECTS.contains(Effects::MEDIA) { a.in_medium() } else { Mask8::NONE };
+            let by_view = bsdf::lanes_of(bsdf::kinds_keyed_by_view(), &a.kind) | in_medium;
             let dir = Vec3x8::select(by_view, v.wo, Vec3x8::select(by_normal, v.ns, mirrored));
             let seen = v.path.depth.eq(U32x8::splat(1));
             let known = if learned.weighs_pixels() { active } else { active.and_not(seen) };
-            let bin = learned.scene_bins(VertexKind8::of(by_normal, seen), v.p, dir, v.key.cache_jitter(), known);
+            let bin =
+                learned.scene_bins(VertexKind8::of(by_normal, in_medium, seen), v.p, dir, v.key.cache_jitter(), known);
             let mut unscale = a.albedo;
             if (seen & active).any() {
                 // in one cell bright pixels see bright samples: only their ratio is alike, whatever a pixel's samples

@@ -4,7 +4,8 @@
 use super::book::Bookkeeping;
 use super::job::Job;
 use super::ledger::NO_RECORD;
-use super::packets::RayState8;
+use super::media_set::MediaSet8;
+use super::packets::{RayKind, RayState8};
 use super::path::Path8;
 use super::root::PixelTarget;
 use crate::camera;
@@ -109,8 +110,11 @@ pub(crate) fn camera_rays<W: World>(
     RayState8 {
         active: Mask8::first(lanes),
         ray: Ray8::unbounded(o, d),
+        kind: RayKind::Camera,
         from: o,
         normal: Vec3x8::ZERO,
+        travelled: F32x8::ZERO,
+        media: MediaSet8::splat(world.camera_media()),
         beta: Vec3x8::ONE,
         weight: Vec3x8::ONE,
         pdf: F32x8::ONE,

@@ -27,9 +27,12 @@ mod emission;
 mod free_list;
 mod job;
 mod ledger;
+mod media_set;
+mod medium;
 mod nee;
 mod occlude;
 mod packets;
+mod passing;
 mod path;
 mod pipeline;
 mod refill;
@@ -47,6 +50,8 @@ mod trace;
 mod vertex;
 
 pub(crate) use job::Job;
+pub(crate) use media_set::media_at;
+pub use occlude::MAX_PASSED;
 pub use shard::{Budget, Shard, ShardError, StepResult};
 
 /// Bytes of the state of a path in flight: a waiting vertex with its link in the ring, and a camera sample.

@@ -2,8 +2,9 @@
 //! roulette for its shadow ray.
 
 use super::book::Bookkeeping;
+use super::media_set::media_towards;
 use super::packets::{Contribution8, Samples8, ShadowRays8};
-use crate::bsdf::{self, Eval8};
+use crate::bsdf::Eval8;
 use crate::geometry::{self, Ray8};
 use crate::learn::cache::NO_BIN;
 use crate::light::{self, LightSample8, power_heuristic};
@@ -13,8 +14,7 @@ use croupier_simd::{F32x8, U32x8, Vec3x8};
 /// One light sample per lane; `None` where next event estimation does not apply to the packet.
 #[inline(always)]
 pub(crate) fn sample_lights<W: World>(world: &W, samples: &Samples8) -> Option<LightSample8> {
-    let delta = bsdf::delta_kinds() >> samples.class.bsdf() as u32 & 1 == 1;
-    if !samples.with_nee || delta || samples.continues.none() || world.scene().lights.is_empty() {
+    if !samples.with_nee || samples.class.is_delta() || samples.continues.none() || world.scene().lights.is_empty() {
         return None;
     }
     Some(one_per_lane(world, samples))
@@ -55,7 +55,15 @@ pub(crate) fn shadow_rays<W: World>(
         found.local = found.local / p;
         active = on;
     }
-    active.any().then(|| ShadowRays8 { active, ray: towards_light(samples, l), path: samples.path, found, towards })
+    active.any().then(|| ShadowRays8 {
+        active,
+        ray: towards_light(samples, l),
+        media: media_towards(world, samples, l.wi),
+        key: samples.key,
+        path: samples.path,
+        found,
+        towards,
+    })
 }
 
 /// Rays from the vertices to the light samples.

@@ -1,6 +1,7 @@
 //! What stages hand to each other: packets of eight lanes.
 
 use super::class::PacketClass;
+use super::media_set::MediaSet8;
 use super::path::Path8;
 use super::vertex::PathVertex8;
 use crate::geometry::Ray8;
@@ -33,10 +34,16 @@ pub(crate) struct RayState8 {
     pub active: Mask8,
     /// The rays; unit directions.
     pub ray: Ray8,
+    /// What the rays are.
+    pub kind: RayKind,
     /// Vertices that the rays left (before the offset), from where light sampling could have found what they hit.
     pub from: Vec3x8,
     /// Geometric normals there.
     pub normal: Vec3x8,
+    /// Distance of the origins from there: 0 until a ray has passed something straight on.
+    pub travelled: F32x8,
+    /// Media around the origins.
+    pub media: MediaSet8,
     /// Prefix weight including the bounce.
     pub beta: Vec3x8,
     /// Weight of the bounce alone, `f cos / pdf`.
@@ -55,6 +62,17 @@ pub(crate) struct RayState8 {
     pub error_weight: Vec3x8,
 }
 
+/// What the rays of a packet are: all of them are of one kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RayKind {
+    /// From the camera.
+    Camera,
+    /// From a vertex.
+    Scattered,
+    /// On from where a ray of another packet passed something or stopped.
+    Straight,
+}
+
 /// Eight shadow rays and what they bring if nothing is in the way.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShadowRays8 {
@@ -62,6 +80,10 @@ pub(crate) struct ShadowRays8 {
     pub active: Mask8,
     /// From the vertex to the light sample.
     pub ray: Ray8,
+    /// Media around the origins.
+    pub media: MediaSet8,
+    /// Random keys of the samples that the rays belong to.
+    pub key: Key8,
     /// Whose rays these are.
     pub path: Path8,
     /// What counts where the light sample is visible.

@@ -14,16 +14,19 @@
 use super::camera_rays::camera_rays;
 use super::emission;
 use super::job::Job;
+use super::medium::{arrive_in_media, cross_media};
 use super::nee::{sample_lights, shadow_rays};
 use super::occlude::occlude;
+use super::passing::{pass, straight_rays};
 use super::refill::{Refill, refill, samples};
 use super::roulette::roulette;
 use super::scatter::scatter;
 use super::settle::settle;
-use super::shading::{albedo, shade};
+use super::shading::{albedo, may_pass, shade};
 use super::state::State;
 use super::trace::trace;
 use crate::geometry::SurfaceHit8;
+use crate::scene::Effects;
 use crate::settings::MAX_PATH_LENGTH;
 use crate::world::World;
 use croupier_simd::{Mask8, U32x8, Vec3x8};
@@ -33,17 +36,18 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
     let State { cursor, ring, book, comb } = state;
     let settings = &job.settings;
 
-    let rays = match refill(cursor, ring, book) {
+    let mut rays = match refill(cursor, ring, book) {
         Refill::Done => return false,
         Refill::Camera => camera_rays(world, job, index, cursor, book),
+        Refill::Straight(taken) => straight_rays(ring, &taken),
         Refill::Samples(taken) => {
             let samples = samples(world, ring, book, &taken);
             let light = sample_lights(world, &samples);
             let scattered = scatter(world, &samples, light.as_ref().map(|l| l.wi));
             if let Some(light) = light {
                 let roulette = settings.shadow_roulette;
-                if let Some(shadow) = shadow_rays(world, book, &samples, &light, &scattered.nee, roulette) {
-                    let visible = occlude(world, book, &shadow);
+                if let Some(mut shadow) = shadow_rays(world, book, &samples, &light, &scattered.nee, roulette) {
+                    let visible = occlude(world, book, &mut shadow);
                     book.learn_shadow_rays(&samples, &shadow, visible);
                     book.accumulate(visible, &shadow.path, &shadow.found);
                 }
@@ -57,19 +61,23 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
         return true;
     }
 
-    let hit = trace(world, book, &rays);
-    let escaped = rays.active.and_not(hit.hit);
+    let mut hit = trace(world, book, &rays);
+    let collision = cross_media(world, book, ring, &mut rays, &mut hit);
+    let escaped = rays.active.and_not(hit.hit | collision.mask);
     if escaped.any() {
         if let Some(found) = emission::environment(world, &rays, escaped) {
             book.accumulate(escaped, &rays.path, &found);
         }
         book.close_lanes(escaped, &rays.path);
     }
-    if hit.hit.none() {
+    if (hit.hit | collision.mask).none() {
         return true;
     }
 
-    let hit = SurfaceHit8::gather(world.scene(), &hit);
+    let mut hit = SurfaceHit8::gather(world.scene(), &hit);
+    if W::EFFECTS.intersects(Effects::STRAIGHT) {
+        hit.t = hit.t + rays.travelled;
+    }
     let point = hit.point();
     book.counters.surface.count(hit.mask.count());
     if let Some(found) = emission::area(world, &rays, &hit, point.ng) {
@@ -77,27 +85,44 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
     }
 
     // segments may end here, and camera samples are looked at all the same
-    let alive = hit.mask & rays.path.depth.lt(U32x8::splat(world.max_depth()));
+    let met = hit.mask | collision.mask;
+    let alive = met & rays.path.depth.lt(U32x8::splat(world.max_depth()));
     if settings.max_depth > MAX_PATH_LENGTH {
-        book.counters.max_length_reached += u64::from(hit.mask.and_not(alive).count());
+        book.counters.max_length_reached += u64::from(met.and_not(alive).count());
     }
-    let first = hit.mask & rays.path.depth.eq(U32x8::splat(1));
+    let first = met & rays.path.depth.eq(U32x8::splat(1));
     let wants_aovs = book.wants_aovs() && first.any();
-    if alive.none() && !wants_aovs {
-        book.close_lanes(hit.mask, &rays.path);
+    let may_pass = may_pass::<W>(world.scene());
+    if alive.none() && !wants_aovs && !may_pass {
+        book.close_lanes(met, &rays.path);
         return true;
     }
 
     let mut arrival = shade(world, &rays, &hit, &point);
+    let mut met = met;
+    if may_pass {
+        let passed = pass(world, book, ring, &rays, &hit, &arrival);
+        met = met.and_not(passed);
+        arrival.active = arrival.active.and_not(passed);
+    }
+    if W::EFFECTS.contains(Effects::MEDIA) && collision.mask.any() {
+        arrive_in_media(&rays, &collision, &mut arrival);
+    }
     let needs_albedo = settings.strategy.needs_albedo();
+    let first = first & met;
     let seen = if wants_aovs { first & arrival.active } else { Mask8::NONE };
     arrival.active &= alive;
     let albedo = albedo(world, &arrival, seen | if needs_albedo { arrival.active } else { Mask8::NONE });
     if wants_aovs {
-        book.record_first_hit(first, &rays.path, hit.t, arrival.vertex.ns, albedo);
+        let t = if W::EFFECTS.contains(Effects::MEDIA) {
+            collision.mask.select(collision.t + rays.travelled, hit.t)
+        } else {
+            hit.t
+        };
+        book.record_first_hit(first, &rays.path, t, arrival.vertex.ns, albedo);
     }
     arrival.albedo = if needs_albedo { albedo } else { Vec3x8::ZERO };
-    book.close_lanes(hit.mask.and_not(arrival.active), &rays.path);
+    book.close_lanes(met.and_not(arrival.active), &rays.path);
     if arrival.active.none() {
         return true;
     }

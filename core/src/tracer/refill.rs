@@ -3,10 +3,11 @@
 
 use super::book::Bookkeeping;
 use super::camera_rays::CameraCursor;
-use super::class::Queue;
+use super::class::{PacketClass, Queue};
 use super::packets::Samples8;
 use super::path::Path8;
 use super::ring::{RESERVE, Ring, Taken8};
+use super::vertex::PathVertex8;
 use crate::world::World;
 use croupier_simd::{Mask8, U32x8};
 
@@ -15,6 +16,8 @@ use croupier_simd::{Mask8, U32x8};
 pub(crate) enum Refill {
     /// Samples of waiting vertices.
     Samples(Taken8),
+    /// Rays on their way.
+    Straight(Taken8),
     /// Camera samples.
     Camera,
     /// Nothing, and nothing will come.
@@ -30,7 +33,11 @@ pub(crate) fn refill(cursor: &CameraCursor, ring: &mut Ring<'_>, book: &mut Book
     match ring.fullest() {
         Some((fullest, pending)) if pending >= 8 || !room => {
             let mut take = |q| ring.take(q, |v, lanes, drained| book.draw(v, lanes, drained));
-            take(fullest).or_else(|| Queue::all().find_map(take)).map_or(Refill::Done, Refill::Samples)
+            match take(fullest).or_else(|| Queue::all().find_map(take)) {
+                Some(taken) if taken.queue.class() == PacketClass::STRAIGHT => Refill::Straight(taken),
+                Some(taken) => Refill::Samples(taken),
+                None => Refill::Done,
+            }
         }
         _ if room => Refill::Camera,
         _ => Refill::Done,
@@ -40,7 +47,7 @@ pub(crate) fn refill(cursor: &CameraCursor, ring: &mut Ring<'_>, book: &mut Book
 /// A packet of the samples that were just taken.
 #[inline(always)]
 pub(crate) fn samples<W: World>(world: &W, ring: &Ring<'_>, book: &mut Bookkeeping<'_>, taken: &Taken8) -> Samples8 {
-    let vertex = ring.vertices(taken);
+    let vertex = PathVertex8::from_records(ring.records(taken));
     let active = Mask8::first(taken.lanes);
     let (class, with_nee) = (taken.queue.class(), taken.queue.with_nee());
     book.counters.scatter.count(taken.lanes as u32);

@@ -21,7 +21,7 @@
 //! [`RESERVE`] slots stay free can always run their packet to its end: the ring can neither overflow nor get stuck.
 
 use super::class::{PacketClass, Queue};
-use super::vertex::{PathVertex, PathVertex8};
+use super::vertex::PathVertex;
 use crate::memory::{Carver, Measure, MemoryError};
 use croupier_simd::U32x8;
 
@@ -209,16 +209,17 @@ impl<'m> Ring<'m> {
         Some(Taken8 { slots: slot, sample: U32x8::new(sample), lanes, queue })
     }
 
-    /// The vertices of samples that were just taken: before anything else is stored.
+    /// The records of samples that were just taken: before anything else is stored.
     #[inline(always)]
-    pub(crate) fn vertices(&self, taken: &Taken8) -> PathVertex8 {
-        PathVertex8::from_records(taken.slots.map(|s| &self.slots[s as usize]))
+    pub(crate) fn records(&self, taken: &Taken8) -> [&PathVertex; 8] {
+        taken.slots.map(|s| &self.slots[s as usize])
     }
 }
 
 #[cfg(test)]
 mod tests {
     extern crate std;
+    use super::super::vertex::PathVertex8;
     use super::*;
     use crate::memory::BLOCK_ALIGN;
     use std::vec::Vec;
@@ -232,7 +233,7 @@ mod tests {
     }
 
     fn class(n: u32) -> PacketClass {
-        PacketClass::of_material(n).unwrap()
+        PacketClass::of_kind(n).unwrap()
     }
 
     /// Random (subcritical) trees through rings of every small size: each turn takes what fits and pushes as `roulette`
@@ -275,7 +276,7 @@ mod tests {
                         if n > 0 {
                             let with_nee = next(n + 1);
                             waiting_nee += u64::from(with_nee);
-                            let class = class(next(PacketClass::COUNT as u32));
+                            let class = class(next(PacketClass::COUNT as u32 - 1));
                             ring.push(class, PathVertex::of_samples(n, with_nee));
                             pushed += u64::from(n);
                         }
@@ -310,7 +311,7 @@ mod tests {
             assert_eq!(batch.sample.to_array()[..3], [1, 2, 1], "numbers of samples go on where they were");
             assert!(ring.take(a.queue(true), |_, _, _| ()).is_none());
             let batch = ring.take(b.queue(false), |_, _, _| ()).unwrap();
-            assert_eq!((batch.lanes, ring.vertices(&batch).samples.lane(0) & 0xff), (5, 0));
+            assert_eq!((batch.lanes, PathVertex8::from_records(ring.records(&batch)).samples.lane(0) & 0xff), (5, 0));
             assert_eq!((ring.waiting(), ring.fullest()), (0, None));
         });
     }

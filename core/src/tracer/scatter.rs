@@ -1,10 +1,11 @@
 //! Stage `scatter`: one BSDF sample per lane, and the BSDF's value towards the light samples. All lanes run one kernel.
 
-use super::packets::RayState8;
-use super::packets::Samples8;
-use crate::bsdf::{self, Bsdf, Eval8, Inputs8, Sample8, Visitor};
+use super::class::Kernel as ClassKernel;
+use super::media_set::media_towards;
+use super::packets::{RayKind, RayState8, Samples8};
+use crate::bsdf::{self, Bsdf, Eval8, HenyeyGreenstein, Inputs8, Sample8, Visitor};
 use crate::geometry::{self, Ray8};
-use crate::scene::Scene;
+use crate::scene::{Effects, Scene};
 use crate::world::World;
 use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
 
@@ -52,7 +53,12 @@ pub(crate) fn scatter<W: World>(world: &W, samples: &Samples8, nee: Option<Vec3x
     let v = &samples.vertex;
     let kernel = Kernel { scene: world.scene(), samples, nee, u: samples.key.scattering() };
     // a class outside the profile cannot be: sessions refuse such scenes
-    let (nee, s, frame) = bsdf::dispatch_in(W::EFFECTS, samples.class.bsdf(), kernel).unwrap_or_else(nothing);
+    let scattered = match samples.class.kernel() {
+        ClassKernel::Surface(kind) => bsdf::dispatch_in(W::EFFECTS, kind, kernel),
+        ClassKernel::Phase if W::EFFECTS.contains(Effects::MEDIA) => Some(kernel.visit::<HenyeyGreenstein>()),
+        _ => None,
+    };
+    let (nee, s, frame) = scattered.unwrap_or_else(nothing);
     let wi = frame.to_world(s.wi);
     let beta = v.beta * s.weight;
     let valid = samples.continues & s.valid;
@@ -63,8 +69,11 @@ pub(crate) fn scatter<W: World>(world: &W, samples: &Samples8, nee: Option<Vec3x
         rays: RayState8 {
             active: valid & beta.any_positive() & finite,
             ray: Ray8::unbounded(geometry::offset(v.p, v.ng, v.error, wi), wi),
+            kind: RayKind::Scattered,
             from: v.p,
             normal: v.ng,
+            travelled: F32x8::ZERO,
+            media: media_towards(world, samples, wi),
             beta,
             weight: s.weight,
             pdf: s.pdf,

@@ -13,7 +13,7 @@ pub(crate) fn settle(book: &mut Bookkeeping<'_>, ring: &mut Ring<'_>, a: &Arriva
     let path = &a.vertex.path;
     let (root, record, depth) = (path.root.to_array(), path.record.to_array(), path.depth.to_array());
     for i in a.active.lanes() {
-        let Some(class) = PacketClass::of_material(a.kind[i]).filter(|_| d.n[i] > 0) else {
+        let Some(class) = PacketClass::of_kind(a.kind[i]).filter(|_| d.n[i] > 0) else {
             book.counters.paths_terminated += 1;
             book.close(root[i], record[i], depth[i]);
             continue;

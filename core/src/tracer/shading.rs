@@ -1,11 +1,13 @@
 //! Stage `shading`: the vertices that hits become, with material, shading normal and texture.
 
+use super::class::PHASE_KIND;
+use super::media_set::{MediaSet8, media_behind};
 use super::packets::RayState8;
 use super::vertex::PathVertex8;
-use crate::bsdf::{self, Bsdf, Inputs8, Visitor};
+use crate::bsdf::{self, Bsdf, Inputs8, Lobes, Visitor};
 use crate::geometry::{SurfaceHit8, SurfacePoint8};
 use crate::learn::cache::NO_BIN;
-use crate::scene::blob::{MATERIAL_TWO_SIDED, MaterialKind, NONE};
+use crate::scene::blob::{MATERIAL_CUTOUT, MATERIAL_TWO_SIDED, MaterialKind, NONE};
 use crate::scene::{Effects, Scene};
 use crate::texture;
 use crate::world::World;
@@ -18,19 +20,30 @@ pub(crate) struct Arrival8 {
     pub vertex: PathVertex8,
     /// Lanes whose path goes on; at first those whose front (or either side, if transmissive) faces `wo`.
     pub active: Mask8,
-    /// [`MaterialKind`] per lane.
+    /// [`MaterialKind`] per lane, or [`PHASE_KIND`](super::class::PHASE_KIND).
     pub kind: [u32; 8],
+    /// Share of light that passes the surface straight on ([`Bsdf::straight`], alpha, or all of it where a medium of
+    /// higher priority hides the surface).
+    pub straight: F32x8,
     /// Weight of the bounce that led here.
     pub weight: Vec3x8,
     /// Albedos seen from `wo`; 0 unless the strategy needs them.
     pub albedo: Vec3x8,
 }
 
+impl Arrival8 {
+    /// Lanes whose vertex is in a medium, not on a surface.
+    #[inline(always)]
+    pub(crate) fn in_medium(&self) -> Mask8 {
+        U32x8::new(self.kind).eq(U32x8::splat(PHASE_KIND))
+    }
+}
+
 /// The vertices at the points of hits.
 #[inline(always)]
 pub(crate) fn shade<W: World>(world: &W, rays: &RayState8, hit: &SurfaceHit8, point: &SurfacePoint8) -> Arrival8 {
     let wo = -rays.ray.d;
-    let m = Materials8::gather::<W>(world.scene(), hit, wo, point.ng);
+    let m = Materials8::gather::<W>(world.scene(), hit, wo, point.ng, rays.media);
     Arrival8 {
         vertex: PathVertex8 {
             p: point.p,
@@ -41,6 +54,7 @@ pub(crate) fn shade<W: World>(world: &W, rays: &RayState8, hit: &SurfaceHit8, po
             beta: rays.beta,
             reflectance: m.reflectance,
             material: U32x8::new(hit.material),
+            media: rays.media,
             path: rays.path,
             key: rays.key,
             albedo_product: rays.albedo_product,
@@ -51,6 +65,7 @@ pub(crate) fn shade<W: World>(world: &W, rays: &RayState8, hit: &SurfaceHit8, po
         },
         active: m.scatters,
         kind: m.kind,
+        straight: m.straight,
         weight: rays.weight,
         albedo: Vec3x8::ZERO,
     }
@@ -64,14 +79,16 @@ struct Materials8 {
     ns: Vec3x8,
     /// Lanes whose front (or either side, if transmissive) faces `wo`.
     scatters: Mask8,
+    /// See [`Arrival8::straight`].
+    straight: F32x8,
 }
 
 impl Materials8 {
     /// Materials, shading normals and textures of the hit lanes.
     #[inline(never)]
-    fn gather<W: World>(scene: &Scene<'_>, hit: &SurfaceHit8, wo: Vec3x8, ng: Vec3x8) -> Self {
+    fn gather<W: World>(scene: &Scene<'_>, hit: &SurfaceHit8, wo: Vec3x8, ng: Vec3x8, media: MediaSet8) -> Self {
         let (mut kind, mut textures) = ([0u32; 8], [NONE; 8]);
-        let (mut two_sided, mut through, mut textured) = (0u32, 0u32, 0u32);
+        let (mut two_sided, mut through, mut textured, mut cutout) = (0u32, 0u32, 0u32, 0u32);
         let mut reflectance = [[0.0f32; 3]; 8];
         for i in hit.mask.lanes() {
             let Some(m) = scene.materials.get(hit.material[i] as usize) else { continue };
@@ -81,8 +98,10 @@ impl Materials8 {
             two_sided |= u32::from(m.flags & MATERIAL_TWO_SIDED != 0) << i;
             through |= (bsdf::transmissive_kinds() >> m.kind & 1) << i;
             textured |= u32::from(m.texture != NONE) << i;
+            cutout |= u32::from(m.flags & MATERIAL_CUTOUT != 0) << i;
         }
         let mut reflectance = Vec3x8::from_fn(|i| reflectance[i]);
+        let mut straight = F32x8::ZERO;
         let [wa, wb, wc] = hit.weights();
         let mut ns = ng;
         if W::EFFECTS.contains(Effects::SMOOTH_NORMALS) && hit.smooth.any() {
@@ -99,6 +118,11 @@ impl Materials8 {
             let mask = Mask8::from_bits(textured);
             let texel = texture::lookup(scene, U32x8::new(textures), [at.x, at.y], mask);
             reflectance = Vec3x8::select(mask, texel, reflectance);
+            if W::EFFECTS.contains(Effects::ALPHA) && cutout != 0 {
+                let mask = mask & Mask8::from_bits(cutout);
+                let alpha = texture::alpha(scene, U32x8::new(textures), [at.x, at.y], mask);
+                straight = mask.zero_unless(1.0 - alpha);
+            }
         }
         let cos = wo.dot(ns);
         let behind = cos.lt(F32x8::ZERO);
@@ -106,7 +130,60 @@ impl Materials8 {
         let turn = behind & Mask8::from_bits(two_sided).and_not(transmissive);
         let ns = Vec3x8::select(turn, -ns, ns);
         let scatters = (cos.gt(F32x8::ZERO) | turn | (transmissive & behind)) & hit.mask;
-        Self { kind, reflectance, ns, scatters }
+        if W::EFFECTS.intersects(Effects::STRAIGHT) && may_pass::<W>(scene) {
+            let by_model = hit.mask & bsdf::lanes_of(bsdf::straight_kinds(), &kind);
+            let material = U32x8::new(hit.material);
+            let of = |mask| StraightOf { scene, material, reflectance, ns, wo, mask };
+            straight = by_model.select(each_kind(W::EFFECTS, by_model, &kind, of).x, straight);
+            if W::EFFECTS.contains(Effects::MEDIA) && media.inside().any() {
+                let hidden = hit.mask & media.hides(&media_behind(scene, &hit.material));
+                straight = hidden.select(F32x8::ONE, straight);
+            }
+        }
+        Self { kind, reflectance, ns, scatters, straight }
+    }
+}
+
+/// Does the scene hold anything that light may pass straight on?
+#[inline(always)]
+pub(crate) fn may_pass<W: World>(scene: &Scene<'_>) -> bool {
+    W::EFFECTS.intersects(Effects::STRAIGHT) && scene.effects.intersects(Effects::STRAIGHT)
+}
+
+/// Share of the light from the directions `wo` that passes the surfaces of `hit` straight on, within `media`; `ng` are
+/// their normals by winding.
+pub(crate) fn straight_share<W: World>(
+    scene: &Scene<'_>,
+    hit: &SurfaceHit8,
+    wo: Vec3x8,
+    ng: Vec3x8,
+    media: MediaSet8,
+) -> F32x8 {
+    hit.mask.zero_unless(Materials8::gather::<W>(scene, hit, wo, ng, media).straight)
+}
+
+/// The kernel of one material kind that says what passes straight on.
+struct StraightOf<'a, 's> {
+    scene: &'a Scene<'s>,
+    material: U32x8,
+    reflectance: Vec3x8,
+    ns: Vec3x8,
+    wo: Vec3x8,
+    mask: Mask8,
+}
+
+impl<'s> Visitor<'s> for StraightOf<'_, 's> {
+    type Out = Vec3x8;
+
+    #[inline(never)]
+    fn visit<B: Bsdf<'s>>(self) -> Vec3x8 {
+        if !B::LOBES.contains(Lobes::STRAIGHT) {
+            return Vec3x8::ZERO;
+        }
+        let inputs = Inputs8 { material: self.material, reflectance: self.reflectance };
+        let wo = Frame8::from_normal(self.ns).to_local(self.wo);
+        let share = B::gather(self.scene, &inputs, self.mask).straight(wo);
+        Vec3x8::new(share, share, share)
     }
 }
 
@@ -132,15 +209,29 @@ impl<'s> Visitor<'s> for AlbedoOf<'_, 's> {
 /// Albedos of the vertices in the lanes of `active`, of any kinds; 0 in other lanes.
 pub(crate) fn albedo<W: World>(world: &W, a: &Arrival8, active: Mask8) -> Vec3x8 {
     let (scene, vertex) = (world.scene(), &a.vertex);
+    let phase = if W::EFFECTS.contains(Effects::MEDIA) { active & a.in_medium() } else { Mask8::NONE };
+    let surface = active.and_not(phase);
+    let of = each_kind(W::EFFECTS, surface, &a.kind, |mask| AlbedoOf { scene, vertex, mask });
+    Vec3x8::select(phase, vertex.reflectance, of)
+}
+
+/// What the kernels (of the lanes of one kind each) say in the lanes of `active` for the model of the kind; 1 for kinds outside the constant
+/// `profile`, 0 in other lanes.
+#[inline(always)]
+fn each_kind<'s, V: Visitor<'s, Out = Vec3x8>>(
+    profile: Effects,
+    active: Mask8,
+    kinds: &[u32; 8],
+    kernel: impl Fn(Mask8) -> V,
+) -> Vec3x8 {
     let mut out = Vec3x8::ZERO;
     let mut left = active.bits();
     while left != 0 {
-        let kind = a.kind[left.trailing_zeros() as usize & 7];
-        let bits = active.lanes().filter(|&i| a.kind[i] == kind).fold(0, |m, i| m | 1 << i);
+        let kind = kinds[left.trailing_zeros() as usize & 7];
+        let bits = active.lanes().filter(|&i| kinds[i] == kind).fold(0, |m, i| m | 1 << i);
         left &= !bits;
         let mask = Mask8::from_bits(bits);
-        let of = MaterialKind::from_u32(kind)
-            .and_then(|k| bsdf::dispatch_in(W::EFFECTS, k, AlbedoOf { scene, vertex, mask }));
+        let of = MaterialKind::from_u32(kind).and_then(|k| bsdf::dispatch_in(profile, k, kernel(mask)));
         out = Vec3x8::select(mask, of.unwrap_or(Vec3x8::ONE), out);
     }
     out

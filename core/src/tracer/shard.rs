@@ -16,7 +16,8 @@ use core::fmt;
 /// How much a step may do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
-    /// Rays of all kinds; exceeded by less than one packet (16 rays).
+    /// Rays of all kinds, and as many steps through media as cost the same ([`Counters::work`]); exceeded by less than one
+    /// packet (16 rays, unless they pass surfaces or media).
     pub rays: u64,
 }
 
@@ -110,8 +111,8 @@ impl<'m> Shard<'m> {
         if self.joined != world.identity() {
             self.begin(world);
         }
-        let start = self.state.book.counters.rays();
-        while self.state.book.counters.rays() - start < budget.rays {
+        let start = self.state.book.counters.work();
+        while self.state.book.counters.work() - start < budget.rays {
             if !turn(world, &self.job, self.index, &mut self.state) {
                 return StepResult::Done;
             }

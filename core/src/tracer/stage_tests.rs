@@ -7,12 +7,10 @@ use super::camera_rays::{CameraCursor, camera_rays};
 use super::class::PacketClass;
 use super::emission;
 use super::ledger::NO_RECORD;
+use super::media_set::MediaSet8;
 use super::nee::{sample_lights, shadow_rays};
 use super::occlude::occlude;
-use super::packets::Contribution8;
-use super::packets::RayState8;
-use super::packets::Samples8;
-use super::packets::ShadowRays8;
+use super::packets::{Contribution8, RayKind, RayState8, Samples8, ShadowRays8};
 use super::path::Path8;
 use super::refill::{Refill, refill, samples};
 use super::root::PixelTarget;
@@ -76,8 +74,11 @@ fn rays(shard: &mut Shard<'_>) -> RayState8 {
     RayState8 {
         active: Mask8::all_lanes(),
         ray: Ray8::unbounded(o, d),
+        kind: RayKind::Camera,
         from: o,
         normal: Vec3x8::ZERO,
+        travelled: F32x8::ZERO,
+        media: MediaSet8::NONE,
         beta: Vec3x8::splat(0.5, 1.0, 2.0),
         weight: Vec3x8::splat(1.0, 0.5, 0.25),
         pdf: F32x8::splat(0.25),
@@ -108,6 +109,7 @@ fn floor(shard: &mut Shard<'_>) -> PathVertex8 {
         beta: Vec3x8::ONE,
         reflectance: Vec3x8::from_fn(|_| FLOOR),
         material: U32x8::splat(0),
+        media: MediaSet8::NONE,
         path: paths(shard, 1),
         key: Key8::camera(5, U32x8::from_fn(|i| i as u32), U32x8::splat(1)),
         albedo_product: F32x8::ONE,
@@ -123,7 +125,7 @@ fn floor_samples(shard: &mut Shard<'_>, kind: MaterialKind, with_nee: bool) -> S
     Samples8 {
         active: Mask8::all_lanes(),
         continues: Mask8::all_lanes(),
-        class: PacketClass::of_material(kind as u32).expect("a class"),
+        class: PacketClass::of_kind(kind as u32).expect("a class"),
         with_nee,
         path: vertex.path,
         key: vertex.key,
@@ -148,7 +150,7 @@ fn refill_takes_what_waits_before_camera_samples() {
             ));
             let mut v = floor(shard);
             v.samples = U32x8::new([8, 9, 1, 1, 1, 1, 1, 1]);
-            let class = |kind| PacketClass::of_material(kind as u32).expect("a class");
+            let class = |kind| PacketClass::of_kind(kind as u32).expect("a class");
             let records = v.records();
             shard.state.ring.push(class(MaterialKind::Diffuse), records[0]);
             shard.state.ring.push(class(MaterialKind::Mirror), records[1]);
@@ -183,7 +185,7 @@ fn samples_at_the_last_depth_do_not_continue() {
         |world, shard| {
             let mut v = floor(shard);
             v.samples = U32x8::splat(2);
-            shard.state.ring.push(PacketClass::of_material(0).expect("a class"), v.records()[0]);
+            shard.state.ring.push(PacketClass::of_kind(0).expect("a class"), v.records()[0]);
             shard.state.cursor = CameraCursor::finished();
             let Refill::Samples(taken) = refill(&shard.state.cursor, &mut shard.state.ring, &mut shard.state.book)
             else {
@@ -288,8 +290,10 @@ fn occlusion_is_found_and_charged() {
             let ray = Ray8 { o, d, tmin: F32x8::ZERO, tmax: F32x8::ONE };
             let found = Contribution8 { pixel: Vec3x8::ONE, local: Vec3x8::ONE };
             let active = Mask8::from_bits(0b0011_1111);
-            let s = ShadowRays8 { active, ray, path, found, towards: U32x8::splat(NO_BIN) };
-            assert_eq!(occlude(world, &mut shard.state.book, &s).bits(), 0b0010_1010);
+            let key = Key8::camera(1, U32x8::splat(0), U32x8::splat(0));
+            let (media, towards) = (MediaSet8::NONE, U32x8::splat(NO_BIN));
+            let mut s = ShadowRays8 { active, ray, media, key, path, found, towards };
+            assert_eq!(occlude(world, &mut shard.state.book, &mut s).bits(), 0b0010_1010);
             let rays = path.root.to_array().map(|r| shard.state.book.roots.get(r).rays);
             assert_eq!(rays, [1, 1, 1, 1, 1, 1, 0, 0]);
             assert_eq!((shard.state.book.counters.shadow_rays, shard.state.book.counters.occlude.lanes), (6, 6));
@@ -344,7 +348,7 @@ fn rays_find_what_they_hit() {
             let charged = r.path.root.to_array().map(|root| shard.state.book.roots.get(root).rays);
             assert_eq!(charged, [1, 0, 1, 1, 1, 1, 1, 1]);
             assert_eq!((shard.state.book.counters.trace.lanes, shard.state.book.counters.scatter_rays), (7, 0));
-            r.path.depth = U32x8::splat(2);
+            r.kind = RayKind::Scattered;
             trace(world, &mut shard.state.book, &r);
             assert_eq!(shard.state.book.counters.scatter_rays, 7);
         },
@@ -508,7 +512,7 @@ fn vertices_wait_or_their_paths_end() {
             let c = &shard.state.book.counters;
             assert_eq!((c.paths_terminated, c.camera_samples, c.splits, c.light_samples_skipped), (2, 2, 5, 1));
             assert_eq!(shard.state.ring.waiting(), 3);
-            let mirror = PacketClass::of_material(MaterialKind::Mirror as u32).expect("a class");
+            let mirror = PacketClass::of_kind(MaterialKind::Mirror as u32).expect("a class");
             assert_eq!(shard.state.ring.fullest(), Some((mirror.queue(true), 5)));
             assert_eq!(shard.state.book.roots.get(a.vertex.path.root.lane(6)).splits, 4);
         },

@@ -1,11 +1,13 @@
 //! A path vertex, as one lane of a packet and as a record that waits for its samples.
 
+use super::media_set::MediaSet8;
 use super::path::Path8;
 use crate::rng::Key8;
 use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, U32x8, Vec3x8};
 
-/// One waiting vertex, 128 bytes: four rows of eight words, so that eight of them transpose into [`PathVertex8`].
+/// One waiting vertex, 128 bytes: four rows of eight words, so that eight of them transpose into [`PathVertex8`]. A ray on
+/// its way waits in the same record ([`super::passing`]).
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct PathVertex {
@@ -19,18 +21,20 @@ pub(crate) struct PathVertex8 {
     pub p: Vec3x8,
     /// Bound of its rounding error along `ng`.
     pub error: F32x8,
-    /// Geometric unit normal.
+    /// Geometric unit normal; 0 in a medium.
     pub ng: Vec3x8,
-    /// Shading unit normal, already facing `wo` on two-sided materials.
+    /// Shading unit normal, already facing `wo` on two-sided materials; `wo` in a medium.
     pub ns: Vec3x8,
     /// Unit direction back along the path.
     pub wo: Vec3x8,
     /// Prefix weight of every sample: throughput over all factors so far.
     pub beta: Vec3x8,
-    /// Reflectance after texturing.
+    /// Reflectance after texturing; single-scattering albedo in a medium.
     pub reflectance: Vec3x8,
-    /// Material index.
+    /// Material index; index of the medium in a medium.
     pub material: U32x8,
+    /// Media that it is inside of; on a surface, those on the side of `wo`.
+    pub media: MediaSet8,
     /// Camera sample, ledger record of the sample that led here, and path segments from the camera to here.
     pub path: Path8,
     /// Random key.
@@ -47,7 +51,8 @@ pub(crate) struct PathVertex8 {
     pub error_weight: Vec3x8,
 }
 
-/// Row and column of the words that are read or changed while a vertex waits.
+/// Row and column of the words that are read or changed while a vertex (or a ray) waits: [`super::passing`] has them in
+/// the same places.
 const ROOT: (usize, usize) = (1, 6);
 const RECORD: (usize, usize) = (3, 1);
 const SAMPLES: (usize, usize) = (3, 2);
@@ -62,6 +67,32 @@ pub(crate) fn pack_samples(count: u32, with_nee: u32) -> u32 {
 const _: () = assert!(crate::rrs::MAX_FACTOR < 255.0);
 
 impl PathVertex {
+    /// Eight records of words by row and column.
+    #[inline(always)]
+    pub(super) fn of_columns(columns: [[F32x8; 8]; 4]) -> [Self; 8] {
+        let mut out: [Self; 8] = Zeroable::zeroed();
+        for (r, columns) in columns.into_iter().enumerate() {
+            for (v, row) in out.iter_mut().zip(F32x8::transpose(columns)) {
+                v.rows[r] = row.to_array();
+            }
+        }
+        out
+    }
+
+    /// The words of eight records, by row and column.
+    #[inline(always)]
+    pub(super) fn columns(v: [&Self; 8]) -> [[F32x8; 8]; 4] {
+        let mut columns = [[F32x8::ZERO; 8]; 4];
+        for (r, c) in columns.iter_mut().enumerate() {
+            let mut rows = [F32x8::ZERO; 8];
+            for (row, v) in rows.iter_mut().zip(v) {
+                *row = F32x8::new(v.rows[r]);
+            }
+            *c = F32x8::transpose(rows);
+        }
+        columns
+    }
+
     fn samples(&self) -> u32 {
         self.rows[SAMPLES.0][SAMPLES.1].to_bits()
     }
@@ -100,7 +131,16 @@ impl PathVertex8 {
         let f = F32x8::from_bits;
         [
             [self.p.x, self.p.y, self.p.z, self.error, self.ng.x, self.ng.y, self.ng.z, f(self.material)],
-            [self.ns.x, self.ns.y, self.ns.z, self.wo.x, self.wo.y, self.wo.z, f(self.path.root), f(self.path.depth)],
+            [
+                self.ns.x,
+                self.ns.y,
+                self.ns.z,
+                self.wo.x,
+                self.wo.y,
+                self.wo.z,
+                f(self.path.root),
+                f(self.media.pack(self.path.depth)),
+            ],
             [
                 self.beta.x,
                 self.beta.y,
@@ -126,14 +166,16 @@ impl PathVertex8 {
 
     fn from_columns(c: [[F32x8; 8]; 4]) -> Self {
         let [a, b, d, e] = c;
+        let (media, depth) = MediaSet8::unpack(b[7].to_bits());
         Self {
             p: Vec3x8::new(a[0], a[1], a[2]),
             error: a[3],
             ng: Vec3x8::new(a[4], a[5], a[6]),
             material: a[7].to_bits(),
+            media,
             ns: Vec3x8::new(b[0], b[1], b[2]),
             wo: Vec3x8::new(b[3], b[4], b[5]),
-            path: Path8 { root: b[6].to_bits(), record: e[1].to_bits(), depth: b[7].to_bits() },
+            path: Path8 { root: b[6].to_bits(), record: e[1].to_bits(), depth },
             beta: Vec3x8::new(d[0], d[1], d[2]),
             reflectance: Vec3x8::new(d[3], d[4], d[5]),
             key: Key8 { lo: d[6].to_bits(), hi: d[7].to_bits() },
@@ -147,26 +189,12 @@ impl PathVertex8 {
 
     /// The eight lanes as records.
     pub(crate) fn records(&self) -> [PathVertex; 8] {
-        let mut out: [PathVertex; 8] = Zeroable::zeroed();
-        for (r, columns) in self.columns().into_iter().enumerate() {
-            for (v, row) in out.iter_mut().zip(F32x8::transpose(columns)) {
-                v.rows[r] = row.to_array();
-            }
-        }
-        out
+        PathVertex::of_columns(self.columns())
     }
 
     /// Loads one record per lane.
     pub(crate) fn from_records(v: [&PathVertex; 8]) -> Self {
-        let mut columns = [[F32x8::ZERO; 8]; 4];
-        for (r, c) in columns.iter_mut().enumerate() {
-            let mut rows = [F32x8::ZERO; 8];
-            for (row, v) in rows.iter_mut().zip(v) {
-                *row = F32x8::new(v.rows[r]);
-            }
-            *c = F32x8::transpose(rows);
-        }
-        Self::from_columns(columns)
+        Self::from_columns(PathVertex::columns(v))
     }
 }
 
@@ -199,7 +227,8 @@ mod tests {
             beta: v3(14),
             reflectance: v3(17),
             material: u(20),
-            path: Path8 { root: u(21), record: u(28), depth: u(24) },
+            media: MediaSet8::unpack(u(24) << 8).0,
+            path: Path8 { root: u(21), record: u(28), depth: U32x8::from_fn(|i| 93 + i as u32) },
             key: Key8 { lo: u(22), hi: u(23) },
             albedo_product: f(25),
             samples: u(26),
@@ -224,6 +253,7 @@ mod tests {
             assert_eq!(back.bin.lane(i), v.bin.lane(7 - i));
             assert_eq!(back.error_weight.lane(i), v.error_weight.lane(7 - i));
             assert_eq!(back.path.lane(i), v.path.lane(7 - i));
+            assert_eq!(back.media.met().lane(i), v.media.met().lane(7 - i));
         }
     }
 }

@@ -26,6 +26,10 @@ kinds! {
     FirstDiffuse;
     /// All other first vertices of a path. Their values are in units of their pixel.
     FirstGlossy;
+    /// Vertices in media behind the first, keyed by the viewing direction.
+    Medium;
+    /// First vertices of a path in media. Their values are in units of their pixel.
+    FirstMedium;
 }
 
 /// Kinds of eight vertices. No lane can hold anything but a row of [`VertexKind::ALL`], so look-ups need no check.
@@ -43,12 +47,15 @@ impl VertexKind8 {
         Self(U32x8::from_fn(|i| f(i) as u32))
     }
 
-    /// Kinds by what sets them apart: vertices of diffuse materials, and first vertices of a path.
+    /// Kinds by what sets them apart: vertices of diffuse materials, in media, and first vertices of a path.
     #[inline(always)]
-    pub fn of(diffuse: Mask8, first: Mask8) -> Self {
-        let by_material = |a: VertexKind, b: VertexKind| U32x8::select(diffuse, Self::splat(a).0, Self::splat(b).0);
-        let at_first = by_material(VertexKind::FirstDiffuse, VertexKind::FirstGlossy);
-        Self(U32x8::select(first, at_first, by_material(VertexKind::Diffuse, VertexKind::Glossy)))
+    pub fn of(diffuse: Mask8, in_medium: Mask8, first: Mask8) -> Self {
+        let of = |diffuse_kind: VertexKind, medium: VertexKind, glossy: VertexKind| {
+            let surface = U32x8::select(diffuse, Self::splat(diffuse_kind).0, Self::splat(glossy).0);
+            U32x8::select(in_medium, Self::splat(medium).0, surface)
+        };
+        let at_first = of(VertexKind::FirstDiffuse, VertexKind::FirstMedium, VertexKind::FirstGlossy);
+        Self(U32x8::select(first, at_first, of(VertexKind::Diffuse, VertexKind::Medium, VertexKind::Glossy)))
     }
 
     /// Number of each lane's octree.
@@ -69,10 +76,19 @@ mod tests {
             assert_eq!(*kind as usize, i);
         }
         let (diffuse, first) = (Mask8::from_bits(0b0101), Mask8::from_bits(0b0011));
-        let found = VertexKind8::of(diffuse, first).octree().to_array();
-        let expected = [VertexKind::FirstDiffuse, VertexKind::FirstGlossy, VertexKind::Diffuse, VertexKind::Glossy]
-            .map(|k| k as u32);
-        assert_eq!(found[..4], expected);
+        let in_medium = Mask8::from_bits(0b11_0000);
+        let found = VertexKind8::of(diffuse, in_medium, first | Mask8::from_bits(0b1_0000)).octree().to_array();
+
+        let expected = [
+            VertexKind::FirstDiffuse,
+            VertexKind::FirstGlossy,
+            VertexKind::Diffuse,
+            VertexKind::Glossy,
+            VertexKind::FirstMedium,
+            VertexKind::Medium,
+        ]
+        .map(|k| k as u32);
+        assert_eq!(found[..6], expected);
         assert_eq!(VertexKind8::from_fn(|i| VertexKind::ALL[i & 3]).octree().to_array()[5], VertexKind::Glossy as u32);
     }
 }

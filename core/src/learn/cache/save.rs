@@ -26,12 +26,12 @@ use core::fmt;
 /// First bytes of a saved cache.
 const MAGIC: u64 = u64::from_le_bytes(*b"CRPCACHE");
 /// Version of the format, which covers the layout of the sums too.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 /// Largest sum that is accepted: sums of such files, and squares of their means, stay finite.
 const MAX_SUM: f64 = 1e100;
 
 // Any of these is part of the layout: another number of octrees, bins or sums needs another version.
-const _: () = assert!(VERSION == 4 && ROOTS == 4 && BINS == 16 && size_of::<BinSums>() == 15 * 8);
+const _: () = assert!(VERSION == 5 && ROOTS == 6 && BINS == 16 && size_of::<BinSums>() == 15 * 8);
 
 const HEADER: usize = size_of::<Header>();
 const LEAF_BYTES: usize = BINS * size_of::<BinSums>();

@@ -1,0 +1,151 @@
+//! Stage `pass`: rays that go straight on through what they meet: boundaries of media, thin sheets, holes of cut-outs.
+//!
+//! Such a passage is no vertex: it has no factor of roulette, adds no segment, and the ray keeps the density of the bounce
+//! that it began with, so that the weight against light samples stays right, which see through the same things
+//! ([`super::occlude`]). The rays wait in the ring, a record each, and go on in a packet of their kind.
+
+use super::book::Bookkeeping;
+use super::class::PacketClass;
+use super::media_set::{MediaSet8, media_behind};
+use super::packets::{RayKind, RayState8};
+use super::path::Path8;
+use super::ring::{Ring, Taken8};
+use super::shading::Arrival8;
+use super::vertex::{PathVertex, pack_samples};
+use crate::geometry::{self, Ray8, SurfaceHit8};
+use crate::rng::Key8;
+use crate::world::World;
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+
+impl RayState8 {
+    /// The lanes as records that wait: [`PathVertex::of_columns`], with root, depth, record and samples at the places of a
+    /// vertex.
+    fn columns(&self) -> [[F32x8; 8]; 4] {
+        let f = F32x8::from_bits;
+        let (o, d, n) = (self.ray.o, self.ray.d, self.normal);
+        // densities are never negative
+        let pdf = self.skip_mis.select(F32x8::splat(-1.0), self.pdf);
+        let one_sample = f(U32x8::splat(pack_samples(1, 0)));
+        [
+            [o.x, o.y, o.z, self.travelled, n.x, n.y, n.z, pdf],
+            [
+                d.x,
+                d.y,
+                d.z,
+                self.from.x,
+                self.from.y,
+                self.from.z,
+                f(self.path.root),
+                f(self.media.pack(self.path.depth)),
+            ],
+            [
+                self.beta.x,
+                self.beta.y,
+                self.beta.z,
+                self.weight.x,
+                self.weight.y,
+                self.weight.z,
+                f(self.key.lo),
+                f(self.key.hi),
+            ],
+            [
+                self.albedo_product,
+                f(self.path.record),
+                one_sample,
+                F32x8::ZERO,
+                F32x8::ZERO,
+                self.error_weight.x,
+                self.error_weight.y,
+                self.error_weight.z,
+            ],
+        ]
+    }
+
+    /// Rays from their records.
+    fn from_columns(c: [[F32x8; 8]; 4], active: Mask8) -> Self {
+        let [a, b, d, e] = c;
+        let (media, depth) = MediaSet8::unpack(b[7].to_bits());
+        Self {
+            active,
+            ray: Ray8::unbounded(Vec3x8::new(a[0], a[1], a[2]), Vec3x8::new(b[0], b[1], b[2])),
+            kind: RayKind::Straight,
+            from: Vec3x8::new(b[3], b[4], b[5]),
+            normal: Vec3x8::new(a[4], a[5], a[6]),
+            travelled: a[3],
+            media,
+            beta: Vec3x8::new(d[0], d[1], d[2]),
+            weight: Vec3x8::new(d[3], d[4], d[5]),
+            pdf: a[7],
+            skip_mis: a[7].lt(F32x8::ZERO),
+            path: Path8 { root: b[6].to_bits(), record: e[1].to_bits(), depth },
+            key: Key8 { lo: d[6].to_bits(), hi: d[7].to_bits() },
+            albedo_product: e[0],
+            error_weight: Vec3x8::new(e[5], e[6], e[7]),
+        }
+    }
+}
+
+/// The rays that were just taken out of the ring.
+#[inline(never)]
+pub(crate) fn straight_rays(ring: &Ring<'_>, taken: &Taken8) -> RayState8 {
+    RayState8::from_columns(PathVertex::columns(ring.records(taken)), Mask8::first(taken.lanes))
+}
+
+/// Lets the rays of `lanes` wait at the points `o`, `distance` from their last vertices, within `media`.
+#[inline(never)]
+pub(crate) fn wait(
+    ring: &mut Ring<'_>,
+    rays: &RayState8,
+    lanes: Mask8,
+    (o, distance, media): (Vec3x8, F32x8, MediaSet8),
+) {
+    let on = RayState8 {
+        ray: Ray8::unbounded(o, rays.ray.d),
+        travelled: distance,
+        media,
+        key: rays.key.straight_on(),
+        ..*rays
+    };
+    let records = PathVertex::of_columns(on.columns());
+    // the lane's share of `open` passes to the waiting ray
+    lanes.lanes().for_each(|i| ring.push(PacketClass::STRAIGHT, records[i]));
+}
+
+/// Sends those of the rays on that their surfaces let pass; returns their lanes.
+#[inline(always)]
+pub(crate) fn pass<W: World>(
+    world: &W,
+    book: &mut Bookkeeping<'_>,
+    ring: &mut Ring<'_>,
+    rays: &RayState8,
+    hit: &SurfaceHit8,
+    a: &Arrival8,
+) -> Mask8 {
+    let possible = hit.mask & a.straight.gt(F32x8::ZERO);
+    if possible.none() {
+        return Mask8::NONE;
+    }
+    let passed = possible & rays.key.straight().lt(a.straight);
+    let (v, d) = (&a.vertex, rays.ray.d);
+    let media = across(world, rays.media, hit, v.ng, d, passed);
+    wait(ring, rays, passed, (geometry::offset(v.p, v.ng, v.error, d), hit.t, media));
+    book.counters.passed.count(passed.count());
+    passed
+}
+
+/// The media behind the surfaces of `hit`, which rays of directions `d` pass in the lanes of `passed`.
+#[inline(always)]
+pub(crate) fn across<W: World>(
+    world: &W,
+    media: MediaSet8,
+    hit: &SurfaceHit8,
+    ng: Vec3x8,
+    d: Vec3x8,
+    passed: Mask8,
+) -> MediaSet8 {
+    let scene = world.scene();
+    if scene.media.is_empty() {
+        return media;
+    }
+    media.across(&media_behind(scene, &hit.material), d.dot(ng).lt(F32x8::ZERO), passed)
+}
