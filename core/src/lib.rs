@@ -24,6 +24,7 @@
 //! | `bsdf` | scattering in local frames | geometry, lights |
 //! | `light` | emission and its sampling | scattering |
 //! | `rrs` | how many samples a vertex gets | where it is |
+//! | `media` | free flights and transmittance in media | surfaces, phase functions, which medium a path is in |
 //! | `film` | sums per pixel and their error | paths |
 //! | `denoise` | pictures and their errors | paths, films but for one copy |
 //! | `setting` | settings by name and text | what they set |
@@ -158,7 +159,7 @@ pub mod unstable {
     pub mod light {
         pub use crate::light::*;
     }
-    /// Participating media.
+    /// Free flights and transmittance in participating media.
     pub mod media {
         pub use crate::media::*;
     }

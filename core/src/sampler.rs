@@ -15,6 +15,18 @@ const SHADOW_BLOCK: u32 = 2;
 /// Dimension blocks of a vertex's key.
 const STRAIGHT_BLOCK: u32 = 0;
 
+/// Dimension blocks of the key of a segment through a medium: of flights, two steps each, then one for the roulette.
+const FLIGHT_BLOCK: u32 = 16;
+const FLIGHT_ROULETTE_BLOCK: u32 = FLIGHT_BLOCK + MAX_FLIGHT_STEPS / 2;
+/// Of transmittances, four steps each, then as many for the roulette.
+const TRANSMITTANCE_BLOCK: u32 = FLIGHT_ROULETTE_BLOCK + 1;
+const TRANSMITTANCE_ROULETTE_BLOCK: u32 = TRANSMITTANCE_BLOCK + MAX_TRANSMITTANCE_STEPS / 4;
+
+/// Most steps of a flight through a medium with one key.
+pub(crate) const MAX_FLIGHT_STEPS: u32 = 64;
+/// Most steps of a transmittance.
+pub(crate) const MAX_TRANSMITTANCE_STEPS: u32 = 4096;
+
 impl Key8 {
     /// Position in the pixel (two numbers) and on the lens (two).
     #[inline(always)]
@@ -65,6 +77,38 @@ impl Key8 {
     #[inline(always)]
     pub(crate) fn straight_on(self) -> Self {
         self.child(U32x8::splat(u32::MAX))
+    }
+
+    /// Steps 2 `pair` and 2 `pair` + 1 of a flight through a medium: each the words of an optical depth and of a choice.
+    #[inline(always)]
+    pub(crate) fn flight_steps(self, pair: u32) -> [[U32x8; 2]; 2] {
+        let [a, b, c, d] = self.words(FLIGHT_BLOCK + pair);
+        [[a, b], [c, d]]
+    }
+
+    /// Roulette at the end of a flight's steps.
+    #[inline(always)]
+    pub(crate) fn flight_roulette(self) -> F32x8 {
+        let [u, ..] = self.uniforms(FLIGHT_ROULETTE_BLOCK);
+        u
+    }
+
+    /// Words of the optical depths of steps 4 `four` to 4 `four` + 3 of a transmittance.
+    #[inline(always)]
+    pub(crate) fn transmittance_steps(self, four: u32) -> [U32x8; 4] {
+        self.words(TRANSMITTANCE_BLOCK + four)
+    }
+
+    /// Roulette after a step of a transmittance.
+    #[inline(always)]
+    pub(crate) fn transmittance_roulette(self, step: u32) -> F32x8 {
+        let [a, b, c, d] = self.uniforms(TRANSMITTANCE_ROULETTE_BLOCK + step / 4);
+        match step % 4 {
+            0 => a,
+            1 => b,
+            2 => c,
+            _ => d,
+        }
     }
 
     /// Offset of a vertex's look-up in the cache, three numbers: the bits of the key itself, of which everything that

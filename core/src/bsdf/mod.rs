@@ -2,9 +2,9 @@
 //! path goes on (or to the light). All directions are unit vectors. Radiance transport: transmission into a medium of
 //! relative index eta scales radiance by 1 / eta^2.
 //!
-//! One model per file; [`dispatch`] is the table of them. Reflecting models return nothing for `wo.z <= 0` or
-//! `wi.z <= 0`; the dielectrics and the null boundary take both sides. Lanes that hold NaN scatter nothing and never
-//! touch their neighbours.
+//! One model per file; [`dispatch`] is the table of those that materials have. [`HenyeyGreenstein`], the phase function
+//! of media, is none of them. Reflecting models return nothing for `wo.z <= 0` or `wi.z <= 0`; the dielectrics and the
+//! null boundary take both sides. Lanes that hold NaN scatter nothing and never touch their neighbours.
 
 mod conductor;
 mod dielectric;

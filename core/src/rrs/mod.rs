@@ -4,7 +4,8 @@
 //! E\[n\] = s. Every estimate is divided by `s`, never by `n`, so it is unbiased for any positive `s` that was fixed
 //! before the samples were drawn (EARS, SIGGRAPH 2022, eq. 10). How `s` is learned: docs/LEARNING.md.
 //!
-//! A new strategy is one file and one line in the table below.
+//! A new strategy is one file and one line in the table below. Choices among unlike terms, such as scattering or
+//! passing in a medium, are [`select`]'s.
 
 mod adrr;
 mod adrrs;
@@ -19,6 +20,7 @@ mod fixed;
 mod learned;
 mod light;
 mod none;
+mod selection;
 mod threshold;
 mod throughput;
 mod winners;
@@ -35,6 +37,7 @@ pub use ears::Ears;
 pub use fixed::Fixed;
 pub use learned::{Learned8, Local8, Norm, Space};
 pub use none::None;
+pub use selection::{Selection8, select};
 pub use threshold::Threshold;
 pub use throughput::Throughput;
 pub use winners::Winners;
