@@ -441,10 +441,25 @@ impl Visitor<'static> for Boxed {
                 self.0.eval(wo, wi)
             }
             fn sample(&self, wo: Vec3x8, u: [F32x8; 3]) -> Sample8 {
-                self.0.sample(wo, u)
+                // as the tracer: what passes straight on is chosen first
+                let straight = self.0.straight(wo);
+                let passes = u[2].lt(straight);
+                let rest = F32x8::ZERO.max((u[2] - straight) / (1.0 - straight));
+                let rest = F32x8::splat(1.0 - f32::EPSILON).min(straight.gt(F32x8::ZERO).select(rest, u[2]));
+                let s = self.0.sample(wo, [u[0], u[1], rest]);
+                Sample8 {
+                    wi: Vec3x8::select(passes, -wo, s.wi),
+                    weight: Vec3x8::select(passes, Vec3x8::ONE, s.weight),
+                    pdf: passes.select(F32x8::ZERO, s.pdf),
+                    delta: s.delta | passes,
+                    valid: s.valid | passes,
+                }
             }
             fn albedo(&self, wo: Vec3x8) -> Vec3x8 {
                 self.0.albedo(wo)
+            }
+            fn straight(&self, wo: Vec3x8) -> F32x8 {
+                self.0.straight(wo)
             }
         }
         Box::new(Holder(B::gather(&self.scene, &self.inputs, self.active)))
@@ -457,10 +472,12 @@ pub trait Model {
     fn delta_only(&self) -> bool;
     /// [`Bsdf::eval`].
     fn eval(&self, wo: Vec3x8, wi: Vec3x8) -> Eval8;
-    /// [`Bsdf::sample`].
+    /// [`Bsdf::sample`], with what passes straight on as one more lobe: the number that chooses the lobe chooses it.
     fn sample(&self, wo: Vec3x8, u: [F32x8; 3]) -> Sample8;
     /// [`Bsdf::albedo`].
     fn albedo(&self, wo: Vec3x8) -> Vec3x8;
+    /// [`Bsdf::straight`].
+    fn straight(&self, wo: Vec3x8) -> F32x8;
 }
 
 /// Every model with parameter sets from narrow to wide and from weak to strong contrast.

@@ -122,7 +122,12 @@ fn first_hits_have_their_albedo() {
             let scene = quad_in_white_environment(*model, false, degrees);
             let image = render(&scene, &Settings { aovs: true, max_depth: 2, ..settings(&scene, "none") }, 16);
             let hits: f64 = image.aovs.iter().map(|a| a.hits).sum();
-            assert_eq!(hits, 256.0);
+            // what passes straight on is no hit, and the rest of a thin sheet is a mirror
+            let straight = matches!(case.kind, MaterialKind::ThinDielectric | MaterialKind::Null);
+            assert!(if straight { hits < 128.0 } else { hits == 256.0 }, "{}: {hits} hits", case.name());
+            if case.kind == MaterialKind::Null || hits == 0.0 {
+                continue;
+            }
             for (c, want) in expected.into_iter().enumerate() {
                 let found = image.aovs.iter().map(|a| a.albedo[c]).sum::<f64>() / hits;
                 let what =

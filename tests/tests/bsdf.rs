@@ -188,6 +188,8 @@ fn lobes_are_as_stated() {
                     let reflects = f64::from(s.wi.lane(l)[2]) * wo[2] > 0.0;
                     seen = seen.with(if reflects { Lobes::REFLECTION } else { Lobes::TRANSMISSION });
                     seen = seen.with(if s.delta.lane(l) { Lobes::SPECULAR } else { Lobes::DIFFUSE });
+                    let straight = model.straight(splat(wo)).lane(l) > 0.0;
+                    seen = if straight { seen.with(Lobes::STRAIGHT) } else { seen };
                 }
             }
         }

@@ -37,8 +37,9 @@ impl Bsdf<'_> for ThinDielectric {
     /// 1 - R'.
     #[inline(always)]
     fn straight(&self, wo: Vec3x8) -> F32x8 {
-        let r = fresnel::dielectric(wo.z.abs(), self.0).reflectance;
-        1.0 - (r + r) / (1.0 + r)
+        let cos = wo.z.abs();
+        let r = fresnel::dielectric(cos, self.0).reflectance;
+        cos.gt(F32x8::ZERO).zero_unless(1.0 - (r + r) / (1.0 + r))
     }
 
     /// 1: no energy is lost.

@@ -1,13 +1,10 @@
 //! The media that paths are inside of: a bit each, so that media may be nested, overlap and touch. The lowest index is
 //! the medium that a path meets (see [`crate::scene::blob::Medium`]).
 
-use super::class::Kernel;
-use super::packets::Samples8;
 use crate::accel::Intersector;
 use crate::geometry::{self, Ray8, SurfaceHit8};
+use crate::scene::Scene;
 use crate::scene::blob::{MAX_MEDIA, NONE};
-use crate::scene::{Effects, Scene};
-use crate::world::World;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Eight sets of media.
@@ -77,18 +74,6 @@ impl MediaSet8 {
         let set = U32x8::select(inwards, self.0 | bits, self.0 & !bits);
         Self(U32x8::select(crossing, set, self.0))
     }
-}
-
-/// The media around rays that leave the vertices of `samples` in the directions `wi`.
-#[inline(always)]
-pub(crate) fn media_towards<W: World>(world: &W, samples: &Samples8, wi: Vec3x8) -> MediaSet8 {
-    let (v, scene) = (&samples.vertex, world.scene());
-    let surface = matches!(samples.class.kernel(), Kernel::Surface(_));
-    if !W::EFFECTS.contains(Effects::MEDIA) || !surface || scene.media.is_empty() {
-        return v.media;
-    }
-    let inwards = wi.dot(v.ng).lt(F32x8::ZERO);
-    v.media.across(&media_behind(scene, &v.material.to_array()), inwards, samples.active)
 }
 
 /// Most surfaces that are looked at on the way out of the scene.

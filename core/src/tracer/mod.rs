@@ -23,6 +23,7 @@ mod book;
 mod cache_key;
 mod camera_rays;
 mod class;
+mod crossing;
 mod emission;
 mod free_list;
 mod job;

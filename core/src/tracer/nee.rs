@@ -2,7 +2,7 @@
 //! roulette for its shadow ray.
 
 use super::book::Bookkeeping;
-use super::media_set::media_towards;
+use super::crossing::media_towards;
 use super::packets::{Contribution8, Samples8, ShadowRays8};
 use crate::bsdf::Eval8;
 use crate::geometry::{self, Ray8};

@@ -2,8 +2,8 @@
 //! and gather a transmittance.
 
 use super::book::Bookkeeping;
+use super::crossing::across;
 use super::packets::ShadowRays8;
-use super::passing::across;
 use super::shading::{may_pass, straight_share};
 use crate::accel::Intersector;
 use crate::cost::COST_SHADOW;

@@ -6,7 +6,8 @@
 
 use super::book::Bookkeeping;
 use super::class::PacketClass;
-use super::media_set::{MediaSet8, media_behind};
+use super::crossing::across;
+use super::media_set::MediaSet8;
 use super::packets::{RayKind, RayState8};
 use super::path::Path8;
 use super::ring::{Ring, Taken8};
@@ -131,21 +132,4 @@ pub(crate) fn pass<W: World>(
     wait(ring, rays, passed, (geometry::offset(v.p, v.ng, v.error, d), hit.t, media));
     book.counters.passed.count(passed.count());
     passed
-}
-
-/// The media behind the surfaces of `hit`, which rays of directions `d` pass in the lanes of `passed`.
-#[inline(always)]
-pub(crate) fn across<W: World>(
-    world: &W,
-    media: MediaSet8,
-    hit: &SurfaceHit8,
-    ng: Vec3x8,
-    d: Vec3x8,
-    passed: Mask8,
-) -> MediaSet8 {
-    let scene = world.scene();
-    if scene.media.is_empty() {
-        return media;
-    }
-    media.across(&media_behind(scene, &hit.material), d.dot(ng).lt(F32x8::ZERO), passed)
 }

@@ -1,7 +1,7 @@
 //! Stage `scatter`: one BSDF sample per lane, and the BSDF's value towards the light samples. All lanes run one kernel.
 
 use super::class::Kernel as ClassKernel;
-use super::media_set::media_towards;
+use super::crossing::media_towards;
 use super::packets::{RayKind, RayState8, Samples8};
 use crate::bsdf::{self, Bsdf, Eval8, HenyeyGreenstein, Inputs8, Sample8, Visitor};
 use crate::geometry::{self, Ray8};
