@@ -257,6 +257,43 @@ impl Parts {
         parts
     }
 
+    /// The tiny scene with a dielectric floor over a homogeneous medium and an emitting quad of null material over a
+    /// grid of 6 x 3 x 5 cells. Neither boundary is closed, which blobs do not promise.
+    pub fn smoky() -> Self {
+        let mut parts = Self::tiny();
+        let colours = Medium {
+            sigma_a: [0.1, 0.2, 0.3],
+            sigma_s: [1.0, 0.0, 2.0],
+            emission: [0.0, 0.5, 0.0],
+            g: -0.5,
+            ..Medium::zeroed()
+        };
+        let cells = [6u32, 3, 5];
+        let box_of_grid = ([-1.0, -0.5, -1.0], [1.0, 0.5, 1.0]);
+        let grid = Medium {
+            kind: MediumKind::Grid as u32,
+            bounds_min: box_of_grid.0,
+            bounds_max: box_of_grid.1,
+            cells,
+            first_density: 2,
+            first_majorant: 1,
+            ..colours
+        };
+        parts.media = vec![colours, grid];
+        // Values that no grid owns may be anything.
+        parts.densities = vec![f32::NAN, -1.0];
+        parts.densities.extend((0..cells.iter().product()).map(|i| ((i * 37) % 101) as f32 / 64.0));
+        parts.densities.push(f32::INFINITY);
+        parts.majorants = vec![f32::NAN];
+        parts.majorants.extend(majorants(cells, &parts.densities[2..]));
+        parts.materials[MaterialKind::Dielectric as usize].medium = 0;
+        parts.materials[MaterialKind::Null as usize].medium = 1;
+        for (i, t) in parts.triangles.iter_mut().enumerate() {
+            t.material = if i < 2 { MaterialKind::Dielectric } else { MaterialKind::Null } as u32;
+        }
+        parts
+    }
+
     /// The tiny scene without triangles and lights.
     pub fn empty() -> Self {
         let mut parts = Self::tiny();
@@ -342,6 +379,29 @@ impl Parts {
 
 /// A child reference and its box.
 type Reference = (u32, [[f32; 3]; 2]);
+
+/// The least majorants of a grid: every cell raises those of the bricks that hold one of its neighbours or itself.
+pub fn majorants(cells: [u32; 3], densities: &[f32]) -> Vec<f32> {
+    let bricks = cells.map(|n| n.div_ceil(BRICK));
+    let mut largest = vec![0.0f32; bricks.iter().product::<u32>() as usize];
+    let steps = || (0..27i64).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);
+    for (i, density) in (0..cells.iter().product::<u32>()).zip(densities) {
+        let cell = [i % cells[0], i / cells[0] % cells[1], i / (cells[0] * cells[1])];
+        for step in steps() {
+            let near: [i64; 3] = core::array::from_fn(|axis| i64::from(cell[axis]) + step[axis]);
+            if (0..3).all(|axis| (0..i64::from(cells[axis])).contains(&near[axis])) {
+                let [x, y, z] = near.map(|n| n as u32 / BRICK);
+                let most = &mut largest[((z * bricks[1] + y) * bricks[0] + x) as usize];
+                *most = most.max(*density);
+            }
+        }
+    }
+    let inflated = |most: f32| {
+        let exact = f64::from(most) * f64::from(MAJORANT_MARGIN);
+        if f64::from(exact as f32) < exact { (exact as f32).next_up() } else { exact as f32 }
+    };
+    largest.into_iter().map(inflated).collect()
+}
 
 /// An alias table by the two-stack method (Vose 1991) in exact integers; some weight must be above 0.
 pub fn alias(weights: &[u32]) -> Vec<Alias> {

@@ -25,6 +25,8 @@ pub fn everything(scene: &Scene<'_>) -> usize {
         steps += 1;
     }
     scene.materials.iter().for_each(|m| material(scene, m));
+    assert!(scene.media.len() <= MAX_MEDIA);
+    scene.media.iter().for_each(|m| medium(scene, m));
     pick(scene.light_alias);
     for l in scene.lights {
         assert!(l.emission.iter().all(|x| x.is_finite() && *x >= 0.0));
@@ -85,6 +87,28 @@ fn material(scene: &Scene<'_>, m: &Material) {
     if m.texture != NONE {
         let t = &scene.textures[m.texture as usize];
         let _ = scene.texels[(t.first + (t.height - 1) * t.width + t.width - 1) as usize];
+    }
+    if m.medium != NONE {
+        let _ = scene.media[m.medium as usize];
+    }
+}
+
+/// The corners of a medium's grid, and the majorants there.
+fn medium(scene: &Scene<'_>, m: &Medium) {
+    let sigma_t = (0..3).map(|c| m.sigma_a[c] + m.sigma_s[c]).fold(0.0, f32::max);
+    assert!(sigma_t.is_finite());
+    if m.kind == MediumKind::Homogeneous as u32 {
+        return;
+    }
+    assert_eq!(m.kind, MediumKind::Grid as u32);
+    let value = |values: &[f32], first: u32, n: [u32; 3], at: [u32; 3]| {
+        values[first as usize + ((at[2] * n[1] + at[1]) * n[0] + at[0]) as usize]
+    };
+    for corner in 0..8 {
+        let cell: [u32; 3] = core::array::from_fn(|axis| if corner >> axis & 1 == 0 { 0 } else { m.cells[axis] - 1 });
+        let density = value(scene.densities, m.first_density, m.cells, cell);
+        let majorant = value(scene.majorants, m.first_majorant, m.bricks(), cell.map(|i| i / BRICK));
+        assert!(density >= 0.0 && density <= majorant && (majorant * sigma_t).is_finite());
     }
 }
 

@@ -442,11 +442,6 @@ fn every_wrong_input_is_told_where() {
             "",
             &["emitters[1]", "already an environment"],
         ),
-        (
-            scene(json(M, ", \"media\": [{\"name\": \"fog\", \"type\": \"homogeneous\"}]")),
-            "",
-            &["scene.json", "media[0]", "medium `fog`", "not supported yet"],
-        ),
         (scene(json(M, ", \"transport\": {\"max_depth\": -1}")), "", &["transport.max_depth", "whole number"]),
     ];
     for (files, path, parts) in cases {

@@ -192,7 +192,7 @@ fn every_fault_of_the_records_has_its_error() {
     ];
     let materials: &[Corruption] = &[
         (|p| p.materials[3].kind = KINDS, SceneError::Kind { of: S::Materials, index: 3, found: KINDS }),
-        (|p| p.materials[3].flags = 2, SceneError::Reserved { of: S::Materials, index: 3 }),
+        (|p| p.materials[3].flags = 8, SceneError::Reserved { of: S::Materials, index: 3 }),
         (
             |p| p.materials[3].medium = 0,
             SceneError::Reference { of: S::Materials, index: 3, to: S::Media, found: 0, count: 0 },
@@ -440,7 +440,7 @@ fn every_fault_of_the_frame_has_its_error() {
     let mut bare = Blob::new(&good.bytes()[..64]);
     bare.header(|h| h.length = 64);
     bare.rehash();
-    expect("no table", &bare, SceneError::Truncated { needed: 64 + 16 * 24, given: 64 });
+    expect("no table", &bare, SceneError::Truncated { needed: 64 + 19 * 24, given: 64 });
     bare.header(|h| h.sections = 0);
     expect("no sections", &bare, count(S::Info, 0));
     let mut flipped = good.clone();
@@ -454,17 +454,17 @@ fn every_fault_of_the_frame_has_its_error() {
         b
     };
     let section = |kind, fault| SceneError::Section { kind, fault };
-    expect("kind", &entry(4, |s| s.kind = 16), SceneError::UnknownSection(16));
+    expect("kind", &entry(4, |s| s.kind = 19), SceneError::UnknownSection(19));
     expect("twice", &entry(4, |s| s.kind = 3), section(S::Triangles, SectionFault::Repeated));
     expect("stride", &entry(4, |s| s.stride = 16), section(S::Vertices, SectionFault::Stride(16)));
     expect("stride 0", &entry(4, |s| s.stride = 0), section(S::Vertices, SectionFault::Stride(0)));
     expect("in the table", &entry(0, |s| s.offset = 384), section(S::Info, SectionFault::Offset(384)));
-    expect("off the grid", &entry(15, |s| s.offset += 4), {
-        section(S::Names, SectionFault::Offset(table(&good)[15].offset + 4))
+    expect("off the grid", &entry(18, |s| s.offset += 4), {
+        section(S::Names, SectionFault::Offset(table(&good)[18].offset + 4))
     });
-    expect("beyond the end", &entry(15, |s| s.count += 1), count(S::Names, table(&good)[15].count + 1));
-    expect("overflow", &entry(15, |s| s.count = u64::MAX), count(S::Names, u64::MAX));
-    expect("offset overflow", &entry(15, |s| s.offset = u64::MAX - 63), count(S::Names, table(&good)[15].count));
+    expect("beyond the end", &entry(18, |s| s.count += 1), count(S::Names, table(&good)[18].count + 1));
+    expect("overflow", &entry(18, |s| s.count = u64::MAX), count(S::Names, u64::MAX));
+    expect("offset overflow", &entry(18, |s| s.offset = u64::MAX - 63), count(S::Names, table(&good)[18].count));
     expect("more than 31 bits", &entry(4, |s| (s.stride, s.count) = (0, 1 << 31)), count(S::Vertices, 1 << 31));
     let mut overlapping = good.clone();
     let offset = table(&good)[3].offset;
@@ -473,7 +473,7 @@ fn every_fault_of_the_frame_has_its_error() {
 }
 
 fn table(blob: &Blob) -> &[Section] {
-    bytemuck::cast_slice(&blob.bytes()[64..64 + 16 * size_of::<Section>()])
+    bytemuck::cast_slice(&blob.bytes()[64..64 + 19 * size_of::<Section>()])
 }
 
 /// The message names the object, its index and the number. Killed by: leaving one of them out.
@@ -484,7 +484,7 @@ fn messages_name_object_index_and_number() {
         (reference(SectionKind::Triangles, 5, SectionKind::Materials, 9, 3), ["triangles[5]", "materials[9]", "3"]),
         (child(12, 3, ChildFault::Outside(2.5)), ["nodes[12]", "child 3", "2.5"]),
         (slot(12, 3, SlotFault::Vertex(2.5)), ["leaves[12]", "slot 3", "2.5"]),
-        (SceneError::Version(9), ["version 9", "version 2", "blob"]),
+        (SceneError::Version(9), ["version 9", "version 3", "blob"]),
         (SceneError::Truncated { needed: 90, given: 12 }, ["90", "12", "bytes"]),
     ];
     for (e, parts) in messages {
@@ -556,7 +556,7 @@ proptest! {
     /// Killed by: dropping any range check of an index.
     #[test]
     fn flipped_bits_with_a_valid_hash_do_no_harm(flips in prop::collection::vec((0usize..1 << 20, 0u32..32), 1..4)) {
-        let mut b = Parts::tiny().blob();
+        let mut b = Parts::smoky().blob();
         let words = (b.bytes().len() - 64) / 4;
         for (word, bit) in flips {
             b.bytes_mut()[64 + word % words * 4 + bit as usize / 8] ^= 1 << (bit % 8);
@@ -570,7 +570,7 @@ proptest! {
     /// Words replaced by telling numbers: small, huge, all ones, NaN, infinities.
     #[test]
     fn hostile_words_do_no_harm(edits in prop::collection::vec((0usize..1 << 20, hostile()), 1..4)) {
-        let mut b = Parts::tiny().blob();
+        let mut b = Parts::smoky().blob();
         let words = (b.bytes().len() - 64) / 4;
         for (word, x) in edits {
             let at = 64 + word % words * 4;
@@ -585,7 +585,7 @@ proptest! {
     /// Killed by: unchecked sums or products in `Sections`.
     #[test]
     fn hostile_section_tables_do_no_harm(
-        edits in prop::collection::vec((0usize..16, 0u32..20, 0u32..5, hostile(), hostile(), any::<bool>()), 1..6),
+        edits in prop::collection::vec((0usize..19, 0u32..23, 0u32..5, hostile(), hostile(), any::<bool>()), 1..6),
         sections in 0u32..40,
     ) {
         let mut b = Parts::tiny().blob();

@@ -42,6 +42,19 @@ pub enum Field {
     FocusDistance,
     /// Volume spanned by the camera's three axes over the product of their lengths, away from 0.
     ImagePlane,
+    /// Absorption coefficient, 0 to [`super::blob::MAX_COEFFICIENT`].
+    Absorption,
+    /// Scattering coefficient, 0 to [`super::blob::MAX_COEFFICIENT`].
+    Scattering,
+    /// Mean cosine of a phase function, as a magnitude up to [`super::blob::MAX_ANISOTROPY`].
+    Anisotropy,
+    /// Cells of a grid along one axis, 1 to [`super::blob::MAX_SIDE`].
+    Cells,
+    /// Density of a grid, 0 to [`super::blob::MAX_COEFFICIENT`].
+    Density,
+    /// Majorant, from [`super::blob::MAJORANT_MARGIN`] times the largest density that it covers to
+    /// [`super::blob::MAX_MAJORANT`].
+    Majorant,
 }
 
 impl Field {
@@ -64,6 +77,12 @@ impl Field {
             Self::LensRadius => "lens radius",
             Self::FocusDistance => "focus distance",
             Self::ImagePlane => "image plane",
+            Self::Absorption => "sigma_a",
+            Self::Scattering => "sigma_s",
+            Self::Anisotropy => "g",
+            Self::Cells => "number of cells along an axis",
+            Self::Density => "density",
+            Self::Majorant => "majorant",
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The scene blob: Pod sections in one block of bytes, validated once, read in place.
 //!
 //! [`blob`] is the layout, `sections` finds the records, `validate` proves what everything downstream relies on
-//! (`tree`, `geometry`, `materials`, `lights`, `environment`, one file each), `view` is what is left: slices.
+//! (`tree`, `geometry`, `media`, `materials`, `lights`, `environment`, one file each), `view` is what is left: slices.
 //! Caller's data is handled with checked arithmetic and checked access only.
 #![deny(clippy::arithmetic_side_effects, clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 

@@ -5,16 +5,20 @@
 //! | `geometry` | vertices, triangles, which of them are degenerate |
 //! | `materials` | materials, their tables, textures |
 //! | `lights` | lights, their choice, the environment |
+//! | `media` | participating media, their majorants |
+//! | `boundary` | nothing: checks that boundaries of media are closed |
 //! | `camera` | the camera |
 //!
 //! Degenerate triangles are dropped and counted; everything else that cannot be rendered is a [`BakeError`] that names
 //! it. What is written passes [`croupier::Scene::from_bytes`].
 
+mod boundary;
 mod camera;
 mod error;
 mod geometry;
 mod lights;
 mod materials;
+mod media;
 
 pub use error::BakeError;
 
@@ -33,7 +37,7 @@ pub struct BakeOptions {
 /// Stages of baking, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Checks vertices and triangles.
+    /// Checks vertices, triangles, media and their boundaries.
     Geometry,
     /// Builds the tree.
     Tree,
@@ -113,6 +117,8 @@ pub fn bake(
     let camera = camera::bake(&scene.camera)?;
     let emission = lights::emission_of_materials(scene)?;
     let mut geometry = geometry::bake(scene, &emission)?;
+    let media = media::bake(&scene.media)?;
+    boundary::check(scene)?;
     done(stage);
 
     let stage = staged(Stage::Tree);
@@ -164,7 +170,10 @@ pub fn bake(
         .section(SectionKind::LightAlias, &lights.alias)
         .section(SectionKind::Environment, &lights.environment)
         .section(SectionKind::EnvTexels, &lights.env_texels)
-        .section(SectionKind::EnvAlias, &lights.env_alias);
+        .section(SectionKind::EnvAlias, &lights.env_alias)
+        .section(SectionKind::Media, &media.media)
+        .section(SectionKind::Densities, &media.densities)
+        .section(SectionKind::Majorants, &media.majorants);
     report.sections = writer.sizes();
     let bytes = writer.finish();
     report.bytes = bytes.len() as u64;

@@ -36,6 +36,8 @@ pub struct SceneDescription {
     pub materials: Vec<Material>,
     /// Decoded textures.
     pub textures: Vec<Texture>,
+    /// Participating media. Where the insides of several overlap, the first of them is there alone.
+    pub media: Vec<Medium>,
     /// Lights, except the one at infinity all around.
     pub emitters: Vec<Emitter>,
     /// Environment of the scene; `None` is black.
@@ -87,6 +89,56 @@ pub struct Material {
     pub two_sided: bool,
     /// Scattering model.
     pub model: Model,
+    /// Index of the medium behind the front sides of the material's triangles; all triangles in front of one medium
+    /// together must be closed.
+    pub medium: Option<u32>,
+    /// The texture's alpha is the share of light that meets the surface, the rest passes straight on. Ignored without a
+    /// texture, and where the texture is opaque.
+    pub cutout: bool,
+    /// A rough model gives back what single scattering between its microfacets loses. Ignored by smooth models.
+    pub compensated: bool,
+}
+
+impl Material {
+    /// A material without medium, cut-outs and compensation, two-sided unless light passes it.
+    pub fn new(name: &str, model: Model) -> Self {
+        let two_sided = !model.is_transmissive();
+        Self { name: name.into(), two_sided, model, medium: None, cutout: false, compensated: false }
+    }
+}
+
+/// What fills the inside of a closed boundary. Coefficients are per unit length at density 1.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Medium {
+    /// Name in messages and scene files.
+    pub name: String,
+    /// Absorption coefficient.
+    pub sigma_a: [f32; 3],
+    /// Scattering coefficient.
+    pub sigma_s: [f32; 3],
+    /// Emitted radiance: the source per unit length is `sigma_a * emission * density`.
+    pub emission: [f32; 3],
+    /// Mean cosine of the Henyey-Greenstein phase function, positive forwards.
+    pub g: f32,
+    /// Density by position.
+    pub density: Density,
+}
+
+/// Density of a medium.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Density {
+    /// 1 everywhere inside.
+    #[default]
+    Homogeneous,
+    /// Values at the centres of the cells of a box, trilinear between them, clamped towards its sides; 0 outside.
+    Grid {
+        /// Cells along x, y, z.
+        cells: [u32; 3],
+        /// Smallest and largest corner, world space.
+        bounds: [[f32; 3]; 2],
+        /// Cell (x, y, z) is value `(z * cells[1] + y) * cells[0] + x`.
+        values: Vec<f32>,
+    },
 }
 
 /// Diffuse albedo, or scale of a specular reflection; 0 to 1 per channel.
@@ -197,7 +249,7 @@ pub struct Texture {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// `width * height` texels r, g, b, a; row 0 is the top (v = 1). Alpha is not used.
+    /// `width * height` texels r, g, b, a; row 0 is the top (v = 1). Alpha is read by cut-outs only.
     pub texels: Vec<[u8; 4]>,
 }
 
@@ -307,6 +359,7 @@ impl Default for SceneDescription {
             objects: Vec::new(),
             materials: Vec::new(),
             textures: Vec::new(),
+            media: Vec::new(),
             emitters: Vec::new(),
             environment: None,
             camera: Camera::default(),
@@ -318,7 +371,7 @@ impl Default for SceneDescription {
 impl SceneDescription {
     /// Adds a material, two-sided unless light passes it; returns its index.
     pub fn add_material(&mut self, name: &str, model: Model) -> u32 {
-        self.materials.push(Material { name: name.into(), two_sided: !model.is_transmissive(), model });
+        self.materials.push(Material::new(name, model));
         (self.materials.len() - 1) as u32
     }
 

@@ -11,6 +11,9 @@ use bytemuck::{Pod, Zeroable};
 pub const MAX_MEDIA: usize = 24;
 /// Largest coefficient of a medium, and largest density of a grid.
 pub const MAX_COEFFICIENT: f32 = 1e18;
+/// Largest majorant: room for [`MAJORANT_MARGIN`] times the largest density. Its product with the sum of two largest
+/// coefficients is 4e36, so extinction stays finite in `f32`.
+pub const MAX_MAJORANT: f32 = 2.0 * MAX_COEFFICIENT;
 /// Mean cosines of phase functions, as magnitudes.
 pub const MAX_ANISOTROPY: f32 = 0.99;
 /// Edge of a brick of the majorant grid, in cells.

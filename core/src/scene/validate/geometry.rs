@@ -1,7 +1,7 @@
 //! Vertices and triangles.
 
-use super::materials;
 use super::record::{Record, records};
+use super::{materials, media};
 use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError};
 use crate::scene::{Effects, Records};
@@ -17,7 +17,7 @@ pub(super) fn vertices(scene: &Records<'_>) -> Result<(), SceneError> {
 }
 
 /// Triangles refer to vertices, materials and lights that exist; smooth ones to unit normals. Returns the effects of
-/// the materials they use. That a light refers back is for `lights` to check.
+/// the materials they use and of the media behind them. That a light refers back is for `lights` to check.
 ///
 /// A triangle of no area is allowed: no ray hits it, so nothing divides by its area.
 pub(super) fn triangles(scene: &Records<'_>) -> Result<Effects, SceneError> {
@@ -32,7 +32,7 @@ pub(super) fn triangles(scene: &Records<'_>) -> Result<Effects, SceneError> {
             }
         }
         let material = at.follow(SectionKind::Materials, t.material, scene.materials)?;
-        effects = effects.with(materials::effects(material));
+        effects = effects.with(materials::effects(material)).with(media::effects(scene, material));
         if smooth {
             effects = effects.with(Effects::SMOOTH_NORMALS);
         }

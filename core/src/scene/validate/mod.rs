@@ -7,6 +7,7 @@ mod environment;
 mod geometry;
 mod lights;
 mod materials;
+mod media;
 mod record;
 mod tree;
 
@@ -22,6 +23,7 @@ pub(super) fn scene(scene: &Records<'_>) -> Result<Effects, SceneError> {
     let lens = camera(scene.camera)?;
     names(scene)?;
     materials::textures(scene)?;
+    media::media(scene)?;
     materials::materials(scene)?;
     geometry::vertices(scene)?;
     let surfaces = geometry::triangles(scene)?;

@@ -86,6 +86,65 @@ pub enum BakeError {
         /// Value found.
         found: f64,
     },
+    /// A material that refers to a medium that is not there.
+    MediumIndex {
+        /// Name of the material.
+        material: String,
+        /// Index found.
+        found: u32,
+        /// Number of those that exist.
+        count: usize,
+    },
+    /// A number of a medium out of range.
+    Medium {
+        /// Name of the medium.
+        medium: String,
+        /// Parameter.
+        what: &'static str,
+        /// Value found.
+        found: f32,
+        /// Range allowed.
+        range: [f32; 2],
+    },
+    /// A density grid whose cells are not those of its values, or too many.
+    Grid {
+        /// Name of the medium.
+        medium: String,
+        /// Cells along x, y, z.
+        cells: [u32; 3],
+        /// Values.
+        values: usize,
+    },
+    /// More media than a path can tell apart.
+    Media {
+        /// Count found.
+        count: usize,
+        /// Most that are allowed.
+        most: usize,
+    },
+    /// A medium without a triangle in front of it.
+    NoBoundary {
+        /// Name of the medium.
+        medium: String,
+    },
+    /// A boundary of a medium that is not closed, or not oriented alike everywhere.
+    Leak {
+        /// Name of the medium.
+        medium: String,
+        /// Object with the edge.
+        object: String,
+        /// Ends of the edge, in the order of the triangle's corners.
+        edge: [[f32; 3]; 2],
+        /// Times that triangles run along the edge in this direction, and in the other.
+        times: [u32; 2],
+    },
+    /// A closed boundary whose front sides face the medium.
+    InsideOut {
+        /// Name of the medium.
+        medium: String,
+        /// Object with the first triangle.
+        object: String,
+    },
     /// More of something than indices of 31 bits can tell apart.
     TooMany {
         /// Plural of the thing.
@@ -122,6 +181,25 @@ impl fmt::Display for BakeError {
             }
             Self::Rotation => write!(f, "environment: `to_world` is not a rotation"),
             Self::Camera { what, found } => write!(f, "camera: {what} is {found}"),
+            Self::MediumIndex { material, found, count } => {
+                write!(f, "material `{material}` refers to medium {found}, there are {count}")
+            }
+            Self::Medium { medium, what, found, range: [lo, hi] } => {
+                write!(f, "medium `{medium}`: {what} is {found}, it must be from {lo} to {hi}")
+            }
+            Self::Grid { medium, cells: [x, y, z], values } => {
+                write!(f, "medium `{medium}`: a grid of {x} x {y} x {z} cells with {values} values cannot be used")
+            }
+            Self::Media { count, most } => write!(f, "{count} media are too many, there may be {most}"),
+            Self::NoBoundary { medium } => write!(f, "medium `{medium}`: no triangle bounds it"),
+            Self::Leak { medium, object, edge: [a, b], times: [there, back] } => write!(
+                f,
+                "medium `{medium}`: its boundary is not closed: object `{object}` has an edge from {a:?} to {b:?} \
+                 (triangles that way: {there}, the other way: {back})"
+            ),
+            Self::InsideOut { medium, object } => {
+                write!(f, "medium `{medium}`: the front sides of its boundary (object `{object}`) face inwards")
+            }
             Self::TooMany { what, count } => write!(f, "{count} {what} are too many"),
         }
     }

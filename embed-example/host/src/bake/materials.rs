@@ -1,10 +1,11 @@
 //! Materials, the tables they share, textures.
 
 use super::BakeError;
-use crate::description::{ModelParameters, Reflectance, SceneDescription};
+use crate::description::{Material, ModelParameters, Reflectance, SceneDescription};
 use crate::microfacet;
 use bytemuck::Zeroable;
-use croupier::unstable::scene::blob::{self, MATERIAL_TWO_SIDED, MAX_SIDE, MIN_CONDUCTOR, NONE, Parameter};
+use croupier::unstable::scene::blob::{self, MAX_SIDE, MIN_CONDUCTOR, NONE, Parameter};
+use croupier::unstable::scene::blob::{MATERIAL_COMPENSATED, MATERIAL_CUTOUT, MATERIAL_TWO_SIDED};
 use std::collections::HashMap;
 
 /// Sections of the blob.
@@ -123,9 +124,15 @@ pub(super) fn bake(scene: &SceneDescription) -> Result<Materials, BakeError> {
     for m in &scene.materials {
         let (kind, parameters) = (m.model.kind(), m.model.parameters());
         let facts = kind.facts();
-        let flags = if m.two_sided && !facts.transmissive { MATERIAL_TWO_SIDED } else { 0 };
+        let medium = match m.medium {
+            Some(found) if found as usize >= scene.media.len() => {
+                return Err(BakeError::MediumIndex { material: m.name.clone(), found, count: scene.media.len() });
+            }
+            medium => medium.unwrap_or(NONE),
+        };
+        let flags = flags(scene, m);
         let blank =
-            blob::Material { kind: kind as u32, flags, texture: NONE, table: NONE, medium: NONE, ..Zeroable::zeroed() };
+            blob::Material { kind: kind as u32, flags, texture: NONE, table: NONE, medium, ..Zeroable::zeroed() };
         let mut draft = Draft { name: &m.name, textures: scene.textures.len(), out: blank, eta: 0.0 };
         facts.parameters.iter().try_for_each(|p| draft.take(*p, &parameters))?;
         coats.derive(facts.parameters, &mut draft);
@@ -136,6 +143,23 @@ pub(super) fn bake(scene: &SceneDescription) -> Result<Materials, BakeError> {
     out.tables = coats.tables;
     textures(scene, &mut out)?;
     Ok(out)
+}
+
+/// Flags of a material: those that it asks for and that change something.
+fn flags(scene: &SceneDescription, m: &Material) -> u32 {
+    let facts = m.model.kind().facts();
+    let cut = match m.model.parameters().reflectance {
+        Some(Reflectance::Texture(t)) if m.cutout => {
+            scene.textures.get(t as usize).is_some_and(|t| t.texels.iter().any(|[_, _, _, alpha]| *alpha < 255))
+        }
+        _ => false,
+    };
+    let flags = [
+        (m.two_sided && !facts.transmissive, MATERIAL_TWO_SIDED),
+        (cut, MATERIAL_CUTOUT),
+        (m.compensated && facts.parameters.contains(&Parameter::Alpha), MATERIAL_COMPENSATED),
+    ];
+    flags.iter().filter(|(set, _)| *set).fold(0, |all, (_, flag)| all | flag)
 }
 
 /// Internal reflectance stays below 1, so that the series of internal reflections converges.
@@ -158,7 +182,7 @@ fn textures(scene: &SceneDescription, out: &mut Materials) -> Result<(), BakeErr
         }
         let first = out.texels.len() as u32;
         out.textures.push(blob::Texture { first, width: t.width, height: t.height, reserved: 0 });
-        out.texels.extend(t.texels.iter().map(|[r, g, b, _]| u32::from_le_bytes([*r, *g, *b, 0])));
+        out.texels.extend(t.texels.iter().map(|rgba| u32::from_le_bytes(*rgba)));
     }
     Ok(())
 }

@@ -48,14 +48,14 @@ pub enum LoadError {
         /// Fault, in words.
         what: String,
     },
-    /// The scene needs participating media.
-    Medium {
+    /// Densities that do not fill their grid, or out of range.
+    Grid {
         /// File.
         path: PathBuf,
-        /// Index in `media`.
-        index: usize,
-        /// Name of the medium.
-        name: String,
+        /// Place that names it: file and value.
+        referrer: String,
+        /// Fault, in words.
+        what: String,
     },
 }
 
@@ -66,6 +66,20 @@ impl LoadError {
 
     pub(super) fn image(path: &Path, referrer: &str, what: String) -> Self {
         Self::Image { path: path.into(), referrer: referrer.into(), what }
+    }
+
+    pub(super) fn grid(path: &Path, referrer: &str, what: String) -> Self {
+        Self::Grid { path: path.into(), referrer: referrer.into(), what }
+    }
+
+    /// The same error of a named object, where only the value's path says which.
+    pub(super) fn within(self, object: &str) -> Self {
+        let named = |what| format!("{object}: {what}");
+        match self {
+            Self::Json { path, at, what } => Self::Json { path, at, what: named(what) },
+            Self::Grid { path, referrer, what } => Self::Grid { path, referrer, what: named(what) },
+            other => other,
+        }
     }
 }
 
@@ -84,11 +98,9 @@ impl fmt::Display for LoadError {
             Self::Image { path, referrer, what } => {
                 write!(f, "cannot use the image {}, which {referrer} names: {what}", path.display())
             }
-            Self::Medium { path, index, name } => write!(
-                f,
-                "{}: media[{index}]: medium `{name}`: participating media are not supported yet",
-                path.display()
-            ),
+            Self::Grid { path, referrer, what } => {
+                write!(f, "cannot use the densities {}, which {referrer} names: {what}", path.display())
+            }
         }
     }
 }

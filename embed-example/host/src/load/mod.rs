@@ -5,6 +5,8 @@
 //! | `scene_json` | a folder with `scene.json` (the format of docs/SCENES.md) |
 //! | `obj` | geometry: Wavefront OBJ |
 //! | `mtl` | materials of a bare OBJ |
+//! | `media` | participating media of a `scene.json`, density grids |
+//! | `presets` | nothing: media by name |
 //! | `images` | PNG and JPEG textures, EXR environment maps |
 //! | `loader` | the files that all of them ask for, each once |
 //! | `json` | values of a JSON document with their paths |
@@ -13,8 +15,10 @@ mod error;
 mod images;
 mod json;
 mod loader;
+mod media;
 mod mtl;
 mod obj;
+mod presets;
 mod scene_json;
 
 pub use error::LoadError;

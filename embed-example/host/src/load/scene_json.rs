@@ -2,11 +2,11 @@
 
 use super::json::{self, Place};
 use super::loader::Loader;
-use super::{LoadError, obj};
+use super::{LoadError, media, obj};
 use crate::description::{
     Camera, Emitter, Environment, Material, Model, ParameterSource, Reflectance, SceneDescription, ThinLens,
 };
-use croupier::unstable::scene::blob::{EnvironmentKind, LightKind, MaterialKind};
+use croupier::unstable::scene::blob::{EnvironmentKind, LightKind, MaterialKind, Parameter};
 use std::path::Path;
 
 pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription, LoadError> {
@@ -14,12 +14,6 @@ pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription,
     let document = json::parse(path, &text)?;
     let document = Place::document(path, &document);
     let folder = path.parent().unwrap_or(Path::new(""));
-    if let Some(media) = document.find("media")?
-        && let Some((index, medium)) = media.elements()?.into_iter().enumerate().next()
-    {
-        let name = medium.find("name")?.map_or(Ok("unnamed"), |n| n.text())?.into();
-        return Err(LoadError::Medium { path: path.into(), index, name });
-    }
     let mut scene = SceneDescription { camera: camera(&document.get("camera")?)?, ..SceneDescription::default() };
     if let Some(transport) = document.find("transport")?
         && let Some(depth) = transport.find("max_depth")?
@@ -37,6 +31,7 @@ pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription,
     }
     let file = document.get("geometry")?.get("file")?;
     obj::load_geometry(loader, &mut scene, &folder.join(file.text()?), &file)?;
+    media::load(loader, &mut scene, folder, &document)?;
     Ok(scene)
 }
 
@@ -72,7 +67,24 @@ fn material(
         .ok_or_else(|| kind.error(format!("unknown material type `{name_of_kind}`")))?;
     let model = Model::from_source(kind, &mut Parameters { loader, scene, folder, m })?;
     let two_sided = m.find("twosided")?.map_or(Ok(false), |t| t.flag())?;
-    Ok(Material { name: name.into(), two_sided, model })
+    let cutout = matches!(model.parameters().reflectance, Some(Reflectance::Texture(_))) && cutout(m)?;
+    let compensated = match m.find("compensate")? {
+        Some(place) if place.flag()? && !kind.facts().parameters.contains(&Parameter::Alpha) => {
+            return Err(place.error(format!("a `{name_of_kind}` is not rough: it loses no energy")));
+        }
+        place => place.map_or(Ok(false), |p| p.flag())?,
+    };
+    Ok(Material { two_sided, cutout, compensated, ..Material::new(name, model) })
+}
+
+/// Whether a texture's alpha cuts holes into the material.
+fn cutout(m: &Place<'_>) -> Result<bool, LoadError> {
+    let Some(place) = m.get("reflectance")?.find("alpha")? else { return Ok(false) };
+    match place.text()? {
+        "cutout" => Ok(true),
+        "ignore" => Ok(false),
+        other => Err(place.error(format!("`{other}` is not supported, only `cutout` and `ignore`"))),
+    }
 }
 
 /// Parameters of a material, all required.
