@@ -76,7 +76,9 @@ impl Weights8 {
     #[inline(always)]
     pub(super) fn collide(&mut self, media: &Media8, fraction: F32x8, u: F32x8, lanes: Mask8) -> Mask8 {
         let scale = fraction / self.sigma;
-        let (absorbed, scattered, real) = (media.sigma_a * scale, media.sigma_s * scale, media.sigma_t * scale);
+        let (absorbed, scattered) = (media.sigma_a * scale, media.sigma_s * scale);
+        // a quotient, not a product: of the largest channel it is 1 exactly, so that a homogeneous medium takes it away
+        let real = (media.sigma_t / self.sigma) * fraction;
         // rounding may take a density above its majorant (NUMERICS MED-6)
         let null = real.map(|x| F32x8::ZERO.max(1.0 - x));
         self.emitted += (self.weight * absorbed * media.emission).zero_unless(lanes);

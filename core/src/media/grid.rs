@@ -156,7 +156,7 @@ pub(super) fn fly(
             }
         }
     }
-    let t = path.parameter(tracker.walk.begin + tracker.s);
+    let t = path.parameter(tracker.walk.begin + tracker.s).min(segment.tmax);
     let mut unfinished = tracker.live;
     let mut roulettes = 0;
     if unfinished.any() {

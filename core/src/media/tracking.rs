@@ -8,7 +8,8 @@ use crate::rng::Key8;
 use crate::scene::{Effects, Scene};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
-/// Null collisions of a flight through a homogeneous medium: each takes the channel of the largest extinction.
+/// Most tentative collisions of a flight through a homogeneous medium: a null collision takes the channel of the largest
+/// extinction.
 const CHANNELS: u32 = 3;
 
 /// Flies along segments to the first scattering: delta tracking with local majorants, the choice at a tentative collision
@@ -116,7 +117,7 @@ fn fly_homogeneous(media: &Media8, segment: &Segment8, beta: Vec3x8, key: Key8, 
             live = collides.and_not(now) & weights.alive();
         }
     }
-    let t = path.parameter(s);
+    let t = path.parameter(s).min(segment.tmax);
     Flight8 {
         collided,
         passed,
