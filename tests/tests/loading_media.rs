@@ -4,6 +4,7 @@ use croupier::Scene;
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::description::*;
 use croupier_host::load::{LoadError, load};
+use croupier_tests::stats::SplitMix;
 use std::fs;
 use tempfile::TempDir;
 
@@ -109,8 +110,8 @@ fn every_key_of_media_is_read() {
         density,
         ..Medium::default()
     };
-    assert_eq!(loaded("", &smoke("")).media, [grid.clone()]);
-    assert_eq!(loaded("", &smoke(said)).media, [grid.clone()]);
+    assert_eq!(loaded("", &smoke("")).media[0], grid);
+    assert_eq!(loaded("", &smoke(said)).media[0], grid);
     let chromatic = smoke("").replace("\"sigma_t_scale\": 8", "\"sigma_t_scale\": [8, 16, 4], \"albedo\": 0.5");
     let chromatic = chromatic.replace("\"albedo\": [0.75, 0.5, 0], ", "");
     let half = [4.0, 8.0, 2.0];
@@ -330,6 +331,9 @@ fn every_wrong_medium_is_told_where() {
     refused(", \"interior\": \"butter\"", "", &["materials.a.interior", "unknown preset `butter`"]);
     refused(", \"interior_scale\": 2", "", &["materials.a.interior_scale", "without `interior`"]);
     refused(&format!("{interior}, \"interior_scale\": 0"), "", &["materials.a.interior_scale", "0 millimetres"]);
+    // of a key that is there twice the last one counts
+    let opaque = format!("{interior}, {GREY}");
+    refused(&opaque, "", &["materials.a.interior", "light does not pass this material"]);
     refused(interior, &list(&fog("fog", "a", "")), &["media[0]", "medium `fog`", "that of `milk of a` already"]);
 }
 
@@ -346,4 +350,36 @@ fn open_boundaries_are_refused_by_name() {
     for part in ["medium `fog`", "object `part b`", "not closed", "[11.0, 0.0, 0.0]"] {
         assert!(error.contains(part), "{error}");
     }
+}
+
+/// Any text is an error or a scene, and what is baked is valid. Killed by: a product of sides that overflows, a list of
+/// media that is indexed before it is checked.
+#[test]
+fn random_damage_never_panics() {
+    let folder = folder(
+        ", \"interior\": \"milk\", \"interior_scale\": 10",
+        &smoke(", \"also_exterior_of\": [\"a\", \"c\"], \"phase\": { \"type\": \"hg\", \"g\": 0.5 }"),
+    );
+    let path = folder.path().join("scene.json");
+    let text = fs::read(&path).unwrap();
+    let start = text.windows(9).position(|w| w == b"materials").unwrap();
+    let mut random = SplitMix(11);
+    let (mut loaded, mut refused) = (0, 0);
+    for _ in 0..2000 {
+        let mut text = text.clone();
+        for _ in 0..1 + random.word() % 2 {
+            let (i, palette) = (start + random.word() as usize % (text.len() - start), b"0123456789-.e,[]{}\"abcdefg ");
+            text[i] = palette[random.word() as usize % palette.len()];
+        }
+        fs::write(&path, text).unwrap();
+        let Ok((scene, _)) = load(folder.path()) else {
+            refused += 1;
+            continue;
+        };
+        loaded += 1;
+        if let Ok(baked) = bake(&scene, &BakeOptions::default(), |_, _| {}) {
+            assert!(Scene::from_bytes(&baked.bytes).is_ok());
+        }
+    }
+    assert!(loaded > 50 && refused > 50, "{loaded} loaded, {refused} refused");
 }

@@ -14,7 +14,8 @@ use core::ops::Deref;
 /// * every index that a record holds is in range of its section or [`NONE`], and every section has fewer than 2^31
 ///   records,
 /// * the tree is a tree: at most [`MAX_TREE_DEPTH`] nodes on a path, every triangle in exactly one leaf,
-/// * every number that a formula reads is finite and in the range that [`super::Field`] states.
+/// * every number that a formula reads is finite and in the range that [`super::Field`] states,
+/// * no density of a medium's grid exceeds the majorants of the bricks within one cell of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'s>(Records<'s>);
 
