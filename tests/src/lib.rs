@@ -11,6 +11,7 @@ pub mod jacobian;
 pub mod light_oracle;
 pub mod light_scene;
 pub mod math;
+pub mod media_flights;
 pub mod media_oracle;
 pub mod minimum;
 pub mod quadrature;
