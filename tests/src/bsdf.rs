@@ -3,10 +3,10 @@
 
 use crate::quadrature::{jittered, midpoint};
 use croupier::unstable::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
-use croupier::unstable::scene::blob::{Camera, Material, MaterialKind, NONE, SceneInfo};
+use croupier::unstable::scene::blob::{Camera, MATERIAL_COMPENSATED, Material, MaterialKind, NONE, SceneInfo};
 use croupier::unstable::scene::{Effects, Records, Scene};
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
-use croupier_host::microfacet;
+use croupier_host::{compensation, microfacet};
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
 /// A vector or colour.
@@ -113,6 +113,32 @@ pub struct Lobe {
 }
 
 impl Case {
+    /// The case compensated for what single scattering loses, with its tables.
+    pub fn compensated(mut self) -> Self {
+        let (alpha, eta) = (self.alpha(), self.eta());
+        let s = compensation::conductor(alpha);
+        // not at the start, so that a lost offset shows
+        self.table = vec![0.25; 5];
+        self.material.table = 5;
+        self.material.flags = MATERIAL_COMPENSATED;
+        if self.kind == MaterialKind::RoughDielectric {
+            self.table.extend(compensation::dielectric(alpha, eta).as_flattened().iter().map(|e| *e as f32));
+            return self;
+        }
+        if self.kind == MaterialKind::RoughPlastic {
+            let t = compensation::rough_plastic(alpha, eta, &s);
+            self.material.fdr = t.r;
+            self.table.extend(t.transmittance);
+        }
+        self.table.extend(s.map(|s| s as f32));
+        self
+    }
+
+    /// Is it compensated?
+    pub fn is_compensated(&self) -> bool {
+        self.material.flags & MATERIAL_COMPENSATED != 0
+    }
+
     /// A case from its parameters; plastics get their tables.
     pub fn new(kind: MaterialKind, reflectance: [f32; 3], eta: [f32; 3], k: [f32; 3], alpha: f32) -> Self {
         let mut material: Material = bytemuck::Zeroable::zeroed();
@@ -138,7 +164,8 @@ impl Case {
     /// For messages.
     pub fn name(&self) -> String {
         let m = &self.material;
-        format!("{} alpha {} eta {} k {}", self.kind.name(), m.alpha, m.eta[0], m.k[0])
+        let compensated = if self.is_compensated() { "compensated " } else { "" };
+        format!("{compensated}{} alpha {} eta {} k {}", self.kind.name(), m.alpha, m.eta[0], m.k[0])
     }
 
     /// Does `wo` below the surface scatter?
@@ -212,6 +239,24 @@ impl Case {
         [fresnel_dielectric(cos, n1, n2); 3]
     }
 
+    /// Entry of the table of compensation that begins `skip` entries behind the start of this material's tables.
+    fn compensation_entry(&self, skip: usize, mu: f64) -> f64 {
+        let t = &self.table[self.material.table as usize + skip..][..64];
+        // half of the entries by cosine, half by where the visible normals lie
+        let by_width = mu * (1.0 + self.alpha()) / (mu + self.alpha());
+        let x = 63.0 * ((mu + by_width) / 2.0).min(1.0);
+        let i = (x as usize).min(62);
+        f64::from(t[i]) + (x - i as f64) * (f64::from(t[i + 1]) - f64::from(t[i]))
+    }
+
+    /// What compensation makes of a Fresnel reflectance `f`, its factor included.
+    fn with_compensation(&self, f: f64, wo: V, wi: V) -> f64 {
+        let skip = if self.kind == MaterialKind::RoughPlastic { 64 } else { 0 };
+        let m = self.compensation_entry(skip, wo[2]) * self.compensation_entry(skip, wi[2]);
+        // a geometric series of 1 - 1 / m, attenuated by f each time
+        f / (1.0 - f * (1.0 - 1.0 / m))
+    }
+
     /// The microfacet part alone.
     pub fn microfacets(&self, wo: V, wi: V) -> Value {
         use MaterialKind::*;
@@ -240,14 +285,20 @@ impl Case {
         if g_o * g_i == 0.0 {
             return Value::default();
         }
+        let dielectric = self.kind == RoughDielectric;
+        let scale = match self.is_compensated() {
+            true if dielectric => 1.0 / self.compensation_entry(if wo[2] > 0.0 { 0 } else { 64 }, wo[2].abs()),
+            _ => 1.0,
+        };
         if reflects {
-            let f = fresnel.map(|r| r * d * g_o * g_i / (4.0 * wo[2].abs()));
+            let raised = |r| if self.is_compensated() && !dielectric { self.with_compensation(r, wo, wi) } else { r };
+            let f = fresnel.map(|r| scale * raised(r) * d * g_o * g_i / (4.0 * wo[2].abs()));
             let lobe = if self.kind == RoughDielectric { fresnel[0] } else { 1.0 };
             return Value { f, pdf: lobe * visible / (4.0 * oh.abs()) };
         }
         let denominator = (ni * ih + no * oh).powi(2);
         let through = 1.0 - fresnel[0];
-        let f = (ih * oh / wo[2]).abs() * no * no * through * g_o * g_i * d / denominator;
+        let f = scale * (ih * oh / wo[2]).abs() * no * no * through * g_o * g_i * d / denominator;
         Value { f: [f; 3], pdf: through * visible * ni * ni * ih.abs() / denominator }
     }
 
@@ -502,6 +553,13 @@ fn all_cases() -> Vec<Case> {
     }
     all.push(Case::new(Plastic, colour, [1.0 / 1.5; 3], zero, 0.0));
     all.push(Case::new(RoughPlastic, colour, [1.0 / 1.5; 3], zero, 0.3));
+    for alpha in [1e-3, 0.02, 0.2, 1.0] {
+        all.push(Case::new(RoughConductor, [1.0, 0.9, 0.5], gold, gold_k, alpha).compensated());
+        for eta in [1.0, 1.5, 1.0 / 1.5] {
+            all.push(Case::new(RoughDielectric, zero, [eta; 3], zero, alpha).compensated());
+        }
+        all.push(Case::new(RoughPlastic, colour, [1.5; 3], zero, alpha).compensated());
+    }
     all
 }
 

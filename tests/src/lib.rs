@@ -4,6 +4,7 @@ pub mod blob;
 pub mod bsdf;
 pub mod cache;
 pub mod documents;
+pub mod furnace;
 pub mod geometry;
 pub mod hit;
 pub mod imports;

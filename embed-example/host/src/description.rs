@@ -85,6 +85,8 @@ pub struct Material {
     /// Both sides behave like the front; else the back of an opaque surface is black. Ignored by dielectrics and
     /// `Null`.
     pub two_sided: bool,
+    /// Give back the energy that rough models lose by single scattering between microfacets; nothing to other models.
+    pub compensated: bool,
     /// Scattering model.
     pub model: Model,
 }
@@ -316,9 +318,10 @@ impl Default for SceneDescription {
 }
 
 impl SceneDescription {
-    /// Adds a material, two-sided unless light passes it; returns its index.
+    /// Adds a material, two-sided unless light passes it and not compensated; returns its index.
     pub fn add_material(&mut self, name: &str, model: Model) -> u32 {
-        self.materials.push(Material { name: name.into(), two_sided: !model.is_transmissive(), model });
+        let two_sided = !model.is_transmissive();
+        self.materials.push(Material { name: name.into(), two_sided, compensated: false, model });
         (self.materials.len() - 1) as u32
     }
 

@@ -186,7 +186,8 @@ pub(super) fn map(definition: &Definition, texture: Option<u32>) -> Mapped {
         Model::RoughPlastic { reflectance: diffuse, int_ior: ior, ext_ior: 1.0, alpha }
     };
     let radiance = m.emissive.filter(|_| !black(m.emissive)).map(|c| c.map(|x| x.max(0.0)));
-    let material = Material { name: m.name.clone(), two_sided: !model.is_transmissive(), model };
+    let two_sided = !model.is_transmissive();
+    let material = Material { name: m.name.clone(), two_sided, compensated: false, model };
     Mapped { material, radiance, notes }
 }
 

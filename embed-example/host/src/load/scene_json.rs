@@ -72,7 +72,8 @@ fn material(
         .ok_or_else(|| kind.error(format!("unknown material type `{name_of_kind}`")))?;
     let model = Model::from_source(kind, &mut Parameters { loader, scene, folder, m })?;
     let two_sided = m.find("twosided")?.map_or(Ok(false), |t| t.flag())?;
-    Ok(Material { name: name.into(), two_sided, model })
+    let compensated = m.find("compensate")?.map_or(Ok(false), |t| t.flag())?;
+    Ok(Material { name: name.into(), two_sided, compensated, model })
 }
 
 /// Parameters of a material, all required.
