@@ -1,11 +1,10 @@
 //! Scalar f64 oracle of every scattering model, from the textbook formulas (Walter et al. 2007, Heitz 2014, Fresnel's
 //! equations over complex indices), written without looking at the vector code, and the table of cases under test.
 
+pub use crate::model::Model;
 use crate::quadrature::{jittered, midpoint};
-use croupier::unstable::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
-use croupier::unstable::scene::blob::{Camera, MATERIAL_COMPENSATED, Material, MaterialKind, NONE, SceneInfo};
-use croupier::unstable::scene::{Effects, Records, Scene};
-use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::scene::blob::{MATERIAL_COMPENSATED, Material, MaterialKind, NONE};
+use croupier::unstable::simd::Vec3x8;
 use croupier_host::{compensation, microfacet};
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
@@ -435,83 +434,6 @@ impl Case {
         }
         sum
     }
-
-    /// The model under test with this case's parameters in the lanes of `active`, indices of other lanes being garbage.
-    pub fn model(&self, active: Mask8) -> Box<dyn Model> {
-        fn leak<T>(x: T) -> &'static T {
-            Box::leak(Box::new(x))
-        }
-        // not the first material, so that a lost index shows
-        let decoy: Material = bytemuck::Zeroable::zeroed();
-        let scene = Scene::assume_valid(Records {
-            info: leak::<SceneInfo>(bytemuck::Zeroable::zeroed()),
-            nodes: &[],
-            leaves: &[],
-            triangles: &[],
-            vertices: &[],
-            materials: Box::leak(Box::new([decoy, self.material])),
-            textures: &[],
-            texels: &[],
-            tables: self.table.clone().leak(),
-            lights: &[],
-            light_alias: &[],
-            environment: None,
-            env_texels: &[],
-            env_alias: &[],
-            camera: leak::<Camera>(bytemuck::Zeroable::zeroed()),
-            media: &[],
-            densities: &[],
-            majorants: &[],
-            names: &[],
-            effects: Effects::default(),
-            hash: 0,
-        });
-        let garbage = |i: usize| if active.lane(i) { 1 } else { 0xdead_beef };
-        let colour = |i: usize| if active.lane(i) { self.material.reflectance } else { [f32::NAN; 3] };
-        let inputs = Inputs8 { material: U32x8::from_fn(garbage), reflectance: Vec3x8::from_fn(colour) };
-        dispatch(self.kind, Boxed { scene, inputs, active })
-    }
-}
-
-struct Boxed {
-    scene: Scene<'static>,
-    inputs: Inputs8,
-    active: Mask8,
-}
-
-impl Visitor<'static> for Boxed {
-    type Out = Box<dyn Model>;
-
-    fn visit<B: Bsdf<'static>>(self) -> Box<dyn Model> {
-        struct Holder<B>(B);
-        impl<B: Bsdf<'static>> Model for Holder<B> {
-            fn delta_only(&self) -> bool {
-                B::DELTA
-            }
-            fn eval(&self, wo: Vec3x8, wi: Vec3x8) -> Eval8 {
-                self.0.eval(wo, wi)
-            }
-            fn sample(&self, wo: Vec3x8, u: [F32x8; 3]) -> Sample8 {
-                self.0.sample(wo, u)
-            }
-            fn albedo(&self, wo: Vec3x8) -> Vec3x8 {
-                self.0.albedo(wo)
-            }
-        }
-        Box::new(Holder(B::gather(&self.scene, &self.inputs, self.active)))
-    }
-}
-
-/// [`Bsdf`] as an object, so that tests can run over a table of cases.
-pub trait Model {
-    /// [`Bsdf::DELTA`].
-    fn delta_only(&self) -> bool;
-    /// [`Bsdf::eval`].
-    fn eval(&self, wo: Vec3x8, wi: Vec3x8) -> Eval8;
-    /// [`Bsdf::sample`].
-    fn sample(&self, wo: Vec3x8, u: [F32x8; 3]) -> Sample8;
-    /// [`Bsdf::albedo`].
-    fn albedo(&self, wo: Vec3x8) -> Vec3x8;
 }
 
 /// Every model with parameter sets from narrow to wide and from weak to strong contrast.

@@ -13,6 +13,7 @@ pub mod light_oracle;
 pub mod light_scene;
 pub mod math;
 pub mod minimum;
+pub mod model;
 pub mod quadrature;
 pub mod replay;
 pub mod runner;

@@ -203,6 +203,39 @@ fn lossless_spheres_are_invisible() {
     }
 }
 
+/// So is a rough one that is compensated, within what its tables are off by at each bounce; single scattering shows.
+/// Killed by: factors that only one of light samples and scattered rays has; a roulette weight that they miss.
+#[test]
+fn compensated_spheres_are_invisible() {
+    use MaterialKind::*;
+    let (one, zero, glass) = ([1.0; 3], [0.0; 3], [1.5; 3]);
+    for alpha in [0.2, 0.7, 1.0] {
+        for (model, case) in [
+            pair(RoughConductor, one, zero, [2.0; 3], alpha),
+            pair(RoughDielectric, zero, glass, zero, alpha),
+            pair(RoughPlastic, one, glass, zero, alpha),
+        ] {
+            let mut s = in_white_environment(camera([0.0, 0.0, 5.0], [0.0; 3], 20.0, [8, 8]));
+            let material = s.add_material("surface", model);
+            add_sphere(&mut s, material, [0.0; 3], 1.0, Sphere { subdivisions: 3, smooth: false, inwards: false });
+            let render_as = |compensated: bool, s: &mut croupier_host::description::SceneDescription| {
+                s.materials[0].compensated = compensated;
+                let scene = blob(s);
+                // light wanders in rough glass
+                let spp = if case.kind == RoughDielectric { 8192 } else { 4096 };
+                render(&scene, &Settings { max_depth: 200, ..settings(&scene, "classic:8") }, spp)
+            };
+            let single = render_as(false, &mut s);
+            let image = render_as(true, &mut s);
+            let (mean, error) = (image.channel(0), image.error_of_channel(0));
+            println!("{}: {} single, {mean} +- {error} compensated", case.name(), single.channel(0));
+            assert!(error < 2e-3, "{}: +- {error}", case.name());
+            assert!((mean - 1.0).abs() < 5e-3 + 4.0 * error, "{}: {mean} +- {error}", case.name());
+            assert!(single.channel(0) < 0.99, "{}: {}", case.name(), single.channel(0));
+        }
+    }
+}
+
 /// A white sphere in a glass one is as invisible, and inside glass radiance is eta^2 times that outside. Killed by:
 /// radiance that is not scaled at the interface, or scaled like importance.
 #[test]
