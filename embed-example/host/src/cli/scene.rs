@@ -47,7 +47,7 @@ pub(crate) fn open(path: Option<&Path>, flags: SceneFlags) -> Result<(SceneBytes
         Some(path) if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")) => {
             if flags.single_scattering {
                 return Err(
-                    format!("{}: `--single-scattering` is for `bake`, not for baked files", path.display()).into()
+                    format!("{}: `--single-scattering` is for baking, not for baked files", path.display()).into()
                 );
             }
             return Ok((map(path)?, Notes::default()));
