@@ -122,6 +122,15 @@ impl Parts {
         blob
     }
 
+    /// Makes a material compensated, with tables of ones that it shares with none.
+    pub fn compensate(&mut self, index: usize) {
+        let m = &mut self.materials[index];
+        let parameters = MaterialKind::from_u32(m.kind).unwrap().facts().parameters;
+        m.flags |= MATERIAL_COMPENSATED;
+        m.table = self.tables.len() as u32;
+        self.tables.extend(parameters.iter().flat_map(|p| vec![1.0; p.entries()]));
+    }
+
     /// A textured floor of rough plastic seen under an emitting quad, an environment map with one black row of cells,
     /// a point and a directional light; one material of every kind; a lens. The tree has two nodes and three leaves.
     pub fn tiny() -> Self {

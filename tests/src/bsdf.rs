@@ -1,12 +1,11 @@
 //! Scalar f64 oracle of every scattering model, from the textbook formulas (Walter et al. 2007, Heitz 2014, Fresnel's
 //! equations over complex indices), written without looking at the vector code, and the table of cases under test.
 
+pub use crate::model::Model;
 use crate::quadrature::{jittered, midpoint};
-use croupier::unstable::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
-use croupier::unstable::scene::blob::{Camera, Material, MaterialKind, NONE, SceneInfo};
-use croupier::unstable::scene::{Effects, Records, Scene};
-use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
-use croupier_host::microfacet;
+use croupier::unstable::scene::blob::{MATERIAL_COMPENSATED, Material, MaterialKind, NONE};
+use croupier::unstable::simd::Vec3x8;
+use croupier_host::{compensation, microfacet};
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
 /// A vector or colour.
@@ -113,6 +112,32 @@ pub struct Lobe {
 }
 
 impl Case {
+    /// The case compensated for what single scattering loses, with its tables.
+    pub fn compensated(mut self) -> Self {
+        let (alpha, eta) = (self.alpha(), self.eta());
+        let s = compensation::conductor(alpha);
+        // not at the start, so that a lost offset shows
+        self.table = vec![0.25; 5];
+        self.material.table = 5;
+        self.material.flags = MATERIAL_COMPENSATED;
+        if self.kind == MaterialKind::RoughDielectric {
+            self.table.extend(compensation::dielectric(alpha, eta).as_flattened().iter().map(|e| *e as f32));
+            return self;
+        }
+        if self.kind == MaterialKind::RoughPlastic {
+            let t = compensation::rough_plastic(alpha, eta, &s);
+            self.material.fdr = t.r;
+            self.table.extend(t.transmittance);
+        }
+        self.table.extend(s.map(|s| s as f32));
+        self
+    }
+
+    /// Is it compensated?
+    pub fn is_compensated(&self) -> bool {
+        self.material.flags & MATERIAL_COMPENSATED != 0
+    }
+
     /// A case from its parameters; plastics get their tables.
     pub fn new(kind: MaterialKind, reflectance: [f32; 3], eta: [f32; 3], k: [f32; 3], alpha: f32) -> Self {
         let mut material: Material = bytemuck::Zeroable::zeroed();
@@ -138,7 +163,8 @@ impl Case {
     /// For messages.
     pub fn name(&self) -> String {
         let m = &self.material;
-        format!("{} alpha {} eta {} k {}", self.kind.name(), m.alpha, m.eta[0], m.k[0])
+        let compensated = if self.is_compensated() { "compensated " } else { "" };
+        format!("{compensated}{} alpha {} eta {} k {}", self.kind.name(), m.alpha, m.eta[0], m.k[0])
     }
 
     /// Does `wo` below the surface scatter?
@@ -212,6 +238,24 @@ impl Case {
         [fresnel_dielectric(cos, n1, n2); 3]
     }
 
+    /// Entry of the table of compensation that begins `skip` entries behind the start of this material's tables.
+    fn compensation_entry(&self, skip: usize, mu: f64) -> f64 {
+        let t = &self.table[self.material.table as usize + skip..][..64];
+        // half of the entries by cosine, half by where the visible normals lie
+        let by_width = mu * (1.0 + self.alpha()) / (mu + self.alpha());
+        let x = 63.0 * ((mu + by_width) / 2.0).min(1.0);
+        let i = (x as usize).min(62);
+        f64::from(t[i]) + (x - i as f64) * (f64::from(t[i + 1]) - f64::from(t[i]))
+    }
+
+    /// What compensation makes of a Fresnel reflectance `f`, its factor included.
+    fn with_compensation(&self, f: f64, wo: V, wi: V) -> f64 {
+        let skip = if self.kind == MaterialKind::RoughPlastic { 64 } else { 0 };
+        let m = self.compensation_entry(skip, wo[2]) * self.compensation_entry(skip, wi[2]);
+        // a geometric series of 1 - 1 / m, attenuated by f each time
+        f / (1.0 - f * (1.0 - 1.0 / m))
+    }
+
     /// The microfacet part alone.
     pub fn microfacets(&self, wo: V, wi: V) -> Value {
         use MaterialKind::*;
@@ -240,14 +284,20 @@ impl Case {
         if g_o * g_i == 0.0 {
             return Value::default();
         }
+        let dielectric = self.kind == RoughDielectric;
+        let scale = match self.is_compensated() {
+            true if dielectric => 1.0 / self.compensation_entry(if wo[2] > 0.0 { 0 } else { 64 }, wo[2].abs()),
+            _ => 1.0,
+        };
         if reflects {
-            let f = fresnel.map(|r| r * d * g_o * g_i / (4.0 * wo[2].abs()));
+            let raised = |r| if self.is_compensated() && !dielectric { self.with_compensation(r, wo, wi) } else { r };
+            let f = fresnel.map(|r| scale * raised(r) * d * g_o * g_i / (4.0 * wo[2].abs()));
             let lobe = if self.kind == RoughDielectric { fresnel[0] } else { 1.0 };
             return Value { f, pdf: lobe * visible / (4.0 * oh.abs()) };
         }
         let denominator = (ni * ih + no * oh).powi(2);
         let through = 1.0 - fresnel[0];
-        let f = (ih * oh / wo[2]).abs() * no * no * through * g_o * g_i * d / denominator;
+        let f = scale * (ih * oh / wo[2]).abs() * no * no * through * g_o * g_i * d / denominator;
         Value { f: [f; 3], pdf: through * visible * ni * ni * ih.abs() / denominator }
     }
 
@@ -384,100 +434,6 @@ impl Case {
         }
         sum
     }
-
-    /// The model under test with this case's parameters in the lanes of `active`, indices of other lanes being garbage.
-    pub fn model(&self, active: Mask8) -> Box<dyn Model> {
-        fn leak<T>(x: T) -> &'static T {
-            Box::leak(Box::new(x))
-        }
-        // not the first material, so that a lost index shows
-        let decoy: Material = bytemuck::Zeroable::zeroed();
-        let scene = Scene::assume_valid(Records {
-            info: leak::<SceneInfo>(bytemuck::Zeroable::zeroed()),
-            nodes: &[],
-            leaves: &[],
-            triangles: &[],
-            vertices: &[],
-            materials: Box::leak(Box::new([decoy, self.material])),
-            textures: &[],
-            texels: &[],
-            tables: self.table.clone().leak(),
-            lights: &[],
-            light_alias: &[],
-            environment: None,
-            env_texels: &[],
-            env_alias: &[],
-            camera: leak::<Camera>(bytemuck::Zeroable::zeroed()),
-            media: &[],
-            densities: &[],
-            majorants: &[],
-            names: &[],
-            effects: Effects::default(),
-            hash: 0,
-        });
-        let garbage = |i: usize| if active.lane(i) { 1 } else { 0xdead_beef };
-        let colour = |i: usize| if active.lane(i) { self.material.reflectance } else { [f32::NAN; 3] };
-        let inputs = Inputs8 { material: U32x8::from_fn(garbage), reflectance: Vec3x8::from_fn(colour) };
-        dispatch(self.kind, Boxed { scene, inputs, active })
-    }
-}
-
-struct Boxed {
-    scene: Scene<'static>,
-    inputs: Inputs8,
-    active: Mask8,
-}
-
-impl Visitor<'static> for Boxed {
-    type Out = Box<dyn Model>;
-
-    fn visit<B: Bsdf<'static>>(self) -> Box<dyn Model> {
-        struct Holder<B>(B);
-        impl<B: Bsdf<'static>> Model for Holder<B> {
-            fn delta_only(&self) -> bool {
-                B::DELTA
-            }
-            fn eval(&self, wo: Vec3x8, wi: Vec3x8) -> Eval8 {
-                self.0.eval(wo, wi)
-            }
-            fn sample(&self, wo: Vec3x8, u: [F32x8; 3]) -> Sample8 {
-                // as the tracer: what passes straight on is chosen first
-                let straight = self.0.straight(wo);
-                let passes = u[2].lt(straight);
-                let rest = F32x8::ZERO.max((u[2] - straight) / (1.0 - straight));
-                let rest = F32x8::splat(1.0 - f32::EPSILON).min(straight.gt(F32x8::ZERO).select(rest, u[2]));
-                let s = self.0.sample(wo, [u[0], u[1], rest]);
-                Sample8 {
-                    wi: Vec3x8::select(passes, -wo, s.wi),
-                    weight: Vec3x8::select(passes, Vec3x8::ONE, s.weight),
-                    pdf: passes.select(F32x8::ZERO, s.pdf),
-                    delta: s.delta | passes,
-                    valid: s.valid | passes,
-                }
-            }
-            fn albedo(&self, wo: Vec3x8) -> Vec3x8 {
-                self.0.albedo(wo)
-            }
-            fn straight(&self, wo: Vec3x8) -> F32x8 {
-                self.0.straight(wo)
-            }
-        }
-        Box::new(Holder(B::gather(&self.scene, &self.inputs, self.active)))
-    }
-}
-
-/// [`Bsdf`] as an object, so that tests can run over a table of cases.
-pub trait Model {
-    /// [`Bsdf::DELTA`].
-    fn delta_only(&self) -> bool;
-    /// [`Bsdf::eval`].
-    fn eval(&self, wo: Vec3x8, wi: Vec3x8) -> Eval8;
-    /// [`Bsdf::sample`], with what passes straight on as one more lobe: the number that chooses the lobe chooses it.
-    fn sample(&self, wo: Vec3x8, u: [F32x8; 3]) -> Sample8;
-    /// [`Bsdf::albedo`].
-    fn albedo(&self, wo: Vec3x8) -> Vec3x8;
-    /// [`Bsdf::straight`].
-    fn straight(&self, wo: Vec3x8) -> F32x8;
 }
 
 /// Every model with parameter sets from narrow to wide and from weak to strong contrast.
@@ -519,6 +475,13 @@ fn all_cases() -> Vec<Case> {
     }
     all.push(Case::new(Plastic, colour, [1.0 / 1.5; 3], zero, 0.0));
     all.push(Case::new(RoughPlastic, colour, [1.0 / 1.5; 3], zero, 0.3));
+    for alpha in [1e-3, 0.02, 0.2, 1.0] {
+        all.push(Case::new(RoughConductor, [1.0, 0.9, 0.5], gold, gold_k, alpha).compensated());
+        for eta in [1.0, 1.5, 1.0 / 1.5] {
+            all.push(Case::new(RoughDielectric, zero, [eta; 3], zero, alpha).compensated());
+        }
+        all.push(Case::new(RoughPlastic, colour, [1.5; 3], zero, alpha).compensated());
+    }
     all
 }
 

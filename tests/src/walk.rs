@@ -80,10 +80,13 @@ fn tree(scene: &Scene<'_>) -> usize {
 
 fn material(scene: &Scene<'_>, m: &Material) {
     let kind = MaterialKind::from_u32(m.kind).unwrap();
-    if kind.facts().parameters.contains(&Parameter::TransmittanceTable) {
-        let table = &scene.tables[m.table as usize..][..TRANSMITTANCE_ENTRIES];
-        assert!(table.iter().all(|x| (0.0..=1.0).contains(x)));
-    }
+    let compensated = m.flags & MATERIAL_COMPENSATED != 0;
+    let used = kind.facts().parameters.iter().filter(|p| compensated || !p.compensates());
+    used.filter(|p| p.entries() > 0).fold(m.table as usize, |first, p| {
+        let ([lo, hi], table) = (p.range(), &scene.tables[first..][..p.entries()]);
+        assert!(table.iter().all(|x| (lo..=hi).contains(x)));
+        first + p.entries()
+    });
     if m.texture != NONE {
         let t = &scene.textures[m.texture as usize];
         let _ = scene.texels[(t.first + (t.height - 1) * t.width + t.width - 1) as usize];

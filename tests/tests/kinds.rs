@@ -1,7 +1,7 @@
 //! What files, documents and the host say of kinds of materials and lights is what the blob's tables say.
 
-use croupier::unstable::scene::Scene;
 use croupier::unstable::scene::blob::*;
+use croupier::unstable::scene::{Effects, Scene};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::description::*;
 use croupier_host::load::load;
@@ -33,6 +33,8 @@ fn fields(parameter: Parameter) -> (&'static [&'static str], &'static str, [f32;
         Parameter::ComplexEta => (&["eta", "k"], "CONDUCTOR_RANGE", CONDUCTOR_RANGE),
         Parameter::InternalReflectance => (&["fdr"], "FDR_RANGE", FDR_RANGE),
         Parameter::TransmittanceTable => (&["table"], "REFLECTANCE_RANGE", REFLECTANCE_RANGE),
+        Parameter::CompensationTable => (&["table"], "COMPENSATION_RANGE", COMPENSATION_RANGE),
+        Parameter::EnergyTable => (&["table"], "ENERGY_RANGE", ENERGY_RANGE),
     }
 }
 
@@ -153,7 +155,8 @@ impl ParameterSource for Source {
 
 /// The model of a kind has the parameters of its row, bakes into a material of that kind that the scene door lets
 /// through, and has every parameter that the kind uses. Killed by: a field of a model that its row lacks, a derived
-/// parameter that baking leaves out.
+/// parameter that baking leaves out; tables of compensation in materials that are not compensated, or the flag in kinds
+/// that do not know it.
 #[test]
 fn models_have_the_parameters_of_their_rows() {
     for kind in MaterialKind::ALL {
@@ -165,22 +168,35 @@ fn models_have_the_parameters_of_their_rows() {
         assert_eq!(source.0, wanted, "{}", kind.name());
         assert_eq!(model.kind(), *kind);
 
-        let mut s = SceneDescription::default();
-        s.add_material("surface", model);
-        let baked = bake(&s, &BakeOptions::default(), |_, _| {}).unwrap();
-        let scene = Scene::from_bytes(&baked.bytes).unwrap();
-        let m = &scene.materials[0];
-        assert_eq!((m.kind, m.flags == 0), (*kind as u32, kind.facts().transmissive), "{}", kind.name());
-        for parameter in kind.facts().parameters {
-            let holds = match parameter {
-                Parameter::Reflectance => m.reflectance == [0.5; 3],
-                Parameter::Alpha => m.alpha == 0.2,
-                Parameter::RelativeEta => m.eta[0] == 1.5,
-                Parameter::ComplexEta => (m.eta, m.k) == ([0.2; 3], [3.0; 3]),
-                Parameter::InternalReflectance => m.fdr > 0.4 && m.fdr < 0.7,
-                Parameter::TransmittanceTable => m.table == 0 && scene.tables.len() == TRANSMITTANCE_ENTRIES,
-            };
-            assert!(holds, "{} and its {parameter:?}", kind.name());
+        for compensated in [false, true] {
+            let mut s = SceneDescription::default();
+            s.add_material("surface", model);
+            s.materials[0].compensated = compensated;
+            let baked = bake(&s, &BakeOptions::default(), |_, _| {}).unwrap();
+            let scene = Scene::from_bytes(&baked.bytes).unwrap();
+            let (m, facts) = (&scene.materials[0], kind.facts());
+            let known = [(MATERIAL_TWO_SIDED, !facts.transmissive), (MATERIAL_COMPENSATED, facts.compensates())];
+            let asked = |flag| flag != MATERIAL_COMPENSATED || compensated;
+            let flags = known.iter().filter(|(flag, holds)| *holds && asked(*flag)).map(|(flag, _)| flag).sum();
+            assert_eq!((m.kind, m.flags), (*kind as u32, flags), "{}", kind.name());
+            let effect = scene.effects.contains(Effects::MULTIPLE_SCATTERING);
+            assert!(!effect || compensated && facts.compensates(), "{}", kind.name());
+            let mut entries = 0;
+            for parameter in facts.parameters.iter().filter(|p| compensated || !p.compensates()) {
+                let holds = match parameter {
+                    Parameter::Reflectance => m.reflectance == [0.5; 3],
+                    Parameter::Alpha => m.alpha == 0.2,
+                    Parameter::RelativeEta => m.eta[0] == 1.5,
+                    Parameter::ComplexEta => (m.eta, m.k) == ([0.2; 3], [3.0; 3]),
+                    Parameter::InternalReflectance => m.fdr > 0.4 && m.fdr < 0.7,
+                    Parameter::TransmittanceTable | Parameter::CompensationTable | Parameter::EnergyTable => {
+                        m.table == 0 && scene.tables.len() >= entries + parameter.entries()
+                    }
+                };
+                assert!(holds, "{} and its {parameter:?}", kind.name());
+                entries += parameter.entries();
+            }
+            assert_eq!((scene.tables.len(), m.table == NONE), (entries, entries == 0), "{}", kind.name());
         }
     }
 }

@@ -115,6 +115,7 @@ fn mtl_materials_become_models() {
         assert_eq!(scene.materials.len(), 1);
         assert_eq!(scene.materials[0].model, *wanted, "{text}");
         assert_eq!(scene.materials[0].two_sided, !wanted.is_transmissive());
+        assert!(scene.materials[0].compensated, "{text}");
         assert!(bake(&scene, &BakeOptions::default(), |_, _| {}).is_ok(), "{text}");
     }
     let (scene, report) = load_obj(TRIANGLE, "newmtl m\nKe 3 2 1\nTf\nKd 2 0 0\n");

@@ -333,6 +333,9 @@ fn every_parameter_of_every_kind_is_checked() {
             let [lo, hi] = parameter.range();
             for bad in [lo.next_down(), hi.next_up(), NAN, INF] {
                 let mut parts = Parts::tiny();
+                if parameter.compensates() {
+                    parts.compensate(index as usize);
+                }
                 let m = &mut parts.materials[index as usize];
                 let field = match parameter {
                     Parameter::Reflectance => (m.reflectance[2] = bad, Field::Reflectance).1,
@@ -341,6 +344,11 @@ fn every_parameter_of_every_kind_is_checked() {
                     Parameter::ComplexEta => (m.eta[1] = bad, Field::Eta).1,
                     Parameter::InternalReflectance => (m.fdr = bad, Field::InternalReflectance).1,
                     Parameter::TransmittanceTable => (parts.tables[40] = bad, Field::Reflectance).1,
+                    // of the last table of this material alone
+                    Parameter::CompensationTable | Parameter::EnergyTable => {
+                        *parts.tables.last_mut().unwrap() = bad;
+                        Field::Compensation
+                    }
                 };
                 let what = format!("{} with {parameter:?} {bad}", kind.name());
                 // all share one table: the first that refers to it is told
@@ -366,6 +374,15 @@ fn every_parameter_of_every_kind_is_checked() {
             m.fdr = 7.0;
         }
         assert_eq!(error(&parts.blob()), None, "{}", kind.name());
+        if kind.facts().compensates() {
+            let mut parts = Parts::tiny();
+            parts.compensate(index as usize);
+            assert_eq!(error(&parts.blob()), None, "compensated {}", kind.name());
+            parts.tables.pop();
+            let (found, count) = (parts.materials[index as usize].table, parts.tables.len() as u32);
+            let short = reference(SectionKind::Materials, index, SectionKind::Tables, found, count);
+            expect("a table that is one entry short", &parts.blob(), short);
+        }
         if unused(Parameter::TransmittanceTable) {
             parts.materials[index as usize].table = 0;
             expect(kind.name(), &parts.blob(), reference(SectionKind::Materials, index, SectionKind::Tables, 0, 64));

@@ -6,6 +6,7 @@
 //! of media, is none of them. Reflecting models return nothing for `wo.z <= 0` or `wi.z <= 0`; the dielectrics and the
 //! null boundary take both sides. Lanes that hold NaN scatter nothing and never touch their neighbours.
 
+mod compensation;
 mod conductor;
 mod dielectric;
 mod diffuse;
@@ -148,8 +149,10 @@ pub trait Visitor<'s> {
     fn visit<B: Bsdf<'s>>(self) -> Self::Out;
 }
 
+/// Rows are `kind => model`, or `kind => model, model without` its part in [`Effects::MULTIPLE_SCATTERING`], which
+/// kernel profiles without that effect compile in place of it.
 macro_rules! models {
-    ($($kind:ident => $model:ty),* $(,)?) => {
+    ($($kind:ident => $model:ty $(, $plain:ty)?;)*) => {
         /// Facts of the model of `kind`, known without running it.
         #[expect(clippy::extra_unused_lifetimes, reason = "a model names it")]
         pub const fn facts<'s>(kind: MaterialKind) -> ModelFacts {
@@ -178,8 +181,12 @@ macro_rules! models {
         #[inline(always)]
         pub fn dispatch_in<'s, V: Visitor<'s>>(profile: Effects, kind: MaterialKind, v: V) -> Option<V::Out> {
             match kind {
-                $(MaterialKind::$kind if profile.contains(Effects::of_material(MaterialKind::$kind)) =>
-                    Some(v.visit::<$model>()),)*
+                $(MaterialKind::$kind if profile.contains(Effects::of_material(MaterialKind::$kind)) => {
+                    $(if !profile.contains(Effects::MULTIPLE_SCATTERING) {
+                        return Some(v.visit::<$plain>());
+                    })?
+                    Some(v.visit::<$model>())
+                })*
                 _ => None,
             }
         }
@@ -187,16 +194,16 @@ macro_rules! models {
 }
 
 models! {
-    Diffuse => Diffuse,
-    Mirror => Mirror,
-    Conductor => Conductor,
-    RoughConductor => RoughConductor,
-    Dielectric => Dielectric,
-    RoughDielectric => RoughDielectric,
-    ThinDielectric => ThinDielectric,
-    Plastic => Plastic,
-    RoughPlastic => RoughPlastic<'s>,
-    Null => Null,
+    Diffuse => Diffuse;
+    Mirror => Mirror;
+    Conductor => Conductor;
+    RoughConductor => RoughConductor<'s>, RoughConductor<'s, false>;
+    Dielectric => Dielectric;
+    RoughDielectric => RoughDielectric<'s>, RoughDielectric<'s, false>;
+    ThinDielectric => ThinDielectric;
+    Plastic => Plastic;
+    RoughPlastic => RoughPlastic<'s>, RoughPlastic<'s, false>;
+    Null => Null;
 }
 
 /// A set of material kinds, a bit each, from a table of one entry per kind.

@@ -1,10 +1,11 @@
-//! GGX dielectric interface, Walter et al. 2007, equations 20 and 21; single scattering. Radiance scales by 1 / eta^2
-//! on transmission.
+//! GGX dielectric interface, Walter et al. 2007, equations 20 and 21; single scattering, unless
+//! [`compensation`](super::compensation) gives back what that loses. Radiance scales by 1 / eta^2 on transmission.
 //!
 //! | parameter | meaning | range |
 //! |---|---|---|
 //! | `eta[0]` | int_ior / ext_ior; +z is the exterior | `ETA_RANGE` |
 //! | `alpha` | GGX width | `ALPHA_RANGE` |
+//! | `table` | if compensated: E from outside, then from inside, `COMPENSATION_ENTRIES` numbers each | `ENERGY_RANGE` |
 //!
 //! A microfacet m visible from `wo` is sampled, then reflection with probability F(wo.m). Everything is computed on the
 //! side of `wo` (z negated below), with eta = index behind / index before, k = eta^2 - 1, c = wo.m and e = eta cos_t.
@@ -18,6 +19,7 @@
 //! transmitted lobe is narrower than 1e-4 rad and is a *delta* lobe to the caller: still sampled through m, so nothing
 //! is lost or bent, but evaluation and density do not know it. The reflected lobe stays rough.
 
+use super::compensation::Compensation8;
 use super::fresnel::{self, Index8};
 use super::ggx::{Ggx8, MIN_COS, mirrored_at};
 use super::{Bsdf, CacheDirection, Eval8, Inputs8, Lobes, Materials8, Sample8, flip, lobes};
@@ -30,16 +32,17 @@ const MIN_CONTRAST: f32 = 1e-4;
 /// alpha |eta - 1| below which transmission is a delta lobe.
 const MIN_WIDTH: f32 = 1e-5;
 
-/// GGX dielectric interface.
+/// GGX dielectric interface, `COMPENSATED` if materials may ask for it.
 #[derive(Clone, Copy, Debug)]
-pub struct RoughDielectric {
+pub struct RoughDielectric<'s, const COMPENSATED: bool = true> {
     index: Index8,
     ggx: Ggx8,
     /// Lanes whose transmitted lobe is a delta lobe.
     narrow: Mask8,
+    compensation: Compensation8<'s, COMPENSATED>,
 }
 
-impl RoughDielectric {
+impl<const COMPENSATED: bool> RoughDielectric<'_, COMPENSATED> {
     /// Density of the refracted direction given c, cos_t, D of its microfacet and wo.z + q(wo).
     #[inline(always)]
     fn refraction_pdf(index: &Index8, c: F32x8, cos_t: F32x8, d: F32x8, denominator: F32x8) -> F32x8 {
@@ -49,17 +52,18 @@ impl RoughDielectric {
     }
 }
 
-impl Bsdf<'_> for RoughDielectric {
+impl<'s, const COMPENSATED: bool> Bsdf<'s> for RoughDielectric<'s, COMPENSATED> {
     const LOBES: Lobes = Lobes::REFLECTION.with(Lobes::TRANSMISSION).with(Lobes::GLOSSY).with(Lobes::SPECULAR);
     const CACHE_DIRECTION: CacheDirection = CacheDirection::View;
 
     #[inline(always)]
-    fn gather(scene: &Scene<'_>, inputs: &Inputs8, active: Mask8) -> Self {
+    fn gather(scene: &Scene<'s>, inputs: &Inputs8, active: Mask8) -> Self {
         let m = Materials8::new(scene, inputs, active);
         let (eta, ggx) = (m.get(|m| m.eta[0]), Ggx8::new(m.get(|m| m.alpha)));
         let contrast = (eta - 1.0).abs();
         let narrow = contrast.lt(F32x8::splat(MIN_CONTRAST)) | (ggx.alpha() * contrast).lt(F32x8::splat(MIN_WIDTH));
-        Self { index: Index8::new(eta), ggx, narrow }
+        let compensation = Compensation8::gather(scene, &m, 0);
+        Self { index: Index8::new(eta), ggx, narrow, compensation }
     }
 
     #[inline(always)]
@@ -88,7 +92,8 @@ impl Bsdf<'_> for RoughDielectric {
         // a facet that refracts is seen from its front by wo and from its back by wi
         let transmits = wi.z.lt(F32x8::ZERO) & h.z.gt(F32x8::ZERO) & cos_t.gt(F32x8::ZERO);
         let valid = wo.z.gt(F32x8::ZERO) & c.gt(F32x8::splat(MIN_COS)) & (reflect | transmits.and_not(self.narrow));
-        Eval8 { f: Vec3x8::grey(pdf * self.ggx.g1(wi) * scale), pdf }.zero_unless(valid)
+        let f = self.compensation.over_energy(pdf * self.ggx.g1(wi) * scale, &self.ggx, wo.z, below);
+        Eval8 { f: Vec3x8::grey(f), pdf }.zero_unless(valid)
     }
 
     #[inline(always)]
@@ -112,7 +117,7 @@ impl Bsdf<'_> for RoughDielectric {
         let valid = wo.z.gt(F32x8::ZERO) & c.gt(F32x8::splat(MIN_COS)) & leaves;
         Sample8 {
             wi: flip(wi, below),
-            weight: Vec3x8::grey(self.ggx.g1(wi) * scale),
+            weight: Vec3x8::grey(self.compensation.over_energy(self.ggx.g1(wi) * scale, &self.ggx, wo.z, below)),
             pdf: delta.select(F32x8::ZERO, pdf),
             delta,
             valid,
@@ -120,7 +125,7 @@ impl Bsdf<'_> for RoughDielectric {
         .masked()
     }
 
-    /// 1: what single scattering loses is not counted.
+    /// 1: what single scattering loses is not counted; exact if compensated.
     #[inline(always)]
     fn albedo(&self, _: Vec3x8) -> Vec3x8 {
         Vec3x8::ONE

@@ -8,11 +8,17 @@
 //! | `alpha` | GGX width | `ALPHA_RANGE` |
 //! | `fdr` | R, reflectance of the coat from inside for diffuse light | `FDR_RANGE` |
 //! | `table` | T, energy the coat transmits from outside, `TRANSMITTANCE_ENTRIES` numbers | `REFLECTANCE_RANGE` |
+//! | `table` | behind T, if compensated: s, `COMPENSATION_ENTRIES` numbers | `COMPENSATION_RANGE` |
 //!
 //! T is interpolated linearly. Samples come from the coat's visible normals with probability s / (s + d) and from the
 //! cosine with d / (s + d): s = 1 - T(wo), not below 2^-10 so that no odd table starves a narrow highlight, and d the
 //! mean over the channels of `T(wo) (1 - R) rho / (1 - rho R)`. Value and density are those of the mixture.
+//!
+//! Single scattering loses energy, in the coat's reflection as in T, unless [`compensation`](super::compensation) gives
+//! it back: the coat then reflects like a conductor of reflectance F, T is what it does not reflect, and R follows from
+//! the mean of T by reciprocity.
 
+use super::compensation::Compensation8;
 use super::fresnel::{self, Index8};
 use super::ggx::{Ggx8, Reflection8, mirrored_at};
 use super::plastic::Base8;
@@ -25,16 +31,17 @@ use croupier_simd::{F32x8, Mask8, Vec3x8};
 /// Table of lanes without one.
 const IDLE_TABLE: &[f32; TRANSMITTANCE_ENTRIES] = &[0.5; TRANSMITTANCE_ENTRIES];
 
-/// GGX coat over a diffuse base.
+/// GGX coat over a diffuse base, `COMPENSATED` if materials may ask for it.
 #[derive(Clone, Copy, Debug)]
-pub struct RoughPlastic<'s> {
+pub struct RoughPlastic<'s, const COMPENSATED: bool = true> {
     index: Index8,
     base: Base8,
     ggx: Ggx8,
     table: [&'s [f32; TRANSMITTANCE_ENTRIES]; 8],
+    compensation: Compensation8<'s, COMPENSATED>,
 }
 
-impl RoughPlastic<'_> {
+impl<const COMPENSATED: bool> RoughPlastic<'_, COMPENSATED> {
     /// T at `mu`.
     #[inline(always)]
     fn transmittance(&self, mu: F32x8) -> F32x8 {
@@ -59,15 +66,16 @@ impl RoughPlastic<'_> {
 
     /// Value and density of the mixture where the coat's part is `coat`.
     #[inline(always)]
-    fn mixture(&self, wi: Vec3x8, coat: &Reflection8, (t, s, d): (F32x8, F32x8, F32x8)) -> Eval8 {
+    fn mixture(&self, wo: Vec3x8, wi: Vec3x8, coat: &Reflection8, (t, s, d): (F32x8, F32x8, F32x8)) -> Eval8 {
         let cosine = wi.z * FRAC_1_PI;
-        let specular = fresnel::dielectric(coat.cos, self.index).reflectance * coat.g1 * coat.pdf;
+        let fresnel = fresnel::dielectric(coat.cos, self.index).reflectance;
+        let specular = self.compensation.grey_reflectance(fresnel, &self.ggx, wo, wi) * coat.g1 * coat.pdf;
         let f = self.base.r * (t * self.transmittance(wi.z) * self.base.inv_eta2 * cosine) + Vec3x8::grey(specular);
         Eval8 { f, pdf: (s * coat.pdf + d * cosine) / (s + d) }.zero_unless(coat.valid)
     }
 }
 
-impl<'s> Bsdf<'s> for RoughPlastic<'s> {
+impl<'s, const COMPENSATED: bool> Bsdf<'s> for RoughPlastic<'s, COMPENSATED> {
     const LOBES: Lobes = Lobes::REFLECTION.with(Lobes::DIFFUSE).with(Lobes::GLOSSY);
     const CACHE_DIRECTION: CacheDirection = CacheDirection::Mirror;
 
@@ -83,12 +91,13 @@ impl<'s> Bsdf<'s> for RoughPlastic<'s> {
             base: Base8::gather(&m, inputs, active),
             ggx: Ggx8::new(m.get(|m| m.alpha)),
             table,
+            compensation: Compensation8::gather(scene, &m, TRANSMITTANCE_ENTRIES as u32),
         }
     }
 
     #[inline(always)]
     fn eval(&self, wo: Vec3x8, wi: Vec3x8) -> Eval8 {
-        self.mixture(wi, &self.ggx.reflection(wo, wi), self.shares(wo))
+        self.mixture(wo, wi, &self.ggx.reflection(wo, wi), self.shares(wo))
     }
 
     #[inline(always)]
@@ -101,12 +110,12 @@ impl<'s> Bsdf<'s> for RoughPlastic<'s> {
         // the half vector that was sampled is better than one rebuilt from the rounded direction
         let half = wo + wi;
         let r = self.ggx.reflection_at(wo, wi, Vec3x8::select(coat, m, half), coat.select(cos, half.length() * 0.5));
-        let e = self.mixture(wi, &r, shares);
+        let e = self.mixture(wo, wi, &r, shares);
         Sample8 { wi, weight: e.f / e.pdf, pdf: e.pdf, delta: Mask8::NONE, valid: r.valid & e.pdf.gt(F32x8::ZERO) }
             .masked()
     }
 
-    /// 1 - T for the coat, which counts what single scattering loses there as reflected.
+    /// 1 - T for the coat, which counts what single scattering loses there as reflected; exact if compensated.
     #[inline(always)]
     fn albedo(&self, wo: Vec3x8) -> Vec3x8 {
         let t = self.transmittance(wo.z);

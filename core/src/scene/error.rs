@@ -26,6 +26,8 @@ pub enum Field {
     Extinction,
     /// Internal diffuse reflectance, [`super::blob::FDR_RANGE`].
     InternalReflectance,
+    /// Tabulated factor or energy of compensation, [`super::blob::COMPENSATION_RANGE`], [`super::blob::ENERGY_RANGE`].
+    Compensation,
     /// Emission, 0 to [`super::blob::MAX_EMISSION`].
     Emission,
     /// Area, above 0 and that of the light's triangle within 1e-3.
@@ -69,6 +71,7 @@ impl Field {
             Self::Eta => "eta",
             Self::Extinction => "k",
             Self::InternalReflectance => "fdr",
+            Self::Compensation => "compensation",
             Self::Emission => "emission",
             Self::Area => "area",
             Self::Probability => "probability",

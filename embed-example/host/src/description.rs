@@ -369,7 +369,7 @@ impl Default for SceneDescription {
 }
 
 impl SceneDescription {
-    /// Adds a material, two-sided unless light passes it; returns its index.
+    /// Adds a material, two-sided unless light passes it and not compensated; returns its index.
     pub fn add_material(&mut self, name: &str, model: Model) -> u32 {
         self.materials.push(Material::new(name, model));
         (self.materials.len() - 1) as u32

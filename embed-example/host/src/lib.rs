@@ -19,6 +19,7 @@ pub mod blob;
 pub mod builtin;
 pub mod bvh;
 pub mod compare;
+pub mod compensation;
 pub mod description;
 pub mod drive;
 pub mod environment;

@@ -48,7 +48,7 @@ pub fn diffuse_fresnel_inside(eta: f64) -> f32 {
 }
 
 /// Reflectance and cosine of the transmitted ray; `eta` = index behind over index before.
-fn fresnel(cos: f64, eta: f64) -> (f64, f64) {
+pub(crate) fn fresnel(cos: f64, eta: f64) -> (f64, f64) {
     let s = cos * cos + (eta - 1.0) * (eta + 1.0);
     if s <= 0.0 {
         return (1.0, 0.0);
@@ -59,13 +59,53 @@ fn fresnel(cos: f64, eta: f64) -> (f64, f64) {
     (0.5 * (rs * rs + rp * rp), cos_t)
 }
 
-/// Mean over the normals visible at cosine `mu` of F G1(reflected) or (1 - F) G1(refracted). The normals come from the
-/// cap map of Dupuy & Benyoub 2023: smooth in both numbers, even in the azimuth.
+/// Mean over the normals visible at cosine `mu` of F G1(reflected) or (1 - F) G1(refracted).
 fn energy(rule: &[(f64, f64)], alpha: f64, eta: f64, mu: f64, reflected: bool) -> f64 {
+    let mut sum = 0.0;
+    visible(rule, alpha, mu, |facet, weight| {
+        let (f, cos_t) = fresnel(facet.cos, eta);
+        let (leaves, part) = if reflected { (facet.reflected(), f) } else { (facet.refracted(eta, cos_t), 1.0 - f) };
+        if let Some((z, denominator)) = leaves {
+            sum += weight * part * 2.0 * z / denominator;
+        }
+    });
+    sum
+}
+
+/// A microfacet that is seen at the cosine `mu` from the mean normal.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Facet {
+    /// Cosine between view and facet normal, above 0.
+    pub cos: f64,
+    /// Cosine between facet and mean normal.
+    m: f64,
+    mu: f64,
+    alpha: f64,
+}
+
+impl Facet {
+    /// Cosine z of the reflected direction, and z + q where G1 = 2 z / (z + q); `None` if it leaves through the surface.
+    pub(crate) fn reflected(&self) -> Option<(f64, f64)> {
+        self.masked(2.0 * self.cos * self.m - self.mu)
+    }
+
+    /// Cosine of the direction refracted at `cos_t` into the relative index `eta`, seen from behind, as [`Self::reflected`].
+    pub(crate) fn refracted(&self, eta: f64, cos_t: f64) -> Option<(f64, f64)> {
+        self.masked(self.mu / eta - (self.cos / eta - cos_t) * self.m)
+    }
+
+    fn masked(&self, z: f64) -> Option<(f64, f64)> {
+        let q = (self.alpha * self.alpha * (1.0 - z * z).max(0.0) + z * z).sqrt();
+        (z > 0.0).then_some((z, z + q))
+    }
+}
+
+/// Calls `f` with the normals visible at cosine `mu` and their weights, 1 in all. They come from the cap map of Dupuy &
+/// Benyoub 2023: smooth in both numbers, even in the azimuth.
+pub(crate) fn visible(rule: &[(f64, f64)], alpha: f64, mu: f64, mut f: impl FnMut(Facet, f64)) {
     let sin = (1.0 - mu * mu).sqrt();
     let length = (alpha * alpha * sin * sin + mu * mu).sqrt();
     let (wx, wz) = (alpha * sin / length, mu / length);
-    let mut sum = 0.0;
     for &(u, weight_u) in rule {
         let t = u * (1.0 + wz);
         let r = (t * (2.0 - t)).sqrt();
@@ -75,20 +115,15 @@ fn energy(rule: &[(f64, f64)], alpha: f64, eta: f64, mu: f64, reflected: bool) -
             let norm = (h[0] * h[0] + h[1] * h[1] + h[2] * h[2]).sqrt();
             let m = h.map(|x| x / norm);
             let cos = sin * m[0] + mu * m[2];
-            let (f, cos_t) = fresnel(cos, eta);
-            let (z, part) =
-                if reflected { (2.0 * cos * m[2] - mu, f) } else { (mu / eta - (cos / eta - cos_t) * m[2], 1.0 - f) };
-            if cos > 0.0 && z > 0.0 {
-                let q = (alpha * alpha * (1.0 - z * z).max(0.0) + z * z).sqrt();
-                sum += weight_u * weight_v * part * 2.0 * z / (z + q);
+            if cos > 0.0 {
+                f(Facet { cos, m: m[2], mu, alpha }, weight_u * weight_v);
             }
         }
     }
-    sum
 }
 
 /// Nodes and weights on [0, 1] (Newton's method on the Legendre polynomial).
-fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
+pub(crate) fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
     let point = |i: usize| {
         let mut x = (PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
         let mut slope = 1.0;

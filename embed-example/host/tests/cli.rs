@@ -126,6 +126,11 @@ fn runtime_errors_are_one_line_and_status_1() {
     fails(dir, &["bake", "cut.crp", "-o", "new.crp"], &["cut.crp"]);
     fails(dir, &["bake", "good.crp", "-o", "no/where.crp"], &["no/where.crp"]);
     fails(dir, &["info", "far.obj"], &["croupier: far.obj: camera: origin"]);
+    fails(
+        dir,
+        &["info", "good.crp", "--single-scattering"],
+        &["good.crp", "--single-scattering", "not for baked files"],
+    );
     fails(dir, &["render", "good.crp", "-o", "no/where.exr"], &["no/where.exr", "not a folder"]);
     fails(dir, &["compare", "missing.exr", "good.crp"], &["missing.exr"]);
     fails(dir, &["compare", "good.crp", "good.crp"], &["good.crp", "not a readable EXR"]);
@@ -190,6 +195,27 @@ l 1 2
 usemtl emitter
 f 1 2 2
 ";
+
+/// Rough materials of a bare OBJ file are compensated unless the user says otherwise. Killed by: another default, a flag
+/// that a command ignores.
+#[test]
+fn single_scattering_is_asked_for() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    std::fs::write(dir.join("t.obj"), "mtllib t.mtl\nv 0 0 0\nv 7 0 0\nv 0 7 0\nusemtl m\nf 1 2 3\n").unwrap();
+    std::fs::write(dir.join("t.mtl"), "newmtl m\nKd 0.5 0.5 0.5\nPm 1\nPr 0.5\n").unwrap();
+    let compensated = |scene: &str, flags: &[&str]| {
+        let out = croupier(dir, &[&["info", scene, "--json"], flags].concat());
+        assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+        text(&out.stdout).contains("multiple scattering")
+    };
+    assert!(compensated("t.obj", &[]) && !compensated("t.obj", &["--single-scattering"]));
+    for flag in [&["--single-scattering"][..], &[]] {
+        let bake = [&["bake", "t.obj", "-o", "t.crp"], flag].concat();
+        assert_eq!(croupier(dir, &bake).status.code(), Some(0));
+        assert_eq!(compensated("t.crp", &[]), flag.is_empty());
+    }
+}
 
 /// What loading and baking assumed or left out is said by every command that opens a scene. Killed by: a report that is
 /// dropped, a count that is left out, notes on stdout.

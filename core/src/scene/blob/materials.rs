@@ -22,6 +22,12 @@ pub const REFLECTANCE_RANGE: [f32; 2] = [0.0, 1.0];
 pub const FDR_RANGE: [f32; 2] = [0.0, 1.0 - f32::EPSILON];
 /// Entries of a table of transmittances: equally spaced cosines from 0 to 1, both ends included.
 pub const TRANSMITTANCE_ENTRIES: usize = 64;
+/// Entries of a table of compensation: `x(mu)` of `bsdf/compensation.rs` equally spaced from 0 to 1, both ends included.
+pub const COMPENSATION_ENTRIES: usize = 64;
+/// Factors s of compensated conductors and coats.
+pub const COMPENSATION_RANGE: [f32; 2] = [0.5, 4.0];
+/// Energies that rough dielectrics scatter; above 0, because compensation divides by them.
+pub const ENERGY_RANGE: [f32; 2] = [1e-12, 1.0];
 
 /// The material kinds, one row each, handed to the macro `$then`: kind and number in the blob, name in scene files,
 /// effect, whether light passes it, whether it has delta lobes only, and the parameters that it uses.
@@ -36,12 +42,12 @@ macro_rules! material_table {
             Conductor = 2, "conductor", CONDUCTOR, transmissive: false, delta: true, [ComplexEta, Reflectance];
             /// GGX conductor.
             RoughConductor = 3, "roughconductor", ROUGH_CONDUCTOR, transmissive: false, delta: false,
-                [ComplexEta, Reflectance, Alpha];
+                [ComplexEta, Reflectance, Alpha, CompensationTable];
             /// Smooth dielectric interface.
             Dielectric = 4, "dielectric", DIELECTRIC, transmissive: true, delta: true, [RelativeEta];
             /// GGX dielectric interface.
             RoughDielectric = 5, "roughdielectric", ROUGH_DIELECTRIC, transmissive: true, delta: false,
-                [RelativeEta, Alpha];
+                [RelativeEta, Alpha, EnergyTable];
             /// Thin dielectric sheet.
             ThinDielectric = 6, "thindielectric", THIN_DIELECTRIC, transmissive: true, delta: true, [RelativeEta];
             /// Smooth coat over a diffuse base.
@@ -49,7 +55,7 @@ macro_rules! material_table {
                 [Reflectance, RelativeEta, InternalReflectance];
             /// GGX coat over a diffuse base.
             RoughPlastic = 8, "roughplastic", ROUGH_PLASTIC, transmissive: false, delta: false,
-                [Reflectance, RelativeEta, Alpha, InternalReflectance, TransmittanceTable];
+                [Reflectance, RelativeEta, Alpha, InternalReflectance, TransmittanceTable, CompensationTable];
             /// Index-matched boundary.
             Null = 9, "null", NULL, transmissive: true, delta: true, [];
         }
@@ -66,6 +72,13 @@ pub struct MaterialFacts {
     pub delta: bool,
     /// Parameters that the model uses.
     pub parameters: &'static [Parameter],
+}
+
+impl MaterialFacts {
+    /// Whether [`MATERIAL_COMPENSATED`] means anything.
+    pub fn compensates(&self) -> bool {
+        self.parameters.iter().any(|p| p.compensates())
+    }
 }
 
 macro_rules! define {
@@ -107,6 +120,12 @@ pub enum Parameter {
     InternalReflectance,
     /// `table`, derived from `eta[0]` and `alpha`: energy that the coat transmits from outside.
     TransmittanceTable,
+    /// `table`, or behind the transmittances; derived from `alpha`, with [`MATERIAL_COMPENSATED`] only: factors of
+    /// reflection.
+    CompensationTable,
+    /// `table`, derived from `eta[0]` and `alpha`, with [`MATERIAL_COMPENSATED`] only: energy scattered to both sides,
+    /// from outside and then from inside.
+    EnergyTable,
 }
 
 impl Parameter {
@@ -118,6 +137,8 @@ impl Parameter {
         Self::ComplexEta,
         Self::InternalReflectance,
         Self::TransmittanceTable,
+        Self::CompensationTable,
+        Self::EnergyTable,
     ];
 
     /// Smallest and largest value allowed of each number.
@@ -128,6 +149,8 @@ impl Parameter {
             Self::RelativeEta => ETA_RANGE,
             Self::ComplexEta => CONDUCTOR_RANGE,
             Self::InternalReflectance => FDR_RANGE,
+            Self::CompensationTable => COMPENSATION_RANGE,
+            Self::EnergyTable => ENERGY_RANGE,
         }
     }
 
@@ -138,8 +161,23 @@ impl Parameter {
             Self::Alpha => &["alpha"],
             Self::RelativeEta => &["int_ior", "ext_ior"],
             Self::ComplexEta => &["eta", "k"],
-            Self::InternalReflectance | Self::TransmittanceTable => &[],
+            Self::InternalReflectance | Self::TransmittanceTable | Self::CompensationTable | Self::EnergyTable => &[],
         }
+    }
+
+    /// Entries in the tables section, behind those of the parameters before it in the row of the kind.
+    pub const fn entries(self) -> usize {
+        match self {
+            Self::TransmittanceTable => TRANSMITTANCE_ENTRIES,
+            Self::CompensationTable => COMPENSATION_ENTRIES,
+            Self::EnergyTable => 2 * COMPENSATION_ENTRIES,
+            Self::Reflectance | Self::Alpha | Self::RelativeEta | Self::ComplexEta | Self::InternalReflectance => 0,
+        }
+    }
+
+    /// Whether materials without [`MATERIAL_COMPENSATED`] do without it.
+    pub const fn compensates(self) -> bool {
+        matches!(self, Self::CompensationTable | Self::EnergyTable)
     }
 }
 
@@ -173,7 +211,7 @@ pub struct Material {
 pub const MATERIAL_TWO_SIDED: u32 = 1;
 /// The texture's alpha is the share of light that meets the surface; the rest passes straight through.
 pub const MATERIAL_CUTOUT: u32 = 2;
-/// Rough models give back what single scattering between microfacets loses.
+/// Rough models give back what single scattering between microfacets loses; nothing to models without roughness.
 pub const MATERIAL_COMPENSATED: u32 = 4;
 /// Every flag of a material.
 pub const MATERIAL_FLAGS: u32 = MATERIAL_TWO_SIDED | MATERIAL_CUTOUT | MATERIAL_COMPENSATED;

@@ -33,18 +33,31 @@ pub(super) fn materials(scene: &Records<'_>) -> Result<(), SceneError> {
         // What arrives at a surface reads these before it looks at the kind.
         at.follow_if_any(SectionKind::Textures, m.texture, scene.textures)?;
         at.follow_if_any(SectionKind::Media, m.medium, scene.media)?;
-        parameter(scene, at, m, Parameter::Reflectance)?;
-        let used = kind.facts().parameters;
-        used.iter().try_for_each(|p| parameter(scene, at, m, *p))?;
-        if !used.contains(&Parameter::TransmittanceTable) && m.table != NONE {
-            return Err(at.wrong_reference(SectionKind::Tables, m.table, scene.tables.len()));
-        }
+        parameter(at, m, Parameter::Reflectance)?;
+        kind.facts().parameters.iter().try_for_each(|p| parameter(at, m, *p))?;
+        tables(scene, at, m, kind)?;
     }
     Ok(())
 }
 
+/// The tables of a material, one behind the other from `table` on; a material without any refers to none.
+fn tables(scene: &Records<'_>, at: Record, m: &Material, kind: MaterialKind) -> Result<(), SceneError> {
+    let compensated = m.flags & MATERIAL_COMPENSATED != 0;
+    let wrong = || at.wrong_reference(SectionKind::Tables, m.table, scene.tables.len());
+    let present = |p: &&Parameter| p.entries() > 0 && (compensated || !p.compensates());
+    let mut next = m.table as usize;
+    let mut any = false;
+    for p in kind.facts().parameters.iter().filter(present) {
+        let ([lo, hi], end) = (p.range(), next.saturating_add(p.entries()));
+        let field = if p.compensates() { Field::Compensation } else { Field::Reflectance };
+        at.all_within(field, scene.tables.get(next..end).ok_or_else(wrong)?, lo, hi)?;
+        (next, any) = (end, true);
+    }
+    if any || m.table == NONE { Ok(()) } else { Err(wrong()) }
+}
+
 /// One parameter of a material that uses it.
-fn parameter(scene: &Records<'_>, at: Record, m: &Material, parameter: Parameter) -> Result<(), SceneError> {
+fn parameter(at: Record, m: &Material, parameter: Parameter) -> Result<(), SceneError> {
     let [lo, hi] = parameter.range();
     match parameter {
         Parameter::Reflectance => at.all_within(Field::Reflectance, &m.reflectance, lo, hi),
@@ -60,23 +73,21 @@ fn parameter(scene: &Records<'_>, at: Record, m: &Material, parameter: Parameter
             m.eta.iter().zip(&m.k).try_for_each(larger)
         }
         Parameter::InternalReflectance => at.within(Field::InternalReflectance, m.fdr, lo, hi),
-        Parameter::TransmittanceTable => {
-            let wrong = at.wrong_reference(SectionKind::Tables, m.table, scene.tables.len());
-            let start = m.table as usize;
-            let entries = scene.tables.get(start..start.saturating_add(TRANSMITTANCE_ENTRIES)).ok_or(wrong)?;
-            at.all_within(Field::Reflectance, entries, lo, hi)
-        }
+        // `tables` checks them
+        Parameter::TransmittanceTable | Parameter::CompensationTable | Parameter::EnergyTable => Ok(()),
     }
 }
 
 /// Effects of a surface of a validated material.
 pub(super) fn effects(m: &Material) -> Effects {
-    let kind = MaterialKind::from_u32(m.kind).map(Effects::of_material).unwrap_or_default();
+    let known = MaterialKind::from_u32(m.kind);
+    let compensates = known.is_some_and(|k| k.facts().compensates());
+    let kind = known.map(Effects::of_material).unwrap_or_default();
     let textured = m.texture != NONE;
     let also = [
         (textured, Effects::TEXTURES),
         (textured && m.flags & MATERIAL_CUTOUT != 0, Effects::ALPHA),
-        (m.flags & MATERIAL_COMPENSATED != 0, Effects::MULTIPLE_SCATTERING),
+        (compensates && m.flags & MATERIAL_COMPENSATED != 0, Effects::MULTIPLE_SCATTERING),
     ];
     also.iter().filter(|(present, _)| *present).fold(kind, |all, (_, effect)| all.with(*effect))
 }

@@ -2,10 +2,12 @@
 
 use super::BakeError;
 use crate::description::{Material, ModelParameters, Reflectance, SceneDescription};
-use crate::microfacet;
+use crate::{compensation, microfacet};
 use bytemuck::Zeroable;
-use croupier::unstable::scene::blob::{self, MAX_SIDE, MIN_CONDUCTOR, NONE, Parameter};
-use croupier::unstable::scene::blob::{MATERIAL_COMPENSATED, MATERIAL_CUTOUT, MATERIAL_TWO_SIDED};
+use croupier::unstable::scene::blob::{
+    self, COMPENSATION_ENTRIES, MATERIAL_COMPENSATED, MATERIAL_CUTOUT, MATERIAL_TWO_SIDED, MAX_SIDE, MIN_CONDUCTOR,
+    NONE, Parameter,
+};
 use std::collections::HashMap;
 
 /// Sections of the blob.
@@ -49,7 +51,10 @@ impl Draft<'_> {
             Parameter::ComplexEta => {
                 self.complex_eta(from.eta.unwrap_or([f32::NAN; 3]), from.k.unwrap_or([f32::NAN; 3]), range)
             }
-            Parameter::InternalReflectance | Parameter::TransmittanceTable => Ok(()),
+            Parameter::InternalReflectance
+            | Parameter::TransmittanceTable
+            | Parameter::CompensationTable
+            | Parameter::EnergyTable => Ok(()),
         }
     }
 
@@ -90,37 +95,76 @@ impl Draft<'_> {
     }
 }
 
-/// The tables of rough coats; quadrature takes long, and many materials of a scene have the same coat.
+/// First entry of a material's tables and its internal reflectance, 0 without.
+type Derived = (u32, f32);
+
+/// The tables of rough materials; quadrature takes long, and many materials of a scene have the same ones.
 #[derive(Default)]
-struct Coats {
-    tables: Vec<f32>,
-    /// First entry and internal reflectance by width and relative index.
-    known: HashMap<(u32, u64), (u32, f32)>,
+struct Tables {
+    entries: Vec<f32>,
+    /// What was derived by kind, width, relative index and whether it is compensated.
+    known: HashMap<(u32, u32, u64, bool), Derived>,
+    /// Factors of compensated reflection by width.
+    factors: HashMap<u32, [f64; COMPENSATION_ENTRIES]>,
 }
 
-impl Coats {
+impl Tables {
     /// Derives what follows from the parameters that were taken over.
     fn derive(&mut self, used: &[Parameter], d: &mut Draft<'_>) {
-        if used.contains(&Parameter::TransmittanceTable) {
-            let (alpha, eta, tables) = (d.out.alpha, d.eta, &mut self.tables);
-            let known = self.known.entry((alpha.to_bits(), eta.to_bits()));
-            (d.out.table, d.out.fdr) = *known.or_insert_with(|| {
-                let table = microfacet::rough_plastic(f64::from(alpha), eta);
-                let first = tables.len() as u32;
-                let [lo, hi] = Parameter::TransmittanceTable.range();
-                tables.extend(table.transmittance.map(|t| t.clamp(lo, hi)));
-                (first, inside(table.r))
-            });
+        let compensated = d.out.flags & MATERIAL_COMPENSATED != 0;
+        if used.iter().any(|p| p.entries() > 0 && (compensated || !p.compensates())) {
+            let key = (d.out.kind, d.out.alpha.to_bits(), d.eta.to_bits(), compensated);
+            let derived = self.known.get(&key).copied();
+            let derived = derived.unwrap_or_else(|| self.compute(used, f64::from(d.out.alpha), d.eta, compensated));
+            self.known.insert(key, derived);
+            (d.out.table, d.out.fdr) = derived;
         } else if used.contains(&Parameter::InternalReflectance) {
             d.out.fdr = inside(microfacet::diffuse_fresnel_inside(d.eta));
         }
+    }
+
+    /// Adds the tables of a material, in the order of its parameters.
+    fn compute(&mut self, used: &[Parameter], alpha: f64, eta: f64, compensated: bool) -> Derived {
+        let (first, mut fdr) = (self.entries.len() as u32, 0.0);
+        for p in used.iter().filter(|p| compensated || !p.compensates()) {
+            let [lo, hi] = p.range();
+            match p {
+                Parameter::TransmittanceTable => {
+                    let table = if compensated {
+                        compensation::rough_plastic(alpha, eta, self.factors(alpha))
+                    } else {
+                        microfacet::rough_plastic(alpha, eta)
+                    };
+                    self.entries.extend(table.transmittance.map(|t| t.clamp(lo, hi)));
+                    fdr = inside(table.r);
+                }
+                Parameter::CompensationTable => {
+                    let factors = *self.factors(alpha);
+                    self.entries.extend(factors.map(|s| (s as f32).clamp(lo, hi)));
+                }
+                Parameter::EnergyTable => {
+                    let sides = compensation::dielectric(alpha, eta);
+                    self.entries.extend(sides.as_flattened().iter().map(|e| (*e as f32).clamp(lo, hi)));
+                }
+                Parameter::Reflectance
+                | Parameter::Alpha
+                | Parameter::RelativeEta
+                | Parameter::ComplexEta
+                | Parameter::InternalReflectance => {}
+            }
+        }
+        (first, fdr)
+    }
+
+    fn factors(&mut self, alpha: f64) -> &[f64; COMPENSATION_ENTRIES] {
+        self.factors.entry((alpha as f32).to_bits()).or_insert_with(|| compensation::conductor(alpha))
     }
 }
 
 /// Materials, tables, textures and names.
 pub(super) fn bake(scene: &SceneDescription) -> Result<Materials, BakeError> {
     let mut out = Materials::default();
-    let mut coats = Coats::default();
+    let mut tables = Tables::default();
     for m in &scene.materials {
         let (kind, parameters) = (m.model.kind(), m.model.parameters());
         let facts = kind.facts();
@@ -135,12 +179,12 @@ pub(super) fn bake(scene: &SceneDescription) -> Result<Materials, BakeError> {
             blob::Material { kind: kind as u32, flags, texture: NONE, table: NONE, medium, ..Zeroable::zeroed() };
         let mut draft = Draft { name: &m.name, textures: scene.textures.len(), out: blank, eta: 0.0 };
         facts.parameters.iter().try_for_each(|p| draft.take(*p, &parameters))?;
-        coats.derive(facts.parameters, &mut draft);
+        tables.derive(facts.parameters, &mut draft);
         out.materials.push(draft.out);
         out.names.extend(m.name.bytes().map(|b| if b == b'\n' { b' ' } else { b }));
         out.names.push(b'\n');
     }
-    out.tables = coats.tables;
+    out.tables = tables.entries;
     textures(scene, &mut out)?;
     Ok(out)
 }
@@ -157,7 +201,7 @@ fn flags(scene: &SceneDescription, m: &Material) -> u32 {
     let flags = [
         (m.two_sided && !facts.transmissive, MATERIAL_TWO_SIDED),
         (cut, MATERIAL_CUTOUT),
-        (m.compensated && facts.parameters.contains(&Parameter::Alpha), MATERIAL_COMPENSATED),
+        (m.compensated && facts.compensates(), MATERIAL_COMPENSATED),
     ];
     flags.iter().filter(|(set, _)| *set).fold(0, |all, (_, flag)| all | flag)
 }

@@ -14,6 +14,8 @@ use std::path::PathBuf;
 pub(crate) struct Args {
     /// Folder with scene.json, .obj file, or baked .crp file; the built-in Cornell box if absent
     scene: Option<PathBuf>,
+    #[command(flatten)]
+    scene_flags: scene::SceneFlags,
     /// Print the facts as one line of JSON
     #[arg(long)]
     json: bool,
@@ -80,7 +82,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let options = args.settings.options()?;
     // Said before the scene is loaded.
     check(&options)?;
-    let (bytes, notes) = scene::open(path)?;
+    let (bytes, notes) = scene::open(path, args.scene_flags)?;
     let f = Facts::of(&bytes, &options, notes).map_err(|e| about(path)(&e))?;
     if args.json {
         return say_json(&f);

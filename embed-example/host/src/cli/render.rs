@@ -34,6 +34,8 @@ pub(crate) struct Flags {
     settings: SettingsFlags,
     #[command(flatten)]
     until: Until,
+    #[command(flatten)]
+    scene: scene::SceneFlags,
     /// Threads, 0 for one per processor; the image does not depend on their number
     #[arg(long, value_name = "N", default_value_t = RenderOptions::default().threads)]
     threads: usize,
@@ -135,7 +137,7 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     // Said now, not after an hour of rendering.
     outputs.check()?;
     let options = flags.options()?;
-    let (bytes, mut notes) = scene::open(path)?;
+    let (bytes, mut notes) = scene::open(path, flags.scene)?;
     let validated = Scene::from_bytes(&bytes).map_err(|e| about(path)(&e))?;
     if let Some(text) = shortened(&validated, options.settings.max_depth) {
         notes.add(path, text);

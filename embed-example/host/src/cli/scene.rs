@@ -31,16 +31,33 @@ impl Deref for SceneBytes {
     }
 }
 
+/// Flags of commands that bake.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+pub(crate) struct SceneFlags {
+    /// Compensate no material for the energy that single scattering between microfacets loses: darker rough surfaces, as
+    /// in renderers without this effect. Baked files stay as they are
+    #[arg(long)]
+    single_scattering: bool,
+}
+
 /// Opens a scene: a baked `.crp` file, anything that loads and bakes (a folder with `scene.json`, an `.obj`), or,
 /// without a path, the built-in one. What had to be assumed, ignored or left out is printed and returned.
-pub(crate) fn open(path: Option<&Path>) -> Result<(SceneBytes, Notes), Box<dyn Error>> {
-    let (description, loaded) = match path {
+pub(crate) fn open(path: Option<&Path>, flags: SceneFlags) -> Result<(SceneBytes, Notes), Box<dyn Error>> {
+    let (mut description, loaded) = match path {
         Some(path) if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")) => {
+            if flags.single_scattering {
+                return Err(
+                    format!("{}: `--single-scattering` is for baking, not for baked files", path.display()).into()
+                );
+            }
             return Ok((map(path)?, Notes::default()));
         }
         Some(path) => load::load(path)?,
         None => (builtin::cornell_box(), LoadReport::default()),
     };
+    if flags.single_scattering {
+        description.materials.iter_mut().for_each(|m| m.compensated = false);
+    }
     let baked = bake(&description).map_err(|e| about(path)(&e))?;
     let notes = Notes::of(&loaded, &baked.report);
     notes.print(path);

@@ -14,7 +14,7 @@
 //! The GGX width is `Pr` squared, else sqrt(2 / (`Ns` + 2)) (Walter et al. 2007, section 5.2), else 0; below 1e-3 the
 //! smooth model is taken. Metals have no Fresnel term (eta 0, k 1): MTL states what they look like, not what they are
 //! made of. `map_Kd` replaces `Kd`. Reflectances are limited to 1. `Ke` is the radiance of an area light. Opacity from
-//! 0.5, bump maps and all other parameters are ignored.
+//! 0.5, bump maps and all other parameters are ignored. All materials are compensated for what single scattering loses.
 
 use super::LoadError;
 use crate::description::{Material, Model, Reflectance};
@@ -186,7 +186,7 @@ pub(super) fn map(definition: &Definition, texture: Option<u32>) -> Mapped {
         Model::RoughPlastic { reflectance: diffuse, int_ior: ior, ext_ior: 1.0, alpha }
     };
     let radiance = m.emissive.filter(|_| !black(m.emissive)).map(|c| c.map(|x| x.max(0.0)));
-    let material = Material::new(&m.name, model);
+    let material = Material { compensated: true, ..Material::new(&m.name, model) };
     Mapped { material, radiance, notes }
 }
 

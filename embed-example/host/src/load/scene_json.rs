@@ -6,7 +6,7 @@ use super::{LoadError, media, obj};
 use crate::description::{
     Camera, Emitter, Environment, Material, Model, ParameterSource, Reflectance, SceneDescription, ThinLens,
 };
-use croupier::unstable::scene::blob::{EnvironmentKind, LightKind, MaterialKind, Parameter};
+use croupier::unstable::scene::blob::{EnvironmentKind, LightKind, MaterialKind};
 use std::path::Path;
 
 pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription, LoadError> {
@@ -69,7 +69,7 @@ fn material(
     let two_sided = m.find("twosided")?.map_or(Ok(false), |t| t.flag())?;
     let cutout = matches!(model.parameters().reflectance, Some(Reflectance::Texture(_))) && cutout(m)?;
     let compensated = match m.find("compensate")? {
-        Some(place) if place.flag()? && !kind.facts().parameters.contains(&Parameter::Alpha) => {
+        Some(place) if place.flag()? && !kind.facts().compensates() => {
             return Err(place.error(format!("a `{name_of_kind}` is not rough: it loses no energy")));
         }
         place => place.map_or(Ok(false), |p| p.flag())?,
