@@ -4,7 +4,7 @@
 //! ([`STEP`], [`END`]).
 
 use crate::clock::Clock;
-use croupier::unstable::profile::{AnyProfile, DiffuseOnly, Full, Profile};
+use croupier::unstable::profile::{AnyProfile, Profile, ProfileVisitor};
 use croupier::{Budget, Counters, Plan, Scene, Session, SessionError, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
 use std::error::Error;
@@ -19,13 +19,26 @@ type Tracer<'s, 'm, P> = Session<'s, 'm, P>;
 /// Renders one iteration for each number of samples per pixel; counters of the whole render, and the seconds of its
 /// iterations.
 pub fn render(scene: Scene<'_>, plan: &Plan, iterations: &[u32]) -> Result<(Counters, f64), Box<dyn Error>> {
-    match AnyProfile::smallest(scene.effects) {
-        AnyProfile::DiffuseOnly => render_with::<DiffuseOnly>(scene, plan, iterations),
-        AnyProfile::Full => render_with::<Full>(scene, plan, iterations),
+    AnyProfile::smallest(scene.effects).dispatch(Render { scene, plan, iterations })
+}
+
+/// A render whose profile is to be chosen.
+struct Render<'a, 's> {
+    scene: Scene<'s>,
+    plan: &'a Plan,
+    iterations: &'a [u32],
+}
+
+impl ProfileVisitor for Render<'_, '_> {
+    type Out = Result<(Counters, f64), Box<dyn Error>>;
+
+    fn visit<P: Profile + Send + Sync>(self) -> Self::Out {
+        render_with::<P>(self.scene, self.plan, self.iterations)
     }
 }
 
-fn render_with<P: Profile>(
+/// [`render`] with the profile `P`.
+pub fn render_with<P: Profile>(
     scene: Scene<'_>,
     plan: &Plan,
     iterations: &[u32],

@@ -9,6 +9,11 @@ macro_rules! bit_set {
                 Self(self.0 | o.0)
             }
 
+            /// What is in `self` and not in `o`.
+            pub const fn without(self, o: Self) -> Self {
+                Self(self.0 & !o.0)
+            }
+
             /// Whether everything of `o` is in `self`.
             pub const fn contains(self, o: Self) -> bool {
                 self.0 & o.0 == o.0

@@ -1,9 +1,25 @@
 //! Kernel profiles: which effects the compiled kernels contain. An effect outside the profile costs nothing, because
 //! the compiler removes it; a scene that calls for one outside is refused when the session starts.
+//!
+//! A firmware, or a host that knows its scenes, names the effects that it needs:
+//!
+//! ```
+//! use croupier::unstable::{Effects, profile::Custom};
+//!
+//! const EFFECTS: Effects = Effects::DIFFUSE.with(Effects::ROUGH_CONDUCTOR).with(Effects::DELTA_LIGHTS);
+//! type Tiny = Custom<{ EFFECTS.0 }>;
+//! // Session::builder(scene).profile::<Tiny>().build(&plan, block)
+//! # use croupier::unstable::profile::Profile;
+//! # assert_eq!(Tiny::EFFECTS, EFFECTS);
+//! ```
+//!
+//! A host that loads any scene lets [`AnyProfile`] choose one of a closed set, once per session: every profile of the
+//! set is compiled into the program. The set is one table at the end of this file; a row is a profile. What a row must
+//! be worth is in docs/EFFECTS.md.
 
 use crate::scene::Effects;
 
-/// A set of effects, fixed at compile time. A firmware defines its own; hosts choose one of the closed set here.
+/// A set of effects, fixed at compile time.
 pub trait Profile {
     /// Effects that the kernels contain.
     const EFFECTS: Effects;
@@ -11,48 +27,108 @@ pub trait Profile {
     const NAME: &'static str;
 }
 
-/// Diffuse surfaces under area lights or a constant environment.
+/// The profile of exactly these effects, given by [`Effects`]' bits.
 #[derive(Clone, Copy, Debug)]
-pub struct DiffuseOnly;
+pub struct Custom<const EFFECTS: u32>;
 
-/// Every effect.
-#[derive(Clone, Copy, Debug)]
-pub struct Full;
+impl<const EFFECTS: u32> Profile for Custom<EFFECTS> {
+    const EFFECTS: Effects = Effects(EFFECTS);
+    const NAME: &'static str = "custom";
+}
 
-impl Profile for DiffuseOnly {
-    const EFFECTS: Effects = Effects::DIFFUSE
+/// Code to run with a profile that is chosen at run time; see [`AnyProfile::dispatch`].
+pub trait ProfileVisitor {
+    /// Result of the visit.
+    type Out;
+
+    /// Called with the profile.
+    fn visit<P: Profile + Send + Sync>(self) -> Self::Out;
+}
+
+macro_rules! profiles {
+    ($($(#[$doc:meta])* $profile:ident = $name:literal, $effects:expr;)*) => {
+        $(
+            $(#[$doc])*
+            #[derive(Clone, Copy, Debug)]
+            pub struct $profile;
+
+            impl Profile for $profile {
+                const EFFECTS: Effects = $effects;
+                const NAME: &'static str = $name;
+            }
+        )*
+
+        /// Closed set of profiles, for hosts that load arbitrary scenes.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum AnyProfile { $($(#[$doc])* $profile),* }
+
+        impl AnyProfile {
+            /// Every profile of the set, none after one that contains it.
+            pub const ALL: &'static [Self] = &[$(Self::$profile),*];
+
+            /// Name of the profile in reports.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$profile => <$profile as Profile>::NAME),* }
+            }
+
+            /// Effects that its kernels contain.
+            pub const fn effects(self) -> Effects {
+                match self { $(Self::$profile => <$profile as Profile>::EFFECTS),* }
+            }
+
+            /// Calls `v` with the profile, once: nothing is chosen after that.
+            #[inline(always)]
+            pub fn dispatch<V: ProfileVisitor>(self, v: V) -> V::Out {
+                match self { $(Self::$profile => v.visit::<$profile>()),* }
+            }
+        }
+    };
+}
+
+impl AnyProfile {
+    /// First profile of the set that contains `effects`: no other that does is smaller.
+    pub const fn smallest(effects: Effects) -> Self {
+        let mut rest = Self::ALL;
+        while let [first, others @ ..] = rest {
+            if first.effects().contains(effects) {
+                return *first;
+            }
+            rest = others;
+        }
+        Self::Full
+    }
+}
+
+// A profile after one that contains it would never be chosen, and some profile must hold every scene.
+const _: () = {
+    let mut rest = AnyProfile::ALL;
+    while let [first, others @ ..] = rest {
+        let mut later = others;
+        while let [next, more @ ..] = later {
+            assert!(!first.effects().contains(next.effects()), "a profile that is never chosen");
+            later = more;
+        }
+        rest = others;
+    }
+    assert!(AnyProfile::Full.effects().0 == u32::MAX);
+};
+
+profiles! {
+    /// Diffuse surfaces under area lights or a constant environment.
+    DiffuseOnly = "diffuse", Effects::DIFFUSE
         .with(Effects::AREA_LIGHTS)
         .with(Effects::CONSTANT)
         .with(Effects::SMOOTH_NORMALS)
         .with(Effects::TEXTURES);
-    const NAME: &'static str = "diffuse";
-}
-
-impl Profile for Full {
-    const EFFECTS: Effects = Effects(u32::MAX);
-    const NAME: &'static str = "full";
-}
-
-/// Closed set of profiles, for hosts that load arbitrary scenes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AnyProfile {
-    /// [`DiffuseOnly`].
-    DiffuseOnly,
-    /// [`Full`].
-    Full,
-}
-
-impl AnyProfile {
-    /// Smallest profile of the set that contains `effects`.
-    pub const fn smallest(effects: Effects) -> Self {
-        if DiffuseOnly::EFFECTS.contains(effects) { Self::DiffuseOnly } else { Self::Full }
-    }
-
-    /// Name of the profile in reports.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::DiffuseOnly => DiffuseOnly::NAME,
-            Self::Full => Full::NAME,
-        }
-    }
+    /// Every material and light, textures, lens: light that travels straight from one surface to the next.
+    Surfaces = "surfaces", Effects::ALL_MATERIALS
+        .with(Effects::TEXTURES)
+        .with(Effects::AREA_LIGHTS)
+        .with(Effects::ENVIRONMENT)
+        .with(Effects::CONSTANT)
+        .with(Effects::DELTA_LIGHTS)
+        .with(Effects::LENS)
+        .with(Effects::SMOOTH_NORMALS);
+    /// Every effect.
+    Full = "full", Effects(u32::MAX);
 }

@@ -58,8 +58,8 @@ impl fmt::Display for SessionError {
             Self::Memory(e) => write!(f, "session: {e}"),
             Self::Profile { missing } => {
                 f.write_str("the scene calls for effects outside the kernel profile:")?;
-                let names = Effects::NAMES.iter().filter(|(e, _)| missing.intersects(*e));
-                names.enumerate().try_for_each(|(i, (_, n))| write!(f, "{}{n}", if i == 0 { " " } else { ", " }))
+                let mut names = missing.names().enumerate();
+                names.try_for_each(|(i, name)| write!(f, "{}{name}", if i == 0 { " " } else { ", " }))
             }
             Self::Shards { expected } => {
                 write!(f, "end_iteration needs every shard in order; shard {expected} is missing")
@@ -140,7 +140,7 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector> SessionBuilder<'s, P, I, 
     pub fn build<'m>(self, plan: &Plan, block: &'m mut [u8]) -> Result<Session<'s, 'm, P, I, L>, SessionError> {
         let Self { scene, intersector, selector, profile } = self;
         if !P::EFFECTS.contains(scene.effects) {
-            return Err(SessionError::Profile { missing: Effects(scene.effects.0 & !P::EFFECTS.0) });
+            return Err(SessionError::Profile { missing: scene.effects.without(P::EFFECTS) });
         }
         let with_media = P::EFFECTS.contains(Effects::MEDIA) && !scene.media.is_empty();
         let camera_media = if with_media { media_at(&scene, &intersector, scene.camera.origin) } else { 0 };

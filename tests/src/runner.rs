@@ -4,7 +4,7 @@ use croupier::unstable::accel::{Intersector, WideBvh};
 use croupier::unstable::film::{PixelAov, PixelStats};
 use croupier::unstable::learn::PictureStatistics;
 use croupier::unstable::learn::cache::CacheError;
-use croupier::unstable::profile::{DiffuseOnly, Full, Profile};
+use croupier::unstable::profile::{AnyProfile, Profile, ProfileVisitor};
 use croupier::{
     Budget, Counters, ErrorEstimate, Plan, Scene, Session, SessionError, Settings, Shard, StepResult, Strategy,
 };
@@ -85,13 +85,7 @@ pub fn render(scene: &[u8], settings: &Settings, spp: u32) -> Image {
 
 /// Renders iterations of the given numbers of samples with the smallest profile.
 pub fn scheduled(scene: &[u8], settings: &Settings, iterations: &[u32], schedule: Schedule) -> Image {
-    let scene = Scene::from_bytes(scene).expect("a valid scene");
-    let bvh = WideBvh::new(&scene);
-    if DiffuseOnly::EFFECTS.contains(scene.effects) {
-        render_with::<DiffuseOnly, _>(scene, bvh, settings, iterations, schedule)
-    } else {
-        render_with::<Full, _>(scene, bvh, settings, iterations, schedule)
-    }
+    learning(scene, settings, iterations, schedule, &mut |_, _| ())
 }
 
 /// As [`scheduled`]; `before` sees what was learned before each iteration, and may change it.
@@ -103,11 +97,25 @@ pub fn learning(
     before: &mut dyn FnMut(usize, &mut dyn Learned),
 ) -> Image {
     let scene = Scene::from_bytes(scene).expect("a valid scene");
-    let bvh = WideBvh::new(&scene);
-    if DiffuseOnly::EFFECTS.contains(scene.effects) {
-        learning_with::<DiffuseOnly, _>(scene, bvh, settings, iterations, schedule, before)
-    } else {
-        learning_with::<Full, _>(scene, bvh, settings, iterations, schedule, before)
+    let smallest = AnyProfile::smallest(scene.effects);
+    smallest.dispatch(Render { scene, settings, iterations, schedule, before })
+}
+
+/// A render whose profile is to be chosen.
+struct Render<'a, 's> {
+    scene: Scene<'s>,
+    settings: &'a Settings,
+    iterations: &'a [u32],
+    schedule: Schedule,
+    before: &'a mut dyn FnMut(usize, &mut dyn Learned),
+}
+
+impl ProfileVisitor for Render<'_, '_> {
+    type Out = Image;
+
+    fn visit<P: Profile + Send + Sync>(self) -> Image {
+        let bvh = WideBvh::new(&self.scene);
+        learning_with::<P, _>(self.scene, bvh, self.settings, self.iterations, self.schedule, self.before)
     }
 }
 

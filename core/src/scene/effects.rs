@@ -118,6 +118,21 @@ impl Effects {
     /// Effects with which light may pass a surface straight on.
     pub const STRAIGHT: Self = Self::NULL.with(Self::THIN_DIELECTRIC).with(Self::ALPHA).with(Self::MEDIA);
 
+    /// The effects of all material kinds.
+    pub const ALL_MATERIALS: Self = {
+        let (mut all, mut i) = (Self(0), 0);
+        while i < MaterialKind::ALL.len() {
+            all = all.with(Self::of_material(MaterialKind::ALL[i]));
+            i += 1;
+        }
+        all
+    };
+
+    /// Names of the effects in the set.
+    pub fn names(self) -> impl Iterator<Item = &'static str> {
+        Self::NAMES.iter().filter(move |(effect, _)| self.contains(*effect)).map(|(_, name)| *name)
+    }
+
     /// The effect of a material kind.
     pub const fn of_material(kind: MaterialKind) -> Self {
         Self(1 << kind as u32)

@@ -16,7 +16,7 @@ use crate::blob::AlignedBytes;
 use croupier::unstable::Phase;
 use croupier::unstable::accel::Intersector;
 use croupier::unstable::learn::cache::{Cache, CacheError};
-use croupier::unstable::profile::{AnyProfile, DiffuseOnly, Full, Profile};
+use croupier::unstable::profile::{AnyProfile, Profile, ProfileVisitor};
 use croupier::unstable::rrs::Space;
 use croupier::{Budget, Counters, ErrorEstimate, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
 use rayon::prelude::*;
@@ -61,9 +61,21 @@ pub fn drive(scene: &[u8], options: &Options<'_>, observer: &dyn Observer) -> Re
 
 /// Renders a validated scene with the smallest profile that holds its effects.
 pub fn drive_scene(scene: Scene<'_>, options: &Options<'_>, observer: &dyn Observer) -> Result<Rendered, DriveError> {
-    match AnyProfile::smallest(scene.effects) {
-        AnyProfile::DiffuseOnly => drive_with::<DiffuseOnly>(scene, options, observer),
-        AnyProfile::Full => drive_with::<Full>(scene, options, observer),
+    AnyProfile::smallest(scene.effects).dispatch(Drive { scene, options, observer })
+}
+
+/// A render whose profile is to be chosen.
+struct Drive<'a, 's> {
+    scene: Scene<'s>,
+    options: &'a Options<'a>,
+    observer: &'a dyn Observer,
+}
+
+impl ProfileVisitor for Drive<'_, '_> {
+    type Out = Result<Rendered, DriveError>;
+
+    fn visit<P: Profile + Send + Sync>(self) -> Self::Out {
+        drive_with::<P>(self.scene, self.options, self.observer)
     }
 }
 
