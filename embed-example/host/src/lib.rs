@@ -7,6 +7,7 @@
 //! | [`builtin`] | a description without files | blobs |
 //! | [`bake`] | description -> scene blob, with [`bvh`], [`alias`], [`environment`], [`microfacet`] | files |
 //! | [`blob`] | the blob's layout on disk and in memory | what sections mean |
+//! | [`effects`] | reasons for a scene's effects | files |
 //! | [`drive`] | memory, threads, iterations around the core | files |
 //! | [`render`] | options in, pictures with layers out | how light is transported |
 //! | [`statistics`] | figures of a render as tables | files |
@@ -22,6 +23,7 @@ pub mod compare;
 pub mod compensation;
 pub mod description;
 pub mod drive;
+pub mod effects;
 pub mod environment;
 pub mod false_color;
 pub mod flip;

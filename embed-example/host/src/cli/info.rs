@@ -4,8 +4,10 @@ use super::console::{Outcome, say, say_json};
 use super::notes::{Notes, about};
 use super::scene;
 use super::settings::SettingsFlags;
-use croupier::unstable::{Effects, MAX_PATH_LENGTH};
+use croupier::unstable::MAX_PATH_LENGTH;
+use croupier::unstable::profile::AnyProfile;
 use croupier::{Scene, SceneError};
+use croupier_host::effects::{Reason, beyond, reasons};
 use croupier_host::render::{PlanSummary, RenderOptions, check, plan};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -42,7 +44,11 @@ struct Facts {
     /// Path segments that the scene asks for, and the most that a path gets.
     max_depth: u32,
     longest_path: u32,
-    effects: Vec<&'static str>,
+    /// Effects that the scene calls for, each with what uses it.
+    effects: Vec<Reason>,
+    /// Name of the kernel profile, and the effects that it contains beyond those of the scene.
+    profile: &'static str,
+    profile_beyond: Vec<&'static str>,
     /// Memory of a render; absent in builds that cannot render.
     plan: Option<PlanSummary>,
     #[serde(flatten)]
@@ -52,7 +58,6 @@ struct Facts {
 impl Facts {
     fn of(bytes: &[u8], options: &RenderOptions, notes: Notes) -> Result<Self, SceneError> {
         let scene = Scene::from_bytes(bytes)?;
-        let called_for = Effects::NAMES.iter().filter(|(effect, _)| scene.effects.contains(*effect));
         Ok(Self {
             bytes: bytes.len(),
             hash: format!("{:016x}", scene.hash),
@@ -69,7 +74,9 @@ impl Facts {
             size: scene.camera.size,
             max_depth: scene.info.max_depth,
             longest_path: scene.info.max_depth.min(MAX_PATH_LENGTH),
-            effects: called_for.map(|(_, name)| *name).collect(),
+            effects: reasons(&scene),
+            profile: AnyProfile::smallest(scene.effects).name(),
+            profile_beyond: beyond(&scene),
             plan: plan(&scene, options).ok(),
             notes,
         })
@@ -99,8 +106,14 @@ pub(crate) fn run(args: &Args) -> Outcome {
         if f.max_depth > MAX_PATH_LENGTH { format!(" (the scene asks for {})", f.max_depth) } else { String::new() };
     let [width, height] = f.size;
     line("picture", format!("{width}x{height} pixels, paths of up to {} segments{limited}", f.longest_path))?;
-    line("effects", f.effects.join(", "))?;
-    let Some(p) = f.plan else { return Ok(()) };
-    line("profile", p.profile.clone())?;
-    line("memory", p.to_string())
+    let title = |i: usize| if i == 0 { "effects" } else { "" };
+    f.effects.iter().enumerate().try_for_each(|(i, reason)| line(title(i), reason.to_string()))?;
+    if f.effects.is_empty() {
+        line(title(0), "none".into())?;
+    }
+    let beyond = f.profile_beyond.join(", ");
+    let beyond =
+        if beyond.is_empty() { "no more than these effects".into() } else { format!("also contains {beyond}") };
+    line("profile", format!("{}: {beyond}", f.profile))?;
+    f.plan.map_or(Ok(()), |p| line("memory", p.to_string()))
 }
