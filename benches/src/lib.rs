@@ -1,6 +1,7 @@
-//! What the benchmarks share: scenes with their references, CPU time, watched renders, medians, generated results, and
+//! What the benchmarks share: scenes with their references, CPU time, counted instructions, watched renders, medians, generated results, and
 //! the check of the figures that documents cite from them.
 
+pub mod callgrind;
 pub mod clock;
 pub mod figures;
 pub mod measure;

@@ -58,6 +58,11 @@ pub fn render_with<P: Profile>(
     Ok((*session.counters(), clock.seconds()))
 }
 
+/// Address of the function that steps with profile `P`, to find it in a disassembly.
+pub fn address_of_step<P: Profile>() -> usize {
+    bench_step_shards::<P> as *const () as usize
+}
+
 #[inline(never)]
 fn bench_step_shards<P: Profile>(session: &Tracer<'_, '_, P>, shards: &mut [Shard<'_>]) {
     for shard in shards {

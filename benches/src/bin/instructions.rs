@@ -4,23 +4,22 @@
 //! else: stepping the shards (paths, rays, learning's records), and ending iterations (merging, denoising, learning).
 //! The same build gives the same counts; another compiler may give others, and so may another C library, whose `memcpy`
 //! chooses its instructions when it runs. `--check` compares with `benches/results/instructions.md` and fails when a
-//! figure has risen.
+//! figure has risen, or when one of stepping is more than 0.5 % above that of `instructions-before-media.md`: no scene
+//! here uses what was added since, and effects that a scene does not call for cost nothing (NUMERICS P2).
 //!
 //! Not made with gungraun (once iai-callgrind): it compares with runs that it keeps below `target/`, where this needs a
 //! committed table and figures per ray, and it needs a runner of its own version installed beside cargo.
 
 use clap::Parser;
 use croupier::{Plan, Scene, Settings};
+use croupier_benches::callgrind::{self, Counted, Folder};
 use croupier_benches::results::{Results, Table};
 use croupier_benches::variant::Variant;
 use croupier_benches::{provenance, serial};
-use croupier_host::bake::{BakeOptions, bake};
-use croupier_host::blob::AlignedBytes;
-use croupier_host::{builtin, load};
 use serde_json::{Value, json};
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 
 #[derive(Parser)]
 #[command(about = "Instructions per ray, counted by callgrind")]
@@ -48,6 +47,9 @@ struct Args {
 }
 
 const NAME: &str = "instructions";
+/// Counts of the library before it had the effects that no scene here calls for, and per cent that a figure of
+/// stepping may be above them.
+const WITHOUT: (&str, f64) = ("instructions-before-media", 0.5);
 const SCENES: [&str; 3] = ["built-in", "cbox", "kitchen"];
 /// `ears+shadow` is what the program calls `ears`.
 const STRATEGIES: [&str; 3] = ["classic", "ears", "ears+shadow"];
@@ -59,53 +61,26 @@ const SHARDS: u32 = 2;
 const COLUMNS: &str =
     "scene, strategy, rays, instructions in step, in end_iteration, step per ray, end_iteration per ray";
 
-/// What was counted in a render.
-#[derive(Clone, Copy)]
+/// A render, and what was counted in it.
 struct Row {
     scene: &'static str,
     strategy: &'static str,
-    rays: u64,
-    /// In stepping, and in ending iterations.
-    instructions: [u64; 2],
+    counted: Counted,
 }
 
 impl Row {
-    fn per_ray(&self) -> [f64; 2] {
-        self.instructions.map(|n| n as f64 / self.rays as f64)
-    }
-
     fn cells(&self) -> Vec<String> {
-        let [step, end] = self.instructions;
-        let [step_per_ray, end_per_ray] = self.per_ray().map(|x| format!("{x:.2}"));
-        let counts = [self.rays, step, end].map(|n| n.to_string());
+        let [step, end] = self.counted.instructions;
+        let [step_per_ray, end_per_ray] = self.counted.per_ray().map(|x| format!("{x:.2}"));
+        let counts = [self.counted.rays, step, end].map(|n| n.to_string());
         let names = [self.scene, self.strategy].map(String::from);
         names.into_iter().chain(counts).chain([step_per_ray, end_per_ray]).collect()
     }
 }
 
-/// A folder that is removed in the end.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new() -> std::io::Result<Self> {
-        let path = std::env::temp_dir().join(format!("croupier-{NAME}-{}", std::process::id()));
-        std::fs::create_dir_all(&path)?;
-        Ok(Self(path))
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        // what is left in a temporary folder does no harm
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
-
 /// The render of a row, and its rays.
 fn render(blob: &Path, strategy: &str) -> Result<Value, Box<dyn Error>> {
-    let read = std::fs::read(blob)?;
-    let mut bytes = AlignedBytes::zeroed(read.len());
-    bytes.as_mut().copy_from_slice(&read);
+    let bytes = callgrind::read(blob)?;
     let scene = Scene::from_bytes(&bytes)?;
     let [width, height] = scene.camera.size.map(f64::from);
     let scale = (PIXELS / (width * height)).sqrt();
@@ -117,60 +92,11 @@ fn render(blob: &Path, strategy: &str) -> Result<Value, Box<dyn Error>> {
     Ok(json!({ "rays": counters.rays() }))
 }
 
-/// Bakes a scene into the folder; `None` if it is not there.
-fn bake_into(folder: &Path, name: &str, scenes: &Path) -> Result<Option<PathBuf>, Box<dyn Error>> {
-    let source = scenes.join(name);
-    let description = match name {
-        "built-in" => builtin::cornell_box(),
-        _ if source.join("scene.json").exists() => load::load(&source)?.0,
-        _ => {
-            println!("skipped {name}: there is no {}", source.display());
-            return Ok(None);
-        }
-    };
-    let path = folder.join(name).with_extension("crp");
-    std::fs::write(&path, &*bake(&description, &BakeOptions::default(), |_, _| {})?.bytes)?;
-    Ok(Some(path))
-}
-
 /// Counts one row under callgrind.
-fn count(folder: &Path, blob: &Path, scene: &'static str, strategy: &'static str) -> Result<Row, Box<dyn Error>> {
-    let out = folder.join(format!("{scene}.{strategy}.out"));
-    let functions = [serial::STEP, serial::END];
-    let mut valgrind = Command::new("valgrind");
-    valgrind.args(["--tool=callgrind", "--quiet", "--compress-strings=no", "--collect-atstart=no"]);
-    valgrind.args(functions.map(|f| format!("--toggle-collect=*{f}*")));
-    valgrind.arg(format!("--callgrind-out-file={}", out.display()));
-    valgrind.arg(std::env::current_exe()?).arg("--blob").arg(blob).args(["--strategy", strategy]);
-    let output = valgrind.output().map_err(|e| {
-        format!("cannot run valgrind: {e}; Debian has it as `apt-get install valgrind`, other systems alike")
-    })?;
-    if !output.status.success() {
-        return Err(format!("{scene}, {strategy}: {}", String::from_utf8_lossy(&output.stderr)).into());
-    }
-    let rays: Value = serde_json::from_slice(&output.stdout)?;
-    let rays = rays["rays"].as_u64().filter(|&n| n > 0).ok_or("a render without rays")?;
-    let profile = std::fs::read_to_string(&out).map_err(|e| format!("{}: {e}", out.display()))?;
-    let instructions = functions.map(|f| inclusive(&profile, f));
-    let total = profile.lines().find_map(|l| l.strip_prefix("totals: ")?.trim().parse::<u64>().ok());
-    if instructions.contains(&0) || total != Some(instructions.iter().sum()) {
-        return Err(format!("callgrind counted {instructions:?} in {functions:?}, and {total:?} in all").into());
-    }
-    Ok(Row { scene, strategy, rays, instructions })
-}
-
-/// Instructions in all calls of a function, with all that it calls. A profile has three lines for the calls from one
-/// place: `cfn=` with the name, `calls=` with their number, the caller's line with the instructions.
-fn inclusive(profile: &str, function: &str) -> u64 {
-    let mut lines = profile.lines();
-    let mut sum = 0;
-    while let Some(line) = lines.next() {
-        if line.strip_prefix("cfn=").is_some_and(|name| name.contains(function)) {
-            let cost = lines.by_ref().nth(1).and_then(|l| l.split(' ').nth(1));
-            sum += cost.and_then(|c| c.parse::<u64>().ok()).unwrap_or(0);
-        }
-    }
-    sum
+fn count(folder: &Folder, blob: &Path, scene: &'static str, strategy: &'static str) -> Result<Row, Box<dyn Error>> {
+    let args = ["--blob", &blob.to_string_lossy(), "--strategy", strategy];
+    let counted = callgrind::count(folder, &format!("{scene}, {strategy}"), &args)?;
+    Ok(Row { scene, strategy, counted })
 }
 
 /// Prints each row beside the committed one; how many have risen.
@@ -188,7 +114,7 @@ fn check(rows: &[Row], tolerance: f64, results: &Results) -> Result<usize, Box<d
         let key = [row.scene, row.strategy];
         let old = table.row(&key).ok_or_else(|| format!("{key:?}: not in the committed results"))?;
         print!("{:<10}{:<13}", row.scene, row.strategy);
-        for ((name, new), k) in ["step", "end_iteration"].iter().zip(row.per_ray()).zip(columns) {
+        for ((name, new), k) in ["step", "end_iteration"].iter().zip(row.counted.per_ray()).zip(columns) {
             let old: f64 = old[k].parse()?;
             // the committed figure is rounded
             let too_much = new > old * (1.0 + tolerance / 100.0) + 0.005;
@@ -196,7 +122,22 @@ fn check(rows: &[Row], tolerance: f64, results: &Results) -> Result<usize, Box<d
             let change = 100.0 * (new / old - 1.0);
             print!("{name} {old:9.2} -> {new:9.2} ({change:+.2} %){}  ", if too_much { " RISEN" } else { "" });
         }
-        println!("{}", if old[rays] == row.rays.to_string() { "" } else { "(other rays: the paths have changed)" });
+        println!(
+            "{}",
+            if old[rays] == row.counted.rays.to_string() { "" } else { "(other rays: the paths have changed)" }
+        );
+    }
+    let table = Results::read(WITHOUT.0)?;
+    let table = table.tables.first().ok_or("no table of the counts before")?;
+    let step = table.column("step per ray").ok_or("no column 'step per ray' in the counts before")?;
+    for row in rows {
+        let key = [row.scene, row.strategy];
+        let old: f64 = table.row(&key).ok_or_else(|| format!("{key:?}: not in the counts before"))?[step].parse()?;
+        let change = 100.0 * (row.counted.per_ray()[0] / old - 1.0);
+        if change > WITHOUT.1 {
+            println!("{} {}: {change:+.2} % above {}", row.scene, row.strategy, WITHOUT.0);
+            risen += 1;
+        }
     }
     Ok(risen)
 }
@@ -213,16 +154,17 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         println!("skipped: the {difference}");
         return Ok(true);
     }
-    let folder = Folder::new()?;
+    let folder = Folder::new(NAME)?;
     let mut rows = Vec::new();
     let mut table = Table::new("", COLUMNS);
     for scene in SCENES {
         let wanted = STRATEGIES.into_iter().filter(|s| format!("{scene} {s}").contains(&args.only));
         let wanted: Vec<_> = wanted.collect();
-        let blob = if wanted.is_empty() { None } else { bake_into(&folder.0, scene, &args.scenes)? };
-        let Some(blob) = blob else { continue };
+        let found = if wanted.is_empty() { None } else { callgrind::description(scene, &args.scenes)? };
+        let Some(found) = found else { continue };
+        let blob = folder.bake(scene, &found)?;
         for strategy in wanted {
-            let row = count(&folder.0, &blob, scene, strategy)?;
+            let row = count(&folder, &blob, scene, strategy)?;
             eprintln!("{}", row.cells().join(", "));
             table.add(row.cells());
             rows.push(row);

@@ -1,0 +1,122 @@
+//! Instructions counted by callgrind in the two parts of a render ([`serial`]): the running program calls itself under
+//! valgrind.
+
+use crate::serial;
+use croupier_host::bake::{BakeOptions, bake};
+use croupier_host::blob::AlignedBytes;
+use croupier_host::description::SceneDescription;
+use croupier_host::{builtin, load};
+use serde_json::Value;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// A temporary folder that is removed in the end.
+#[derive(Debug)]
+pub struct Folder(PathBuf);
+
+impl Folder {
+    /// A folder of this process; `name` is part of its own name.
+    pub fn new(name: &str) -> std::io::Result<Self> {
+        let path = std::env::temp_dir().join(format!("croupier-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&path)?;
+        Ok(Self(path))
+    }
+
+    /// Path of the folder.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// Bakes a scene into the folder; the blob's path.
+    pub fn bake(&self, name: &str, description: &SceneDescription) -> Result<PathBuf, Box<dyn Error>> {
+        let path = self.0.join(name).with_extension("crp");
+        std::fs::write(&path, &*bake(description, &BakeOptions::default(), |_, _| {})?.bytes)?;
+        Ok(path)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // what is left in a temporary folder does no harm
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// The scene of a name: `built-in`, or that of a folder in `scenes`, `None` if it is not there.
+pub fn description(name: &str, scenes: &Path) -> Result<Option<SceneDescription>, Box<dyn Error>> {
+    let source = scenes.join(name);
+    Ok(match name {
+        "built-in" => Some(builtin::cornell_box()),
+        _ if source.join("scene.json").exists() => Some(load::load(&source)?.0),
+        _ => {
+            println!("skipped {name}: there is no {}", source.display());
+            None
+        }
+    })
+}
+
+/// The bytes of a blob, aligned.
+pub fn read(blob: &Path) -> std::io::Result<AlignedBytes> {
+    let read = std::fs::read(blob)?;
+    let mut bytes = AlignedBytes::zeroed(read.len());
+    bytes.as_mut().copy_from_slice(&read);
+    Ok(bytes)
+}
+
+/// What was counted in a render.
+#[derive(Clone, Copy, Debug)]
+pub struct Counted {
+    /// Rays of all kinds.
+    pub rays: u64,
+    /// Instructions in stepping, and in ending iterations.
+    pub instructions: [u64; 2],
+}
+
+impl Counted {
+    /// Instructions per ray of both.
+    pub fn per_ray(&self) -> [f64; 2] {
+        self.instructions.map(|n| n as f64 / self.rays as f64)
+    }
+}
+
+/// Runs this program with `args` under callgrind; it must render once and print `{"rays": N}`. `label` names the run in
+/// errors.
+pub fn count(folder: &Folder, label: &str, args: &[&str]) -> Result<Counted, Box<dyn Error>> {
+    let out = folder.path().join("callgrind.out");
+    let functions = [serial::STEP, serial::END];
+    let mut valgrind = Command::new("valgrind");
+    valgrind.args(["--tool=callgrind", "--quiet", "--compress-strings=no", "--collect-atstart=no"]);
+    valgrind.args(functions.map(|f| format!("--toggle-collect=*{f}*")));
+    valgrind.arg(format!("--callgrind-out-file={}", out.display()));
+    valgrind.arg(std::env::current_exe()?).args(args);
+    let output = valgrind.output().map_err(|e| {
+        format!("cannot run valgrind: {e}; Debian has it as `apt-get install valgrind`, other systems alike")
+    })?;
+    if !output.status.success() {
+        return Err(format!("{label}: {}", String::from_utf8_lossy(&output.stderr)).into());
+    }
+    let rays: Value = serde_json::from_slice(&output.stdout)?;
+    let rays = rays["rays"].as_u64().filter(|&n| n > 0).ok_or("a render without rays")?;
+    let profile = std::fs::read_to_string(&out).map_err(|e| format!("{}: {e}", out.display()))?;
+    let instructions = functions.map(|f| inclusive(&profile, f));
+    let total = profile.lines().find_map(|l| l.strip_prefix("totals: ")?.trim().parse::<u64>().ok());
+    if instructions.contains(&0) || total != Some(instructions.iter().sum()) {
+        return Err(format!("callgrind counted {instructions:?} in {functions:?}, and {total:?} in all").into());
+    }
+    Ok(Counted { rays, instructions })
+}
+
+/// Instructions in all calls of a function, with all that it calls. A profile has three lines for the calls from one
+/// place: `cfn=` with the name, `calls=` with their number, the caller's line with the instructions.
+fn inclusive(profile: &str, function: &str) -> u64 {
+    let mut lines = profile.lines();
+    let mut sum = 0;
+    while let Some(line) = lines.next() {
+        if line.strip_prefix("cfn=").is_some_and(|name| name.contains(function)) {
+            let cost = lines.by_ref().nth(1).and_then(|l| l.split(' ').nth(1));
+            sum += cost.and_then(|c| c.parse::<u64>().ok()).unwrap_or(0);
+        }
+    }
+    sum
+}
