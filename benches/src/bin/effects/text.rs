@@ -1,22 +1,24 @@
 //! Bytes of machine code that a function leads to, from a disassembly of the running program.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::error::Error;
+use std::path::Path;
 use std::process::Command;
 
 /// A function of the program.
 struct Function {
-    name: String,
-    start: u64,
+    /// Whether it belongs to these crates.
+    ours: bool,
     bytes: u64,
-    /// Names of the functions that it refers to: calls, jumps, addresses.
-    refers_to: Vec<String>,
+    /// Addresses that it refers to: of functions that it calls, or of the slots that hold those.
+    refers_to: Vec<u64>,
 }
 
 /// The functions of this program.
 pub(crate) struct Text {
-    functions: Vec<Function>,
-    by_name: HashMap<String, usize>,
+    functions: BTreeMap<u64, Function>,
+    /// Addresses in slots that the loader fills in: calls between crates go through them.
+    slots: HashMap<u64, u64>,
     /// Where the program lies in memory, less where its file says.
     shift: u64,
 }
@@ -25,45 +27,60 @@ impl Text {
     /// Disassembles this program, with `objdump` of the system's binutils, which linking needs anyway.
     pub(crate) fn of_this_program() -> Result<Self, Box<dyn Error>> {
         let exe = std::env::current_exe()?;
-        let output = Command::new("objdump").args(["-d", "--no-show-raw-insn"]).arg(&exe).output();
-        let output = output.map_err(|e| format!("cannot run objdump: {e}"))?;
-        let mut functions: Vec<Function> = Vec::new();
-        for line in String::from_utf8_lossy(&output.stdout).lines() {
-            let heading = line.strip_suffix(">:").and_then(|l| l.split_once(" <"));
-            if let Some((start, name)) = heading {
-                let start = u64::from_str_radix(start, 16)?;
-                if let Some(last) = functions.last_mut() {
-                    last.bytes = start - last.start;
+        let mut functions: BTreeMap<u64, Function> = BTreeMap::new();
+        for line in objdump(&["-d", "--no-show-raw-insn"], &exe)?.lines() {
+            if let Some((start, name)) = line.strip_suffix(">:").and_then(|l| l.split_once(" <")) {
+                let start = hexadecimal(start)?;
+                if let Some(mut last) = functions.last_entry() {
+                    last.get_mut().bytes = start - last.key();
                 }
-                functions.push(Function { name: name.into(), start, bytes: 0, refers_to: Vec::new() });
-            } else if let Some((_, name)) = line.strip_suffix('>').and_then(|l| l.rsplit_once('<'))
-                && let Some(last) = functions.last_mut()
+                let ours = name.contains("croupier");
+                functions.insert(start, Function { ours, bytes: 0, refers_to: Vec::new() });
+            } else if let Some((before, _)) = line.strip_suffix('>').and_then(|l| l.rsplit_once(" <"))
+                && let Some(address) = before.split_whitespace().last()
+                && let Some(mut last) = functions.last_entry()
             {
-                last.refers_to.push(name.split("+0x").next().unwrap_or(name).into());
+                last.get_mut().refers_to.extend(hexadecimal(address));
             }
         }
-        let by_name = functions.iter().enumerate().map(|(i, f)| (f.name.clone(), i)).collect();
+        let mut slots = HashMap::new();
+        for line in objdump(&["-R"], &exe)?.lines() {
+            if let Some((before, target)) = line.split_once("*ABS*+0x")
+                && let Some(slot) = before.split_whitespace().next()
+            {
+                slots.insert(hexadecimal(slot)?, hexadecimal(target)?);
+            }
+        }
         let maps = std::fs::read_to_string("/proc/self/maps")?;
         let loaded = maps.lines().find(|l| l.ends_with(&*exe.to_string_lossy())).ok_or("the program is not mapped")?;
-        let shift = u64::from_str_radix(loaded.split('-').next().unwrap_or(""), 16)?;
-        Ok(Self { functions, by_name, shift })
+        let shift = hexadecimal(loaded.split('-').next().unwrap_or(""))?;
+        Ok(Self { functions, slots, shift })
     }
 
-    /// Bytes of the function at an address and of all functions of these crates that it leads to.
+    /// Bytes of the function at an address and of all functions of these crates that it leads to. What messages of
+    /// panics need belongs to no effect.
     pub(crate) fn bytes(&self, address: usize) -> Result<u64, Box<dyn Error>> {
-        let start = address as u64 - self.shift;
-        let first = self.functions.iter().position(|f| f.start == start).ok_or("no function at this address")?;
+        let first = address as u64 - self.shift;
         let (mut seen, mut waiting, mut sum) = (HashSet::from([first]), vec![first], 0);
-        while let Some(i) = waiting.pop() {
-            let f = &self.functions[i];
+        while let Some(start) = waiting.pop() {
+            let f = self.functions.get(&start).ok_or("no function at this address")?;
             sum += f.bytes;
-            for to in f.refers_to.iter().filter_map(|name| self.by_name.get(name)) {
-                // what messages of panics need belongs to no effect
-                if self.functions[*to].name.contains("croupier") && seen.insert(*to) {
+            for to in f.refers_to.iter().map(|to| self.slots.get(to).unwrap_or(to)) {
+                if self.functions.get(to).is_some_and(|f| f.ours) && seen.insert(*to) {
                     waiting.push(*to);
                 }
             }
         }
         Ok(sum)
     }
+}
+
+fn hexadecimal(text: &str) -> Result<u64, std::num::ParseIntError> {
+    u64::from_str_radix(text, 16)
+}
+
+fn objdump(args: &[&str], exe: &Path) -> Result<String, Box<dyn Error>> {
+    let output = Command::new("objdump").args(args).arg(exe).output();
+    let output = output.map_err(|e| format!("cannot run objdump: {e}"))?;
+    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
