@@ -5,7 +5,7 @@
 //! The same build gives the same counts; another compiler may give others, and so may another C library, whose `memcpy`
 //! chooses its instructions when it runs. `--check` compares with `benches/results/instructions.md` and fails when a
 //! figure has risen, or when one of stepping is more than 0.5 % above that of `instructions-before-media.md`: no scene
-//! here uses what was added since, and effects that a scene does not call for cost nothing (NUMERICS P2).
+//! here uses what was added since, and effects that a scene does not call for cost nothing (docs/EFFECTS.md).
 //!
 //! Not made with gungraun (once iai-callgrind): it compares with runs that it keeps below `target/`, where this needs a
 //! committed table and figures per ray, and it needs a runner of its own version installed beside cargo.

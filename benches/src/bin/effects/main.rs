@@ -277,7 +277,11 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
     let (folder, text) = (Folder::new(NAME)?, Text::of_this_program()?);
     let bases = bases(&folder, &text)?;
     if args.check {
-        return Ok(check(&bases, &Results::read(NAME)?)? == 0);
+        let risen = check(&bases, &Results::read(NAME)?)?;
+        if risen > 0 {
+            println!("if that is meant: cargo run --release -p croupier-benches --bin {NAME} -- --write");
+        }
+        return Ok(risen == 0);
     }
     results.tables = vec![effects(&folder, &text, &bases)?, profiles(&text)?, scenes(&folder, args)?];
     if args.write {
