@@ -4,9 +4,17 @@
 #![forbid(unsafe_code)]
 
 use croupier::Scene;
+use croupier::unstable::Effects;
+use croupier::unstable::profile::{Custom, Profile};
 use croupier::unstable::rng::Key8;
 use croupier::unstable::scene::blob::content_hash;
 use croupier::unstable::simd::{F32x8, U32x8};
+
+/// Kernels for the firmware's scenes: what they call for, and no more. A session of them is
+/// `Session::builder(scene).profile::<Kernels>().build(&plan, block)`.
+pub type Kernels = Custom<{ SURFACES.with(LIGHTS).with(Effects::LENS).0 }>;
+const SURFACES: Effects = Effects::DIFFUSE.with(Effects::ROUGH_PLASTIC).with(Effects::TEXTURES);
+const LIGHTS: Effects = Effects::AREA_LIGHTS.with(Effects::ENVIRONMENT).with(Effects::DELTA_LIGHTS);
 
 /// Bytes at an address that is a multiple of 64.
 #[repr(C, align(64))]
@@ -59,9 +67,12 @@ fn simd() -> u64 {
     hash.0
 }
 
-/// What a blob holds, through the validating door; 0 if it is refused.
+/// What a blob holds, through the validating door; 0 if it is refused, or if [`Kernels`] are not enough for it.
 fn scene(bytes: &[u8]) -> u64 {
     let Ok(scene) = Scene::from_bytes(bytes) else { return 0 };
+    if !Kernels::EFFECTS.contains(scene.effects) {
+        return 0;
+    }
     let mut hash = Hash(scene.hash);
     let counts = [scene.nodes.len(), scene.leaves.len(), scene.triangles.len(), scene.lights.len()];
     counts.into_iter().for_each(|n| hash.add(n as u64));

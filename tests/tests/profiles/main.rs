@@ -1,5 +1,5 @@
 //! Kernel profiles: the same pixels in all that hold a scene, an error in all others, none that a scene does not need.
-//! Obligations P4, P5, P6 and P8 of docs/NUMERICS.md; P1 and P2 are counted by the benchmark `effects`.
+//! Instructions are counted by the benchmarks `effects` and `instructions`; docs/EFFECTS.md has the whole list.
 
 mod scenes;
 
@@ -11,6 +11,7 @@ use croupier_host::blob::AlignedBytes;
 use croupier_host::description::{Model, Reflectance, Texture};
 use croupier_host::drive::{DriveError, Options, Target, Unobserved, drive_scene, drive_with};
 use croupier_host::effects::{beyond, reasons};
+use croupier_tests::blob::Parts;
 use croupier_tests::runner::{Image, Schedule, render_with};
 use croupier_tests::scenes::{blob, cornell, everything};
 use scenes::{LARGER, SCENES, WITHOUT_SCENE};
@@ -49,7 +50,7 @@ fn the_scenes_call_for_every_effect() {
     assert!(missing.is_empty(), "{missing:?}");
 }
 
-/// P4. Killed by: a random number, a sum or a branch that depends on what is compiled in and not on what the scene
+/// Killed by: a random number, a sum or a branch that depends on what is compiled in and not on what the scene
 /// calls for.
 #[test]
 fn pixels_are_the_same_in_every_profile_that_holds_the_scene() {
@@ -87,7 +88,8 @@ fn start<P: Profile>(effects: Effects) -> Option<SessionError> {
 macro_rules! each_effect {
     ($($effect:ident),*) => {
         const EACH: &[Effects] = &[$(Effects::$effect),*];
-        /// What sessions of a profile without an effect, and with no other, say of a scene that calls for all or for it.
+        /// Errors of sessions: of a profile without an effect over a scene that calls for all; of a profile with it
+        /// alone, and of one without any, over a scene that calls for it.
         const STARTS: &[fn() -> [Option<SessionError>; 3]] = &[$(|| [
             start::<Custom<{ !Effects::$effect.0 }>>(Effects(u32::MAX)),
             start::<Custom<{ Effects::$effect.0 }>>(Effects::$effect),
@@ -120,7 +122,7 @@ each_effect!(
     MULTIPLE_SCATTERING
 );
 
-/// P5. Killed by: an effect that a session does not look for, a message without its name.
+/// Killed by: an effect that a session does not look for, a message without its name.
 #[test]
 fn each_effect_outside_the_profile_is_an_error_that_names_it() {
     assert!(Effects::NAMES.iter().map(|(e, _)| e).eq(EACH), "an effect is not tested");
@@ -140,7 +142,7 @@ fn each_effect_outside_the_profile_is_an_error_that_names_it() {
     assert!(matches!(refused, Err(DriveError::Session(SessionError::Profile { .. }))));
 }
 
-/// P6. Killed by: state of a path that a setting or a scene's effects enlarge.
+/// Killed by: state of a path that a setting or a scene's effects enlarge.
 #[test]
 fn bytes_per_path_do_not_depend_on_effects() {
     for s in SCENES {
@@ -151,7 +153,7 @@ fn bytes_per_path_do_not_depend_on_effects() {
     }
 }
 
-/// P8. Killed by: a dispatch that takes another profile than the smallest, a profile that no scene needs.
+/// Killed by: a dispatch that takes another profile than the smallest, a profile that no scene needs.
 #[test]
 fn every_profile_runs_and_none_that_a_scene_does_not_need() {
     let mut runs: BTreeMap<&str, u32> = BTreeMap::new();
@@ -169,6 +171,19 @@ fn every_profile_runs_and_none_that_a_scene_does_not_need() {
     assert!(never.is_empty(), "{never:?} never run: {runs:?}");
     assert_eq!(runs.values().sum::<u32>() as usize, SCENES.len());
     assert!(AnyProfile::ALL.len() <= 12, "each profile is compiled into every host");
+}
+
+/// The firmware's own profile renders its scene as the full one does. Killed by: a profile of another scene.
+#[test]
+fn the_firmware_has_kernels_for_its_scene() {
+    let blob = Parts::tiny().blob();
+    let scene = Scene::from_bytes(blob.bytes()).unwrap();
+    let surplus: Vec<_> = croupier_firmware::Kernels::EFFECTS.without(scene.effects).names().collect();
+    let missing: Vec<_> = scene.effects.without(croupier_firmware::Kernels::EFFECTS).names().collect();
+    assert!(surplus.is_empty() && missing.is_empty(), "{surplus:?} not needed, {missing:?} missing");
+    let (settings, samples) = (Settings { size: [8, 8], ..settings(&scene, "classic") }, [2]);
+    let own = Render(scene, &settings, &samples).visit::<croupier_firmware::Kernels>();
+    assert!(own.bits() == Render(scene, &settings, &samples).visit::<Full>().bits() && own.mean() > 0.0);
 }
 
 /// Killed by: an effect without a reason, a reason for what is not there.
