@@ -13,7 +13,8 @@ use croupier::unstable::simd::{F32x8, U32x8};
 /// Kernels for the firmware's scenes: what they call for, and no more. A session of them is
 /// `Session::builder(scene).profile::<Kernels>().build(&plan, block)`.
 pub type Kernels = Custom<{ SURFACES.with(LIGHTS).with(Effects::LENS).0 }>;
-const SURFACES: Effects = Effects::DIFFUSE.with(Effects::ROUGH_PLASTIC).with(Effects::TEXTURES);
+const SURFACES: Effects =
+    Effects::DIFFUSE.with(Effects::ROUGH_PLASTIC).with(Effects::TEXTURES).with(Effects::SMOOTH_NORMALS);
 const LIGHTS: Effects = Effects::AREA_LIGHTS.with(Effects::ENVIRONMENT).with(Effects::DELTA_LIGHTS);
 
 /// Bytes at an address that is a multiple of 64.
