@@ -18,6 +18,8 @@ macro_rules! materials {
 
 impl Effects {
             $($(#[$doc])* pub const $effect: Self = Self(1 << $number);)*
+            /// The effects of all material kinds.
+            pub const ALL_MATERIALS: Self = Self(0 $(| 1 << $number)*);
         }
 
         const MATERIALS: &[(Effects, &str)] = &[$((Effects::$effect, $name)),*];
@@ -117,16 +119,6 @@ impl Effects {
 
     /// Effects with which light may pass a surface straight on.
     pub const STRAIGHT: Self = Self::NULL.with(Self::THIN_DIELECTRIC).with(Self::ALPHA).with(Self::MEDIA);
-
-    /// The effects of all material kinds.
-    pub const ALL_MATERIALS: Self = {
-        let (mut all, mut i) = (Self(0), 0);
-        while i < MaterialKind::ALL.len() {
-            all = all.with(Self::of_material(MaterialKind::ALL[i]));
-            i += 1;
-        }
-        all
-    };
 
     /// Names of the effects in the set.
     pub fn names(self) -> impl Iterator<Item = &'static str> {

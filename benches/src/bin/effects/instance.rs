@@ -6,6 +6,9 @@ use croupier::{Counters, Plan, Scene};
 use croupier_benches::serial;
 use std::error::Error;
 
+/// Renders a scene, with numbers of samples.
+type Render = fn(Scene<'_>, &Plan, &[u32]) -> Result<(Counters, f64), Box<dyn Error>>;
+
 /// The tracer of one profile.
 #[derive(Clone, Copy)]
 pub(crate) struct Instance {
@@ -14,7 +17,7 @@ pub(crate) struct Instance {
     /// Effects that it contains.
     pub(crate) effects: Effects,
     /// [`serial::render_with`] of the profile.
-    pub(crate) render: fn(Scene<'_>, &Plan, &[u32]) -> Result<(Counters, f64), Box<dyn Error>>,
+    pub(crate) render: Render,
     /// Address of the function that steps.
     pub(crate) step: fn() -> usize,
 }
