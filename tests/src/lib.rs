@@ -12,6 +12,7 @@ pub mod light_oracle;
 pub mod light_scene;
 pub mod math;
 pub mod media_oracle;
+pub mod media_scene;
 pub mod minimum;
 pub mod quadrature;
 pub mod replay;
