@@ -106,12 +106,17 @@ fn light_scattered_once_follows_quadrature() {
                     let mut s = in_the_dark(o, target, *light);
                     add_medium_box(&mut s, medium, [-1.0; 3], [1.0; 3]);
                     let scene = blob(&s);
-                    let image = render(&scene, &Settings { max_depth: 2, ..settings(&scene, "none") }, 16384);
+                    let image = render(&scene, &Settings { max_depth: 2, ..settings(&scene, "none") }, 8192);
                     let what = format!("light {i}, g {g}, {sigma_a:?}, {sigma_s:?}, grid {grid}");
                     let least = expected[0].max(expected[1]).max(expected[2]) / 20.0;
                     // positions near the border of the opaque channel are as coarse as 1e-3 of a free path
                     let rounding = if sigma_a[2] > 1.0 { 2e-3 } else { 3e-4 };
-                    assert_channels(&what, &image, expected, [LIMIT, 0.015, rounding, least]);
+                    assert_channels(
+                        &what,
+                        &image,
+                        expected,
+                        [LIMIT, if sigma_a[2] > 1.0 { 0.04 } else { 0.02 }, rounding, least],
+                    );
                 }
             }
         }
@@ -133,8 +138,8 @@ const FURNACES: [Furnace; 9] = {
         Furnace { strategy, tau, iterations, shadow_roulette: false, control_variate: ControlVariate::Off }
     }
     const ALL: &[f32] = &[0.1, 1.0, 10.0];
-    const ONE: &[u32] = &[2048];
-    const LEARN: &[u32] = &[16, 48, 128, 512, 1024];
+    const ONE: &[u32] = &[1024];
+    const LEARN: &[u32] = &[16, 48, 128, 256, 512];
     [
         of("none", ALL, ONE),
         of("classic", ALL, ONE),
@@ -143,7 +148,7 @@ const FURNACES: [Furnace; 9] = {
         of("adrrs", ALL, LEARN),
         of("ears", ALL, LEARN),
         of("fixed:0.5", &[0.1, 0.5], &[8192]),
-        of("fixed:2", ALL, &[512]),
+        of("fixed:2", ALL, &[128]),
         Furnace { shadow_roulette: true, control_variate: ControlVariate::Cached, ..of("ears", ALL, LEARN) },
     ]
 };
@@ -182,7 +187,8 @@ fn lossless_media_are_invisible() {
                     c.rays() as f64 * 1e-6,
                     start.elapsed().as_secs_f64()
                 );
-                assert_channels(&what, &image, [1.0; 3], [LIMIT, 0.005, 5e-5, 0.0]);
+                let power = if tau > 1.0 { 0.01 } else { 0.005 };
+                assert_channels(&what, &image, [1.0; 3], [LIMIT, power, 5e-5, 0.0]);
                 assert!(c.vertex_samples > c.camera_samples / 100, "{what}: a medium scatters");
             }
         }
@@ -223,8 +229,8 @@ fn a_lossless_medium_changes_nothing_in_a_glowing_box() {
     add_medium_box(&mut s, homogeneous([0.0; 3], [0.4, 0.2, 0.1], 0.3), [-0.95; 3], [0.95; 3]);
     let scene = blob(&s);
     for strategy in ["none", "classic", "fixed:1.3"] {
-        let settings = Settings { max_depth: 200, split_budget: 8, ..settings(&scene, strategy) };
-        let image = render(&scene, &settings, 1024);
-        assert_channels(strategy, &image, [1.5; 3], [LIMIT, 0.01, 5e-5, 0.0]);
+        let settings = Settings { max_depth: 60, split_budget: 8, ..settings(&scene, strategy) };
+        let image = render(&scene, &settings, 512);
+        assert_channels(strategy, &image, [1.5; 3], [LIMIT, 0.015, 5e-5, 0.0]);
     }
 }
