@@ -3,7 +3,7 @@
 use croupier_host::description::*;
 
 use crate::runner::Image;
-use crate::scenes::{add_box, camera, in_white_environment};
+use crate::scenes::*;
 
 /// A medium of density 1.
 pub fn homogeneous(sigma_a: [f32; 3], sigma_s: [f32; 3], g: f32) -> Medium {
@@ -27,6 +27,39 @@ pub fn add_medium(scene: &mut SceneDescription, medium: Medium, model: Model) ->
 pub fn add_medium_box(scene: &mut SceneDescription, medium: Medium, lo: [f32; 3], hi: [f32; 3]) {
     let boundary = add_medium(scene, medium, Model::Null);
     add_box(scene, boundary, lo, hi, false);
+}
+
+/// Fog in a box, denser smoke in a grid within it, a pane before both and a sheet with holes, under a sun and a sky; the
+/// camera is in the fog.
+pub fn misty(size: [u32; 2]) -> SceneDescription {
+    let mut s = SceneDescription {
+        camera: camera([0.3, 0.9, 3.2], [0.0, 0.6, 0.0], 42.0, size),
+        ..SceneDescription::default()
+    };
+    let texels = (0..16u8).map(|i| [40 + 12 * i, 200 - 9 * i, 90, 17 * (i * 7 % 16)]).collect();
+    s.textures.push(Texture { name: "holes".into(), width: 4, height: 4, texels });
+    let values = (0..7 * 6 * 5).map(|i| (i * 37 % 101) as f32 / 50.0 * f32::from(i % 3 != 0)).collect();
+    let smoke = Medium { emission: [0.2, 0.05, 0.0], ..homogeneous([0.5, 0.8, 1.5], [4.0, 3.0, 2.0], 0.5) };
+    let bounds = [[-0.7, 0.1, -0.7], [0.6, 1.2, 0.5]];
+    add_medium_box(&mut s, in_grid(smoke, [7, 6, 5], bounds, values), bounds[0], bounds[1]);
+    let fog = homogeneous([0.02, 0.03, 0.05], [0.1, 0.12, 0.2], -0.2);
+    add_medium_box(&mut s, fog, [-2.5, 0.0, -2.5], [2.5, 2.5, 3.5]);
+    let floor = s.add_material("floor", diffuse([0.6, 0.5, 0.4]));
+    add_quad(&mut s, "floor", floor, facing_y(4.0, -0.05, 1.0));
+    let emitter = s.add_material("emitter", grey(0.3));
+    add_quad(&mut s, "emitter", emitter, facing_y(0.4, 2.2, -1.0));
+    s.emitters.push(Emitter::Area { material: emitter, radiance: [9.0, 8.0, 7.0] });
+    let pane = s.add_material("pane", Model::ThinDielectric { int_ior: 1.5, ext_ior: 1.0 });
+    add_quad(&mut s, "pane", pane, facing_z(0.8, 1.1, 1.0).map(|[x, y, z]| [x - 0.4, y + 0.9, z]));
+    let holes = s.add_material("holes", Model::Diffuse { reflectance: Reflectance::Texture(0) });
+    s.materials[holes as usize].cutout = true;
+    add_quad(&mut s, "holes", holes, facing_z(0.5, 0.8, 1.0).map(|[x, y, z]| [x + 0.8, y + 0.6, z]));
+    let marble = homogeneous([0.1, 0.3, 0.6], [6.0, 5.0, 4.0], 0.0);
+    let skin = add_medium(&mut s, marble, Model::Dielectric { int_ior: 1.4, ext_ior: 1.0 });
+    add_sphere(&mut s, skin, [1.2, 0.4, -0.6], 0.4, Sphere { subdivisions: 3, smooth: true, inwards: false });
+    s.emitters.push(Emitter::Directional { direction: [-1.0, -2.0, -0.5], irradiance: [1.5, 1.4, 1.2] });
+    s.environment = Some(Environment::Constant { radiance: [0.2, 0.3, 0.5] });
+    s
 }
 
 /// 4 x 4 pixels that all look along one line, to 1e-5 of its length, in a constant environment.
