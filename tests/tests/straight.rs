@@ -50,8 +50,9 @@ fn panes_before_delta_lights_are_a_factor() {
             let what = format!("{degrees} degrees, {} panes", heights.len());
             let image = render_as(&s, "none", 2, 16);
             assert_exact(&what, &image, expected, 2e-5);
-            // a shadow ray and one more for each pane, all counted
-            assert_eq!(image.counters.shadow_rays, 256 * (1 + heights.len() as u64), "{what}");
+            // a search for what blocks and a ray to each pane, all counted; on its diagonal a pane counts as two triangles
+            let rays = image.counters.shadow_rays / 256 - heights.len() as u64;
+            assert!((1..=2).contains(&rays), "{what}: {}", image.counters.shadow_rays);
             // panes above the point are not passed
             let at = 1.2f64;
             points.emitters.push(Emitter::Point {
@@ -284,10 +285,11 @@ fn rows_of_panes_are_bounded_and_counted() {
         assert_eq!((c.non_finite, c.camera_samples), (0, 32));
         if n == 1000 {
             assert_exact("1000 sheets", &image, [0.5 / PI; 3], 1e-4);
-            assert_eq!((c.passages_cut, c.shadow_rays), (0, 32 * 1001));
+            assert_eq!(c.passages_cut, 0);
+            assert!((32 * 1001..=32 * 1002).contains(&c.shadow_rays), "{}", c.shadow_rays);
         } else {
             assert_eq!((image.mean(), c.passages_cut), (0.0, 32));
-            assert_eq!(c.shadow_rays, 32 * u64::from(croupier::unstable::MAX_PASSED));
+            assert_eq!(c.shadow_rays, 32 * u64::from(1 + croupier::unstable::MAX_PASSED));
         }
         // from above through all of them
         s.camera = camera([0.0, 20.0, 0.0], [0.0; 3], 0.01, [4, 4]);
