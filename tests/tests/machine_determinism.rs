@@ -53,7 +53,7 @@ fn schedules_do_not_change_a_bit() {
 #[test]
 fn schedules_do_not_change_what_is_learned() {
     for (name, scene) in
-        [("cornell", cornell([24, 20])), ("everything", everything([24, 20])), ("misty", misty([36, 28]))]
+        [("cornell", cornell([24, 20])), ("everything", everything([24, 20])), ("misty", misty([56, 40]))]
     {
         let scene = blob(&scene);
         for all in [false, true] {
