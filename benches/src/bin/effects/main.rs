@@ -155,26 +155,20 @@ fn effects(folder: &Folder, text: &Text, bases: &[Counts]) -> Result<Table, Box<
         if present.rays != base.counted.rays {
             return Err(format!("{name}: the paths differ where it is not used").into());
         }
-        let used = match row.used {
-            Some(build) => {
-                let mut scene = row.base.scene();
-                build(&mut scene);
-                let blob = folder.bake("used", &scene)?;
-                let bytes = callgrind::read(&blob)?;
-                let called_for = Scene::from_bytes(&bytes)?.effects;
-                if !called_for.contains(*effect) {
-                    return Err(format!("{name}: its scene does not use it").into());
-                }
-                format!("{:.2}", count(folder, &blob, &row.instance, "classic", SMALL)?.per_ray()[0])
-            }
-            None => "-".into(),
-        };
+        let mut scene = row.base.scene();
+        (row.used)(&mut scene);
+        let blob = folder.bake("used", &scene)?;
+        let bytes = callgrind::read(&blob)?;
+        if !Scene::from_bytes(&bytes)?.effects.contains(*effect) {
+            return Err(format!("{name}: its scene does not use it").into());
+        }
+        let used = count(folder, &blob, &row.instance, "classic", SMALL)?.per_ray()[0];
         let [absent, present] = [base.counted, present].map(|c| c.per_ray()[0]);
         let with = text.bytes((row.instance.step)())?;
         let more = with as i64 - base.text as i64;
-        let [absent_text, present_text] = [absent, present].map(|x| format!("{x:.2}"));
+        let [absent_text, present_text, used_text] = [absent, present, used].map(|x| format!("{x:.2}"));
         table.add(
-            [(*name).into(), row.base.name().into(), absent_text, present_text, used, percent(present, absent)]
+            [(*name).into(), row.base.name().into(), absent_text, present_text, used_text, percent(present, absent)]
                 .into_iter()
                 .chain([base.text.to_string(), with.to_string(), more.to_string()]),
         );
