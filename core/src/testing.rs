@@ -104,7 +104,8 @@ pub(crate) fn scene<R>(f: impl FnOnce(&Scene<'_>) -> R) -> R {
         densities: &[],
         majorants: &[],
         names: &[],
-        effects: Effects(u32::MAX),
+        // nothing that light may pass
+        effects: Effects(!Effects::STRAIGHT.0),
         hash: 1,
     }))
 }

@@ -14,6 +14,7 @@ pub mod light_scene;
 pub mod math;
 pub mod media_flights;
 pub mod media_oracle;
+pub mod media_scene;
 pub mod minimum;
 pub mod model;
 pub mod quadrature;

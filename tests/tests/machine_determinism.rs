@@ -6,6 +6,7 @@ use croupier::unstable::learn::ControlVariate;
 use croupier::unstable::scene::blob::content_hash;
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::builtin;
+use croupier_tests::media_scene::misty;
 use croupier_tests::runner::{Image, Learned, Schedule, learning, render, scheduled, settings};
 use croupier_tests::scenes::{blob, cornell, everything};
 use std::fmt::Write;
@@ -15,7 +16,9 @@ use std::path::Path;
 /// step that flushes a half-filled packet at the end of its budget, a merge in the order of completion.
 #[test]
 fn schedules_do_not_change_a_bit() {
-    for (name, scene) in [("cornell", cornell([24, 20])), ("everything", everything([24, 20]))] {
+    for (name, scene) in
+        [("cornell", cornell([24, 20])), ("everything", everything([24, 20])), ("misty", misty([24, 20]))]
+    {
         let scene = blob(&scene);
         for strategy in ["classic:2", "fixed:3.3"] {
             let settings = Settings { shards: 5, aovs: true, seed: 7, max_depth: 5, ..settings(&scene, strategy) };
@@ -49,7 +52,9 @@ fn schedules_do_not_change_a_bit() {
 /// the picture summed per thread, adaptive counts that a shard makes for itself.
 #[test]
 fn schedules_do_not_change_what_is_learned() {
-    for (name, scene) in [("cornell", cornell([24, 20])), ("everything", everything([24, 20]))] {
+    for (name, scene) in
+        [("cornell", cornell([24, 20])), ("everything", everything([24, 20])), ("misty", misty([36, 28]))]
+    {
         let scene = blob(&scene);
         for all in [false, true] {
             let mut settings = Settings { shards: 5, aovs: true, seed: 8, max_depth: 6, ..settings(&scene, "ears") };
@@ -100,7 +105,7 @@ fn schedules_do_not_change_what_is_learned() {
 /// shard.
 #[test]
 fn samples_do_not_depend_on_iterations_or_shards() {
-    for scene in [cornell([21, 10]), everything([21, 10])] {
+    for scene in [cornell([21, 10]), everything([21, 10]), misty([21, 10])] {
         let scene = blob(&scene);
         let one = Settings { max_depth: 6, aovs: true, ..settings(&scene, "none") };
         let reference = render(&scene, &one, 12);
@@ -185,7 +190,9 @@ fn pictures_have_the_same_bits_on_every_target() {
     let mut box_of_the_program = builtin::cornell_box();
     box_of_the_program.camera.size = [48, 48];
     let mut text = String::from("# scene, strategy, hash of all sums of the film; rewrite with BLESS=1\n");
-    for (name, scene) in [("builtin", box_of_the_program), ("everything", everything([48, 36]))] {
+    for (name, scene) in
+        [("builtin", box_of_the_program), ("everything", everything([48, 36])), ("misty", misty([48, 36]))]
+    {
         let scene = bake(&scene, &BakeOptions::default(), |_, _| {}).unwrap().bytes;
         let base = Settings { shards: 4, aovs: true, max_depth: 12, split_budget: 64, ..settings(&scene, "none") };
         let mut add = |what: &str, settings: Settings, iterations: &[u32]| {

@@ -2,7 +2,7 @@
 //! like others, bounds of steps and counters hold.
 
 use croupier::unstable::MAX_PATH_LENGTH;
-use croupier::unstable::accel::{Intersector, WideBvh};
+use croupier::unstable::accel::{Intersector, Occlusion8, WideBvh};
 use croupier::unstable::film::{PixelAov, PixelStats};
 use croupier::unstable::geometry::{Hit8, Ray8};
 use croupier::unstable::profile::Full;
@@ -65,6 +65,10 @@ impl Intersector for Faulty<'_> {
 
     fn occluded(&self, rays: &Ray8, active: Mask8) -> Mask8 {
         self.inner.occluded(rays, active)
+    }
+
+    fn occluded_by(&self, rays: &Ray8, active: Mask8, blocks: &dyn Fn(u32) -> bool) -> Occlusion8 {
+        self.inner.occluded_by(rays, active, blocks)
     }
 }
 

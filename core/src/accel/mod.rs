@@ -3,11 +3,13 @@
 //! | file | holds |
 //! |---|---|
 //! | `wide` | [`WideBvh`]: the built-in [`Intersector`], grouping of rays |
+//! | `blocking` | which triangles end a search for any hit |
 //! | `setup` | per-ray constants, eight rays at once |
 //! | `triangle` | the watertight triangle test, the same lanes for 8 triangles or 8 rays |
 //! | `single` | one ray against 8-wide nodes and 8-triangle leaves |
 //! | `packet` | up to eight rays of one octant together |
 
+mod blocking;
 mod packet;
 mod setup;
 mod single;
@@ -17,7 +19,7 @@ mod wide;
 pub use wide::WideBvh;
 
 use crate::geometry::{Hit8, Ray8};
-use croupier_simd::Mask8;
+use croupier_simd::{Mask8, U32x8};
 
 /// Intersection of rays with the scene. The built-in one traverses the scene's tree; hosts may bring their own.
 ///
@@ -29,4 +31,20 @@ pub trait Intersector {
 
     /// Active lanes with any hit.
     fn occluded(&self, rays: &Ray8, active: Mask8) -> Mask8;
+
+    /// What active lanes meet where some triangles let light pass: `blocks` says by its index whether a triangle ends a
+    /// ray. Provided: an intersector that cannot ask leaves every ray that meets anything to be followed.
+    fn occluded_by(&self, rays: &Ray8, active: Mask8, _blocks: &dyn Fn(u32) -> bool) -> Occlusion8 {
+        let met = self.occluded(rays, active);
+        Occlusion8 { blocked: Mask8::NONE, passed: U32x8::select(met, U32x8::splat(u32::MAX), U32x8::splat(0)) }
+    }
+}
+
+/// What eight rays meet that some triangles do not block; see [`Intersector::occluded_by`].
+#[derive(Clone, Copy, Debug)]
+pub struct Occlusion8 {
+    /// Lanes that meet a triangle that blocks.
+    pub blocked: Mask8,
+    /// Triangles that do not block on the way, at least as many as there are; meaningless in blocked lanes.
+    pub passed: U32x8,
 }

@@ -15,6 +15,7 @@
 //!    box when it is popped: fewer tests, as some are behind a hit by then, and a fifth of the memory of keeping their
 //!    entries.
 
+use super::blocking::Blocking;
 use super::setup::{Setup, each};
 use super::single::{Hit1, Hits, Keys, STACK, key, test_leaf, walk};
 use super::triangle::{Line, intersect};
@@ -75,12 +76,13 @@ fn one(i: usize) -> Mask8 {
 /// Walks the rays `group` of `s` (one octant, one major axis) from the root. Closest: improves `hits`. Any: returns the
 /// lanes with a hit. `stack` is for single rays.
 #[inline(never)]
-pub(super) fn walk_packet<const ANY: bool>(
+pub(super) fn walk_packet<const ANY: bool, B: Blocking>(
     tree: (&[Node], &[Leaf]),
     s: &Setup,
     group: u32,
     hits: &mut Hits,
     stack: &mut Keys,
+    blocking: B,
 ) -> u32 {
     let mut keys: Keys = [0; STACK];
     let lead = group.trailing_zeros() as usize & 7;
@@ -120,7 +122,7 @@ pub(super) fn walk_packet<const ANY: bool>(
         if child & LEAF_BIT == 0 {
             if n <= FEW {
                 let mut h = b.store();
-                let found = walk::<ANY>(tree, (child, &entry.to_array()), s, rays, &mut h, stack);
+                let found = walk::<ANY, B>(tree, (child, &entry.to_array()), (s, rays), &mut h, stack, blocking);
                 if ANY {
                     occluded |= found;
                     b.t = Mask8::from_bits(found).select(never, b.t);
@@ -160,7 +162,7 @@ pub(super) fn walk_packet<const ANY: bool>(
             if n < triangles {
                 for i in Mask8::from_bits(rays).lanes() {
                     let mut h = b.lane(i);
-                    if test_leaf::<ANY, true>(leaf, s, i, entry.lane(i), &mut h) {
+                    if test_leaf::<ANY, true, B>(leaf, s, i, entry.lane(i), &mut h, blocking) {
                         changed = true;
                         if ANY {
                             occluded |= 1 << i;
@@ -177,6 +179,9 @@ pub(super) fn walk_packet<const ANY: bool>(
                     // rays that miss the leaf's box miss its triangles, also when they go on as single rays
                     let mask = c.mask & inside;
                     if ANY {
+                        if !B::ALL && (mask.none() || !blocking.blocks(leaf.triangle[i], mask.bits())) {
+                            continue;
+                        }
                         occluded |= mask.bits();
                         b.t = mask.select(never, b.t);
                         changed = true;

@@ -14,13 +14,14 @@
 //!    meets nothing at all is a branch; without it, such nodes cost more. Sorted stacks save 1 % of the nodes and 3 %
 //!    of the leaves, but not their own cost.
 //! 2. Entry and child share a `u64`: one read, one write. Entries are never negative, so their bits compare like them.
-//! 3. Any hit: no order but that of the slots, the first hit ends it.
+//! 3. Any hit: no order but that of the slots, the first hit that blocks ends it.
 //! 4. A hit counts from `max(t, entry of its leaf)`: so a subtree entered after the closest hit holds nothing closer,
 //!    not even by rounding, and the result does not depend on the order of visits. Equal t: the lower triangle index.
 //! 5. While one ray waits for a node or a leaf from memory, the processor already works on the next ray. Rays share one
 //!    stack of the full size: a ray that fills its eighth begins anew with all of it, and (4) gives the same result.
 //!    Dropped: nodes of all rays first and then leaves, reading ahead what is next (slower).
 
+use super::blocking::Blocking;
 use super::setup::{Setup, each};
 use super::triangle::{Line, intersect};
 use crate::scene::blob::{CHILD_INDEX, LEAF_BIT, Leaf, NONE, Node};
@@ -66,12 +67,13 @@ impl Hits {
 /// Tests lane `i` of `s` against the triangles of `leaf`, which it enters at `entry`. Closest: improves `best`, returns
 /// whether it did. Any: returns whether there is a hit at or before `best.t`. `EARLY`: see [`intersect`].
 #[inline(always)]
-pub(super) fn test_leaf<const ANY: bool, const EARLY: bool>(
+pub(super) fn test_leaf<const ANY: bool, const EARLY: bool, B: Blocking>(
     leaf: &Leaf,
     s: &Setup,
     i: usize,
     entry: f32,
     best: &mut Hit1,
+    blocking: B,
 ) -> bool {
     let axes = s.axes(i);
     let line = Line {
@@ -85,7 +87,12 @@ pub(super) fn test_leaf<const ANY: bool, const EARLY: bool>(
     let p = each(|v| each(|k| F32x8::new(leaf.p[3 * v + axes[k]])));
     let Some(c) = intersect::<ANY, EARLY>(&p, &line, F32x8::splat(best.t)) else { return false };
     if ANY {
-        return c.mask.any();
+        // each is asked, so that all that let the ray pass are counted
+        return if B::ALL {
+            c.mask.any()
+        } else {
+            c.mask.lanes().fold(false, |hit, k| hit | blocking.blocks(leaf.triangle[k], 1 << i))
+        };
     }
     let t = c.mask.select(F32x8::splat(entry).max(c.t), F32x8::INFINITY);
     let nearest = t.min_lane();
@@ -119,17 +126,17 @@ pub(super) fn key(x: f32, y: u32) -> u64 {
 
 /// Walks the subtree `root` with the rays `lanes` of `s`, which enter it at `entry`. Closest: improves `hits`. Any:
 /// returns the lanes with a hit at or before `hits.t`; each stops at its first.
-pub(super) fn walk<const ANY: bool>(
+pub(super) fn walk<const ANY: bool, B: Blocking>(
     tree: (&[Node], &[Leaf]),
     root: (u32, &[f32; 8]),
-    s: &Setup,
-    lanes: u32,
+    (s, lanes): (&Setup, u32),
     hits: &mut Hits,
     stack: &mut Keys,
+    blocking: B,
 ) -> u32 {
-    let (mut found, deep) = take_turns::<ANY, { STACK / 8 }>(tree, root, (s, lanes), hits, stack);
+    let (mut found, deep) = take_turns::<ANY, { STACK / 8 }, B>(tree, root, (s, lanes), hits, stack, blocking);
     for i in Mask8::from_bits(deep).lanes() {
-        found |= take_turns::<ANY, STACK>(tree, root, (s, 1 << i), hits, stack).0;
+        found |= take_turns::<ANY, STACK, B>(tree, root, (s, 1 << i), hits, stack, blocking).0;
     }
     found
 }
@@ -137,12 +144,13 @@ pub(super) fn walk<const ANY: bool>(
 /// [`walk`] with `ROOM` entries of the stack for each ray. Returns the lanes with any hit, and those that need more
 /// room: their `hits` are real, though perhaps not the closest.
 #[inline(never)]
-fn take_turns<const ANY: bool, const ROOM: usize>(
+fn take_turns<const ANY: bool, const ROOM: usize, B: Blocking>(
     (nodes, leaves): (&[Node], &[Leaf]),
     (root, entry): (u32, &[f32; 8]),
     (s, lanes): (&Setup, u32),
     hits: &mut Hits,
     stack: &mut Keys,
+    blocking: B,
 ) -> (u32, u32) {
     let mut current: [u64; 8] = core::array::from_fn(|i| key(entry[i], root));
     let mut tops = [0usize; 8];
@@ -198,7 +206,7 @@ fn take_turns<const ANY: bool, const ROOM: usize>(
             } else if let Some(leaf) = leaves.get((child & CHILD_INDEX) as usize) {
                 let mut best = Hit1 { t: hits.t[i], triangle: hits.triangle[i], u: hits.u[i], v: hits.v[i] };
                 let entry = f32::from_bits((current[i] >> 32) as u32);
-                let hit = test_leaf::<ANY, false>(leaf, s, i, entry, &mut best);
+                let hit = test_leaf::<ANY, false, B>(leaf, s, i, entry, &mut best, blocking);
                 if !ANY {
                     hits.set(i, &best);
                 } else if hit {

@@ -3,13 +3,15 @@
 //! Rays are grouped by direction octant and major axis; groups of more than [`FEW`] walk the tree as a packet, which
 //! doubles the throughput of coherent rays; the others go one by one, which is best for incoherent ones.
 
-use super::Intersector;
+use super::blocking::{Asked, Blocking, Everything};
 use super::packet::{FEW, walk_packet};
 use super::setup::Setup;
 use super::single::{Hits, Keys, STACK, walk};
+use super::{Intersector, Occlusion8};
 use crate::geometry::{Hit8, Ray8};
 use crate::scene::Scene;
 use crate::scene::blob::{Leaf, NONE, Node};
+use core::cell::Cell;
 use croupier_simd::{F32x8, Mask8, U32x8};
 
 /// Built-in intersector: the scene's own tree of 8-wide nodes and 8-triangle leaves.
@@ -46,9 +48,10 @@ impl<'s> WideBvh<'s> {
         Self { nodes, leaves, extent }
     }
 
-    /// Traces the valid rays of `s`. Closest: improves `hits`. Any: returns the lanes with a hit.
+    /// Traces the valid rays of `s`. Closest: improves `hits`. Any: returns the lanes with a hit
+    /// that blocks.
     #[inline(always)]
-    fn trace<const ANY: bool>(&self, s: &Setup, hits: &mut Hits) -> u32 {
+    fn trace<const ANY: bool, B: Blocking>(&self, s: &Setup, hits: &mut Hits, blocking: B) -> u32 {
         let tree = (self.nodes, self.leaves);
         let mut stack: Keys = [0; STACK];
         let (mut left, mut single, mut occluded) = (s.valid, 0, 0);
@@ -58,11 +61,11 @@ impl<'s> WideBvh<'s> {
             if group.count_ones() <= FEW {
                 single |= group;
             } else {
-                occluded |= walk_packet::<ANY>(tree, s, group, hits, &mut stack);
+                occluded |= walk_packet::<ANY, B>(tree, s, group, hits, &mut stack, blocking);
             }
         }
         if single != 0 {
-            occluded |= walk::<ANY>(tree, (0, &s.tmin), s, single, hits, &mut stack);
+            occluded |= walk::<ANY, B>(tree, (0, &s.tmin), (s, single), hits, &mut stack, blocking);
         }
         occluded
     }
@@ -73,7 +76,7 @@ impl Intersector for WideBvh<'_> {
         let s = Setup::new(rays, active, self.extent);
         let mut hits = Hits::none(s.limit);
         if !self.nodes.is_empty() && s.valid != 0 {
-            self.trace::<false>(&s, &mut hits);
+            self.trace::<false, _>(&s, &mut hits, Everything);
         }
         let triangle = U32x8::new(hits.triangle);
         let hit = !triangle.eq(U32x8::splat(NONE));
@@ -91,6 +94,16 @@ impl Intersector for WideBvh<'_> {
         if self.nodes.is_empty() || s.valid == 0 {
             return Mask8::NONE;
         }
-        Mask8::from_bits(self.trace::<true>(&s, &mut Hits::none(s.limit)))
+        Mask8::from_bits(self.trace::<true, _>(&s, &mut Hits::none(s.limit), Everything))
+    }
+
+    fn occluded_by(&self, rays: &Ray8, active: Mask8, blocks: &dyn Fn(u32) -> bool) -> Occlusion8 {
+        let s = Setup::new(rays, active, self.extent);
+        let passed = [const { Cell::new(0) }; 8];
+        let mut blocked = 0;
+        if !self.nodes.is_empty() && s.valid != 0 {
+            blocked = self.trace::<true, _>(&s, &mut Hits::none(s.limit), Asked { blocks, passed: &passed });
+        }
+        Occlusion8 { blocked: Mask8::from_bits(blocked), passed: U32x8::from_fn(|i| passed[i].get()) }
     }
 }

@@ -5,7 +5,7 @@ use super::book::Bookkeeping;
 use super::job::Job;
 use super::ledger::NO_RECORD;
 use super::media_set::MediaSet8;
-use super::packets::{RayKind, RayState8};
+use super::packets::RayState8;
 use super::path::Path8;
 use super::root::PixelTarget;
 use crate::camera;
@@ -110,11 +110,14 @@ pub(crate) fn camera_rays<W: World>(
     RayState8 {
         active: Mask8::first(lanes),
         ray: Ray8::unbounded(o, d),
-        kind: RayKind::Camera,
         from: o,
         normal: Vec3x8::ZERO,
         travelled: F32x8::ZERO,
-        media: MediaSet8::splat(world.camera_media()),
+        media: if W::EFFECTS.contains(Effects::MEDIA) {
+            MediaSet8::splat(world.camera_media())
+        } else {
+            MediaSet8::NONE
+        },
         beta: Vec3x8::ONE,
         weight: Vec3x8::ONE,
         pdf: F32x8::ONE,

@@ -13,7 +13,11 @@ use croupier_simd::{F32x8, Mask8, Vec3x8};
 pub(crate) fn media_towards<W: World>(world: &W, samples: &Samples8, wi: Vec3x8) -> MediaSet8 {
     let (v, scene) = (&samples.vertex, world.scene());
     let surface = matches!(samples.class.kernel(), Kernel::Surface(_));
-    if !W::EFFECTS.contains(Effects::MEDIA) || !surface || scene.media.is_empty() {
+    if !W::EFFECTS.contains(Effects::MEDIA) {
+        // a constant: the set is not kept
+        return MediaSet8::NONE;
+    }
+    if !surface || scene.media.is_empty() {
         return v.media;
     }
     let inwards = wi.dot(v.ng).lt(F32x8::ZERO);

@@ -26,7 +26,6 @@ fn bit(medium: u32) -> u32 {
 
 impl MediaSet8 {
     /// Outside of all media.
-    #[cfg(test)]
     pub(crate) const NONE: Self = Self(U32x8::splat(0));
 
     /// The same set in all lanes.

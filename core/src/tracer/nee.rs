@@ -2,7 +2,6 @@
 //! roulette for its shadow ray.
 
 use super::book::Bookkeeping;
-use super::crossing::media_towards;
 use super::packets::{Contribution8, Samples8, ShadowRays8};
 use crate::bsdf::Eval8;
 use crate::geometry::{self, Ray8};
@@ -55,15 +54,7 @@ pub(crate) fn shadow_rays<W: World>(
         found.local = found.local / p;
         active = on;
     }
-    active.any().then(|| ShadowRays8 {
-        active,
-        ray: towards_light(samples, l),
-        media: media_towards(world, samples, l.wi),
-        key: samples.key,
-        path: samples.path,
-        found,
-        towards,
-    })
+    active.any().then(|| ShadowRays8 { active, ray: towards_light(samples, l), path: samples.path, found, towards })
 }
 
 /// Rays from the vertices to the light samples.

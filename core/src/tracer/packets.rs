@@ -34,8 +34,6 @@ pub(crate) struct RayState8 {
     pub active: Mask8,
     /// The rays; unit directions.
     pub ray: Ray8,
-    /// What the rays are.
-    pub kind: RayKind,
     /// Vertices that the rays left (before the offset), from where light sampling could have found what they hit.
     pub from: Vec3x8,
     /// Geometric normals there.
@@ -62,7 +60,7 @@ pub(crate) struct RayState8 {
     pub error_weight: Vec3x8,
 }
 
-/// What the rays of a packet are: all of them are of one kind.
+/// What the rays of a packet are: all of one kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RayKind {
     /// From the camera.
@@ -80,10 +78,6 @@ pub(crate) struct ShadowRays8 {
     pub active: Mask8,
     /// From the vertex to the light sample.
     pub ray: Ray8,
-    /// Media around the origins.
-    pub media: MediaSet8,
-    /// Random keys of the samples that the rays belong to.
-    pub key: Key8,
     /// Whose rays these are.
     pub path: Path8,
     /// What counts where the light sample is visible.

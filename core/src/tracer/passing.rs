@@ -8,7 +8,7 @@ use super::book::Bookkeeping;
 use super::class::PacketClass;
 use super::crossing::across;
 use super::media_set::MediaSet8;
-use super::packets::{RayKind, RayState8};
+use super::packets::RayState8;
 use super::path::Path8;
 use super::ring::{Ring, Taken8};
 use super::shading::Arrival8;
@@ -69,7 +69,6 @@ impl RayState8 {
         Self {
             active,
             ray: Ray8::unbounded(Vec3x8::new(a[0], a[1], a[2]), Vec3x8::new(b[0], b[1], b[2])),
-            kind: RayKind::Straight,
             from: Vec3x8::new(b[3], b[4], b[5]),
             normal: Vec3x8::new(a[4], a[5], a[6]),
             travelled: a[3],

@@ -22,6 +22,7 @@ use super::job::Job;
 use super::medium::{arrive_in_media, cross_media};
 use super::nee::{sample_lights, shadow_rays};
 use super::occlude::occlude;
+use super::packets::RayKind;
 use super::passing::{pass, straight_rays};
 use super::refill::{Refill, refill, samples};
 use super::roulette::roulette;
@@ -41,10 +42,19 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
     let State { cursor, ring, book, comb } = state;
     let settings = &job.settings;
 
-    let mut rays = match refill(cursor, ring, book) {
+    let filled = refill(cursor, ring, book);
+    let kind = match filled {
+        Refill::Done => return false,
+        Refill::Camera => RayKind::Camera,
+        Refill::Straight(_) => RayKind::Straight,
+        Refill::Samples(_) => RayKind::Scattered,
+    };
+    let mut rays = match filled {
         Refill::Done => return false,
         Refill::Camera => camera_rays(world, job, index, cursor, book),
-        Refill::Straight(taken) => straight_rays(ring, &taken),
+        Refill::Straight(taken) if W::EFFECTS.intersects(Effects::STRAIGHT) => straight_rays(ring, &taken),
+        // nothing lets rays pass: none waits
+        Refill::Straight(_) => return true,
         Refill::Samples(taken) => {
             let samples = samples(world, ring, book, &taken);
             let light = sample_lights(world, &samples);
@@ -52,7 +62,7 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
             if let Some(light) = light {
                 let roulette = settings.shadow_roulette;
                 if let Some(mut shadow) = shadow_rays(world, book, &samples, &light, &scattered.nee, roulette) {
-                    let visible = occlude(world, book, &mut shadow);
+                    let visible = occlude(world, book, &samples, &mut shadow);
                     book.learn_shadow_rays(&samples, &shadow, visible);
                     book.accumulate(visible, &shadow.path, &shadow.found);
                 }
@@ -66,7 +76,7 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
         return true;
     }
 
-    let mut hit = trace(world, book, &rays);
+    let mut hit = trace(world, book, &rays, kind);
     let collision = cross_media(world, book, ring, &mut rays, &mut hit);
     let escaped = rays.active.and_not(hit.hit | collision.mask);
     if escaped.any() {

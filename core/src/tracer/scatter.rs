@@ -2,7 +2,7 @@
 
 use super::class::Kernel as ClassKernel;
 use super::crossing::media_towards;
-use super::packets::{RayKind, RayState8, Samples8};
+use super::packets::{RayState8, Samples8};
 use crate::bsdf::{self, Bsdf, Eval8, HenyeyGreenstein, Inputs8, Sample8, Visitor};
 use crate::geometry::{self, Ray8};
 use crate::scene::{Effects, Scene};
@@ -69,7 +69,6 @@ pub(crate) fn scatter<W: World>(world: &W, samples: &Samples8, nee: Option<Vec3x
         rays: RayState8 {
             active: valid & beta.any_positive() & finite,
             ray: Ray8::unbounded(geometry::offset(v.p, v.ng, v.error, wi), wi),
-            kind: RayKind::Scattered,
             from: v.p,
             normal: v.ng,
             travelled: F32x8::ZERO,

@@ -74,7 +74,6 @@ fn rays(shard: &mut Shard<'_>) -> RayState8 {
     RayState8 {
         active: Mask8::all_lanes(),
         ray: Ray8::unbounded(o, d),
-        kind: RayKind::Camera,
         from: o,
         normal: Vec3x8::ZERO,
         travelled: F32x8::ZERO,
@@ -93,7 +92,7 @@ fn rays(shard: &mut Shard<'_>) -> RayState8 {
 fn arrive(world: &TestWorld<'_>, shard: &mut Shard<'_>, depth: u32) -> (RayState8, SurfaceHit8, Arrival8) {
     let mut rays = rays(shard);
     rays.path.depth = U32x8::splat(depth);
-    let hit = SurfaceHit8::gather(world.scene(), &trace(world, &mut shard.state.book, &rays));
+    let hit = SurfaceHit8::gather(world.scene(), &trace(world, &mut shard.state.book, &rays, RayKind::Camera));
     let arrival = shade(world, &rays, &hit, &hit.point());
     (rays, hit, arrival)
 }
@@ -290,10 +289,9 @@ fn occlusion_is_found_and_charged() {
             let ray = Ray8 { o, d, tmin: F32x8::ZERO, tmax: F32x8::ONE };
             let found = Contribution8 { pixel: Vec3x8::ONE, local: Vec3x8::ONE };
             let active = Mask8::from_bits(0b0011_1111);
-            let key = Key8::camera(1, U32x8::splat(0), U32x8::splat(0));
-            let (media, towards) = (MediaSet8::NONE, U32x8::splat(NO_BIN));
-            let mut s = ShadowRays8 { active, ray, media, key, path, found, towards };
-            assert_eq!(occlude(world, &mut shard.state.book, &mut s).bits(), 0b0010_1010);
+            let samples = Samples8 { path, ..floor_samples(shard, MaterialKind::Diffuse, true) };
+            let mut s = ShadowRays8 { active, ray, path, found, towards: U32x8::splat(NO_BIN) };
+            assert_eq!(occlude(world, &mut shard.state.book, &samples, &mut s).bits(), 0b0010_1010);
             let rays = path.root.to_array().map(|r| shard.state.book.roots.get(r).rays);
             assert_eq!(rays, [1, 1, 1, 1, 1, 1, 0, 0]);
             assert_eq!((shard.state.book.counters.shadow_rays, shard.state.book.counters.occlude.lanes), (6, 6));
@@ -341,15 +339,14 @@ fn rays_find_what_they_hit() {
         |world, shard| {
             let mut r = rays(shard);
             r.active = Mask8::from_bits(0b1111_1101);
-            let hit = trace(world, &mut shard.state.book, &r);
+            let hit = trace(world, &mut shard.state.book, &r, RayKind::Camera);
             assert_eq!(hit.hit.bits(), 0b0111_1101);
             assert_eq!(hit.triangle.to_array()[2..7], [1, 0, 2, 2, 3]);
             assert_eq!([0, 4, 5, 6].map(|i| hit.t.lane(i)), [0.5, 0.5, 0.5, 1.5]);
             let charged = r.path.root.to_array().map(|root| shard.state.book.roots.get(root).rays);
             assert_eq!(charged, [1, 0, 1, 1, 1, 1, 1, 1]);
             assert_eq!((shard.state.book.counters.trace.lanes, shard.state.book.counters.scatter_rays), (7, 0));
-            r.kind = RayKind::Scattered;
-            trace(world, &mut shard.state.book, &r);
+            trace(world, &mut shard.state.book, &r, RayKind::Scattered);
             assert_eq!(shard.state.book.counters.scatter_rays, 7);
         },
     );
@@ -363,7 +360,7 @@ fn emission_is_weighted_against_light_samples() {
         |_| (),
         |world, shard| {
             let mut r = rays(shard);
-            let hit = SurfaceHit8::gather(world.scene(), &trace(world, &mut shard.state.book, &r));
+            let hit = SurfaceHit8::gather(world.scene(), &trace(world, &mut shard.state.book, &r, RayKind::Camera));
             let ng = hit.point().ng;
             let escaped = Mask8::from_bits(0b1000_0000);
             for skip_mis in [true, false] {

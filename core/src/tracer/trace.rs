@@ -9,10 +9,10 @@ use crate::world::World;
 
 /// What the rays of a packet hit.
 #[inline(always)]
-pub(crate) fn trace<W: World>(world: &W, book: &mut Bookkeeping<'_>, rays: &RayState8) -> Hit8 {
+pub(crate) fn trace<W: World>(world: &W, book: &mut Bookkeeping<'_>, rays: &RayState8, kind: RayKind) -> Hit8 {
     let n = rays.active.count();
     book.counters.trace.count(n);
-    match rays.kind {
+    match kind {
         // counted where they begin
         RayKind::Camera => (),
         RayKind::Scattered => book.counters.scatter_rays += u64::from(n),
