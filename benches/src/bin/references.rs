@@ -11,9 +11,9 @@
 //! - none is beyond 6,
 //! - the mean of the image is within [`MAX_RATIO`] or 3 standard errors of the reference's.
 //!
-//! Where the reference is known to be wrong, and why, is listed in [`NOTES`], which the results repeat. Of blocks: scores
-//! are taken without them, and the table shows the figures with them in brackets. Of a whole scene: its rows show their
-//! figures and have no verdict. Biased settings must fail: their rows are as expected if the test notices.
+//! Where the reference is known to be wrong, and why, is listed in [`NOTES`], which the results repeat. Of blocks:
+//! scores are taken without them, and the table shows the figures with them in brackets. Of a whole scene: its rows
+//! show their figures and have no verdict. Biased settings must fail: their rows are as expected if the test notices.
 //!
 //! `--write` puts a run of all rows into `benches/results/references.md`; its figures depend on nothing but the program
 //! and the scenes. Exit status: 0 all rows as expected, or the scenes are not there; 1 otherwise.
@@ -169,22 +169,23 @@ const NOTES: &[Note] = &[
     Note {
         scene: "white_furnace",
         region: Region::Blocks(on_polished_outline),
-        why: "Outlines of the spheres with a smooth specular lobe (Mirror, Dielectric, Plastic, ConductorAl). Near the \
-              outline interpolated normals send some specular paths into the faceted sphere. The reference lets rays start \
-              9e-5 (1 + largest coordinate) beside the surface; that is a third of the facets' depth, so such paths are \
-              caught inside until max_depth and 1 % of the outline's light is lost. Here rays start within the rounding \
-              error of the surface, and the paths leave at the next facet. With the reference's offset put into \
-              `accel::surface_point` the scores of these blocks are inconspicuous (largest 3.8, 0.26 % of all beyond 3).",
+        why: "Outlines of the spheres with a smooth specular lobe (Mirror, Dielectric, Plastic, ConductorAl). Near \
+              the outline interpolated normals send some specular paths into the faceted sphere. The reference lets \
+              rays start 9e-5 (1 + largest coordinate) beside the surface; that is a third of the facets' depth, so \
+              such paths are caught inside until max_depth and 1 % of the outline's light is lost. Here rays start \
+              within the rounding error of the surface, and the paths leave at the next facet. With the reference's \
+              offset put into `accel::surface_point` the scores of these blocks are inconspicuous (largest 3.8, 0.26 \
+              % of all beyond 3).",
     },
     Note {
         scene: "volumetric_caustic",
         region: Region::Everywhere,
-        why: "The reference lacks the single scattering of the fog close to the light, and all that follows from it. The \
-              light lies 1 cm above the fog's top. The reference's shadow rays start a little beyond that boundary, but \
-              are cut by the whole distance to the light, so that short ones meet the light itself and count as \
-              blocked: above y = 1.6 a factor of 3 is missing. In the other renderer (Mitsuba 3.9.1, volpath and \
-              volpathmis alike), the fog's top moved from 1.97 to 1.997, above the light at 1.98, triples the picture \
-              there, and makes it the one that is rendered here.",
+        why: "The reference lacks the single scattering of the fog close to the light, and all that follows from it. \
+              The light lies 1 cm above the fog's top. The reference's shadow rays start a little beyond that \
+              boundary, but are cut by the whole distance to the light, so that short ones meet the light itself and \
+              count as blocked: above y = 1.6 a factor of 3 is missing. In the other renderer (Mitsuba 3.9.1, \
+              volpath and volpathmis alike), the fog's top moved from 1.97 to 1.997, above the light at 1.98, \
+              triples the picture there, and makes it the one that is rendered here.",
     },
 ];
 
