@@ -2,7 +2,7 @@
 
 use croupier_host::bake::{BakeOptions, Baked, bake};
 use croupier_host::compare::{CompareError, MeanImage, relmse_of, relmse_of_per_pixel, relmse_per_pixel};
-use croupier_host::image::Rgb;
+use croupier_host::image::{Layer, Picture, Rgb};
 use croupier_host::load::load;
 use std::error::Error;
 use std::path::Path;
@@ -13,9 +13,9 @@ pub struct Subject {
     pub name: String,
     /// Ready to render.
     pub baked: Baked,
-    /// `reference.exr`.
+    /// `reference.exr`, or what [`Self::with_reference`] put in its place.
     pub image: Rgb,
-    /// The same with `reference_stderr.exr`.
+    /// The same with its standard error.
     pub reference: MeanImage,
 }
 
@@ -29,6 +29,20 @@ impl Subject {
         let stderr = Rgb::read_exr(&folder.join("reference_stderr.exr"))?;
         let reference = MeanImage::from_image(&image, Some(&stderr))?;
         Ok(Self { name: name.into(), baked, image, reference })
+    }
+
+    /// The same scene with another reference: an EXR file with its standard error in the layer `stderr`, as the
+    /// benchmark `references` saves it.
+    pub fn with_reference(self, file: &Path) -> Result<Self, Box<dyn Error>> {
+        let picture = Picture::read_exr(file)?;
+        let stderr = picture.layer("stderr").and_then(Layer::rgb);
+        let (image, stderr) = picture.main().zip(stderr).ok_or("a reference without colours or `stderr`")?;
+        let stderr = Rgb::new(image.width, image.height, stderr).ok_or("a layer `stderr` without its pixels")?;
+        if [image.width, image.height] != [self.image.width, self.image.height] {
+            return Err("a reference of another size".into());
+        }
+        let reference = MeanImage::from_image(&image, Some(&stderr))?;
+        Ok(Self { image, reference, ..self })
     }
 
     /// relMSE of an image without the worst part `outliers` of the pixels, less the share of the reference's noise in

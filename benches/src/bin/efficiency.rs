@@ -37,7 +37,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-const SCENES: [&str; 7] = ["kitchen", "bathroom", "living_room", "pool", "water_caustic", "cbox", "veach_mis"];
+const SCENES: [&str; 9] =
+    ["kitchen", "bathroom", "living_room", "pool", "water_caustic", "cbox", "veach_mis", "smoke", "volumetric_caustic"];
 const STRATEGIES: [&str; 5] = ["classic", "throughput", "adrrs", "ears", "ears+shadow"];
 /// With `--all`.
 const ALL: [&str; 24] = [
@@ -81,6 +82,10 @@ struct Args {
     /// Only these scenes (any of the folder); several with commas.
     #[arg(long = "scene", value_name = "NAME", value_delimiter = ',', default_values = SCENES)]
     only: Vec<String>,
+    /// In place of the reference of a scene this EXR file, such as `references --save` writes; several with commas. For
+    /// scenes whose reference is wrong.
+    #[arg(long = "reference", value_name = "SCENE=FILE", value_delimiter = ',')]
+    references: Vec<String>,
     /// Only these strategies (any that `croupier render --rrs` knows, with options, and behind a `+` other choices:
     /// adaptive, shadow, constant, small, truth, idle); several with commas.
     #[arg(long = "strategy", value_name = "NAME", value_delimiter = ',', conflicts_with = "all")]
@@ -274,7 +279,9 @@ impl Report<'_> {
             |samples| format!("{n} seeds of {samples} samples per pixel"),
         );
         let coverage = 100.0 * coverage(n as usize);
-        let facts = [
+        let own = self.args.references.iter().filter_map(|r| r.split_once('='));
+        let own: Vec<&str> = own.map(|(scene, _)| scene).collect();
+        let mut facts = vec![
             ("renders", what),
             ("figures", format!("medians over the seeds [intervals that hold the true median with {coverage:.0} %]")),
             (
@@ -283,6 +290,9 @@ impl Report<'_> {
                     + "; else without 0.01 % and with it",
             ),
         ];
+        if !own.is_empty() {
+            facts.push(("scenes with another reference than their own", own.join(", ")));
+        }
         facts.into_iter().map(|(key, value)| (key.into(), value)).collect()
     }
 
@@ -421,7 +431,10 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     results.header.extend(report.facts());
     report.facts().iter().for_each(|(key, value)| println!("- {key}: {value}"));
     for name in &args.only {
-        let subject = Subject::open(&args.scenes, name).map_err(|e| format!("{name}: {e}"))?;
+        let mut subject = Subject::open(&args.scenes, name).map_err(|e| format!("{name}: {e}"))?;
+        if let Some((_, file)) = args.references.iter().filter_map(|r| r.split_once('=')).find(|r| r.0 == name) {
+            subject = subject.with_reference(file.as_ref()).map_err(|e| format!("{file}: {e}"))?;
+        }
         let group = Group::render(&subject, &report.strategies, args)?;
         print!("\n{}", report.table(&group));
         report.groups.push(group);

@@ -1,12 +1,17 @@
 //! The whole turn of a packet, stage by stage.
 //!
 //! ```text
-//!            +--> samples of waiting vertices --> nee, scatter --> occlude --+
-//!  refill ---+                                                               +--> trace --> emission --+
-//!            +--> camera rays -----------------------------------------------+                         |
-//!    ^                                                                                                 v
-//!    +------------------------------------ settle <-- roulette <-- aov <-- shading --------------------+
+//!             +--> samples of waiting vertices --> nee, scatter --> occlude --+
+//!  refill ----+--> camera rays -----------------------------------------------+--> trace --> medium --> emission --+
+//!    ^        +--> waiting rays ----------------------------------------------+                 |                  |
+//!    |                                                                                          |                  v
+//!    +--------------------------------- waiting rays <------------------------------------------+------ pass <-- shading
+//!    |                                                                                                    |
+//!    +------------------------------------ settle <-- roulette <-- aov <----------------------------------+
 //! ```
+//!
+//! `medium` and `pass` are compiled in with effects that call for them. Waiting rays stopped in a medium, or passed what
+//! they met (`passing.rs`). A collision in a medium is a vertex without a surface: it joins behind `pass`.
 //!
 //! Stages compute packets from packets and read nothing but the [`World`]; what outlives the packet goes to the books
 //! ([`Bookkeeping`](super::book::Bookkeeping)) or, as waiting vertices, to the [`Ring`](super::ring::Ring).

@@ -1,20 +1,14 @@
 //! Small scenes that together call for every effect, and the tracers of profiles outside the closed set.
-//!
-//! An effect that comes new needs a row in [`SCENES`]; until a scene can call for it, it stands in [`WITHOUT_SCENE`].
 
 use croupier::unstable::Effects;
 use croupier::unstable::accel::WideBvh;
 use croupier::unstable::profile::Custom;
-use croupier::unstable::scene::blob::{Header, MATERIAL_COMPENSATED, Material, Section, SectionKind};
 use croupier::{Scene, Settings};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin::sky;
 use croupier_host::description::*;
 use croupier_tests::runner::{Image, Schedule, render_with};
 use croupier_tests::scenes::*;
-
-/// Effects that no scene calls for yet.
-pub(crate) const WITHOUT_SCENE: Effects = Effects::MEDIA.with(Effects::GRID_MEDIA).with(Effects::ALPHA);
 
 /// Renders a scene with a profile, settings and numbers of samples.
 pub(crate) type Renderer = fn(Scene<'_>, &Settings, &[u32]) -> Image;
@@ -39,7 +33,7 @@ pub(crate) struct EffectScene {
 
 macro_rules! scenes {
     ($($name:literal, [$($effect:ident),*], $blob:expr;)*) => {
-        /// Scenes with all effects but [`WITHOUT_SCENE`].
+        /// Scenes that together call for every effect.
         pub(crate) const SCENES: &[EffectScene] = &[$(EffectScene {
             name: $name,
             effects: Effects(0)$(.with(Effects::$effect))*,
@@ -99,7 +93,20 @@ scenes! {
         changed(|s| add_sphere(s, 0, [0.0, -0.4, 0.0], 0.5, Sphere { subdivisions: 2, smooth: true, inwards: false }))
     };
     "compensated metal", [DIFFUSE, ROUGH_CONDUCTOR, AREA_LIGHTS, MULTIPLE_SCATTERING],
-        || with_flag(&with(rough_conductor()), MATERIAL_COMPENSATED);
+        || changed(|s| { ball(s, rough_conductor()).compensated = true; });
+    "fog", [DIFFUSE, NULL, AREA_LIGHTS, MEDIA], || changed(|s| fill(s, Model::Null, Density::Homogeneous));
+    "clouded glass", [DIFFUSE, DIELECTRIC, AREA_LIGHTS, MEDIA],
+        || changed(|s| fill(s, Model::Dielectric { int_ior: 1.3, ext_ior: 1.0 }, Density::Homogeneous));
+    "smoke", [DIFFUSE, NULL, AREA_LIGHTS, MEDIA, GRID_MEDIA], || changed(|s| fill(s, Model::Null, smoke()));
+    "cut-outs", [DIFFUSE, AREA_LIGHTS, TEXTURES, ALPHA], || {
+        changed(|s| {
+            let texels = (0..16).map(|i| [200, 180, 160, 17 * i]).collect();
+            s.textures.push(Texture { name: "leaves".into(), width: 4, height: 4, texels });
+            let m = s.add_material("leaves", Model::Diffuse { reflectance: Reflectance::Texture(0) });
+            s.materials[m as usize].cutout = true;
+            add_quad(s, "leaves", m, facing_z(0.6, 0.3, 1.0).map(|[x, y, z]| [x, y - 0.4, z]));
+        })
+    };
     "everything but media", [
         DIFFUSE, ROUGH_CONDUCTOR, DIELECTRIC, THIN_DIELECTRIC, ROUGH_PLASTIC, NULL, TEXTURES, AREA_LIGHTS, ENVIRONMENT,
         DELTA_LIGHTS, LENS, SMOOTH_NORMALS
@@ -122,26 +129,30 @@ fn changed(change: impl FnOnce(&mut SceneDescription)) -> AlignedBytes {
     blob(&scene)
 }
 
+/// Adds a ball of a model; its material.
+fn ball(scene: &mut SceneDescription, model: Model) -> &mut Material {
+    let material = scene.add_material("ball", model);
+    let shape = Sphere { subdivisions: 2, smooth: false, inwards: false };
+    add_sphere(scene, material, [0.0, -0.4, 0.0], 0.5, shape);
+    &mut scene.materials[material as usize]
+}
+
 /// The diffuse box with a ball of a model.
 fn with(model: Model) -> AlignedBytes {
     changed(|s| {
-        let material = s.add_material("ball", model);
-        add_sphere(s, material, [0.0, -0.4, 0.0], 0.5, Sphere { subdivisions: 2, smooth: false, inwards: false });
+        ball(s, model);
     })
 }
 
-/// The blob with a flag set on its last material.
-fn with_flag(scene: &[u8], flag: u32) -> AlignedBytes {
-    let mut out = AlignedBytes::zeroed(scene.len());
-    let bytes = out.as_mut();
-    bytes.copy_from_slice(scene);
-    let header: Header = *bytemuck::from_bytes(&bytes[..size_of::<Header>()]);
-    let sections = &bytes[size_of::<Header>()..][..header.sections as usize * size_of::<Section>()];
-    let sections: &[Section] = bytemuck::cast_slice(sections);
-    let materials = sections.iter().find(|s| s.kind == SectionKind::Materials as u32).expect("materials");
-    let last = materials.offset as usize + (materials.count as usize - 1) * size_of::<Material>();
-    bytemuck::from_bytes_mut::<Material>(&mut bytes[last..][..size_of::<Material>()]).flags |= flag;
-    let hash = croupier::unstable::scene::blob::content_hash(&bytes[size_of::<Header>()..]);
-    bytemuck::from_bytes_mut::<Header>(&mut bytes[..size_of::<Header>()]).hash = hash;
-    out
+/// Adds a ball full of a medium.
+fn fill(scene: &mut SceneDescription, model: Model, density: Density) {
+    let (sigma_a, sigma_s) = ([0.1, 0.3, 0.6], [3.0, 2.0, 1.0]);
+    scene.media.push(Medium { sigma_a, sigma_s, emission: [0.1, 0.0, 0.2], g: 0.4, density, ..Medium::default() });
+    ball(scene, model).medium = Some(0);
+}
+
+/// Densities in a box a little smaller than the ball's.
+fn smoke() -> Density {
+    let values = (0..5 * 6 * 7u32).map(|i| (i * 37 % 11) as f32 * 0.2).collect();
+    Density::Grid { cells: [5, 6, 7], bounds: [[-0.4, -0.8, -0.4], [0.4, 0.0, 0.4]], values }
 }

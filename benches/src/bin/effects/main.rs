@@ -5,7 +5,7 @@
 //! profile, compiled into this program: what the base scene calls for, and the effect. The second table shows the
 //! profiles that hosts choose from, the third real scenes: in a profile of exactly their effects, in the one that a
 //! host chooses, in that of all effects, and as they were before media existed
-//! (`results/instructions-before-media.md`).
+//! (`results/instructions-before-media.md`), where their paths are still the same.
 //!
 //! Instructions are counted by callgrind in stepping, without ending iterations. Text is the machine code of these
 //! crates that stepping leads to. `--check` counts the base scenes and compares with `results/effects.md`: what is
@@ -34,7 +34,7 @@ use text::Text;
 #[derive(Parser)]
 #[command(about = "What each effect costs: absent, present, used")]
 struct Args {
-    /// Folder with the scenes `cbox` and `kitchen`; what is not there is skipped.
+    /// Folder with the scenes of the third table; what is not there is skipped.
     #[arg(long, default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/scenes"))]
     scenes: PathBuf,
     /// Count the base scenes and compare with benches/results/effects.md; exit status 1 if a figure has risen by more
@@ -59,7 +59,7 @@ struct Args {
 const NAME: &str = "effects";
 /// Per cent by which a figure may rise.
 const TOLERANCE: f64 = 0.5;
-/// Iterations and pixels of `instructions`, so that its figures compare; the scenes of effects are smaller.
+/// Iterations and pixels of `instructions`, so that its figures compare; all other scenes are smaller.
 const ITERATIONS: [u32; 4] = [1, 1, 2, 4];
 const PIXELS: u32 = 9216;
 const SMALL: u32 = 2304;
@@ -69,10 +69,13 @@ const PROFILES: &str = "Profiles";
 const SCENES: &str = "Scenes in their profiles";
 
 /// Scenes with profiles of exactly their effects.
-const EXACT: [(&str, Instance); 3] = [
+const EXACT: [(&str, Instance); 6] = [
     ("built-in", Instance::of::<Custom<{ BUILT_IN.0 }>>()),
     ("cbox", Instance::of::<Custom<{ CBOX.0 }>>()),
     ("kitchen", Instance::of::<Custom<{ KITCHEN.0 }>>()),
+    ("pool", Instance::of::<Custom<{ POOL.0 }>>()),
+    ("volumetric_caustic", Instance::of::<Custom<{ FOG.0 }>>()),
+    ("smoke", Instance::of::<Custom<{ SMOKE.0 }>>()),
 ];
 const CBOX: Effects = Effects::DIFFUSE.with(Effects::AREA_LIGHTS);
 const BUILT_IN: Effects = CBOX.with(Effects::CONDUCTOR).with(Effects::DIELECTRIC).with(Effects::SMOOTH_NORMALS);
@@ -86,6 +89,17 @@ const KITCHEN: Effects = Effects::DIFFUSE
     .with(Effects::TEXTURES)
     .with(Effects::ENVIRONMENT)
     .with(Effects::SMOOTH_NORMALS);
+
+const POOL: Effects = Effects::DIFFUSE
+    .with(Effects::ROUGH_CONDUCTOR)
+    .with(Effects::DIELECTRIC)
+    .with(Effects::ROUGH_PLASTIC)
+    .with(Effects::TEXTURES)
+    .with(Effects::ENVIRONMENT)
+    .with(Effects::SMOOTH_NORMALS);
+const FOG: Effects =
+    CBOX.with(Effects::DIELECTRIC).with(Effects::NULL).with(Effects::SMOOTH_NORMALS).with(Effects::MEDIA);
+const SMOKE: Effects = CBOX.with(Effects::NULL).with(Effects::CONSTANT).with(Effects::MEDIA).with(Effects::GRID_MEDIA);
 
 /// Every profile of the program.
 fn instances() -> impl Iterator<Item = Instance> {
@@ -155,26 +169,20 @@ fn effects(folder: &Folder, text: &Text, bases: &[Counts]) -> Result<Table, Box<
         if present.rays != base.counted.rays {
             return Err(format!("{name}: the paths differ where it is not used").into());
         }
-        let used = match row.used {
-            Some(build) => {
-                let mut scene = row.base.scene();
-                build(&mut scene);
-                let blob = folder.bake("used", &scene)?;
-                let bytes = callgrind::read(&blob)?;
-                let called_for = Scene::from_bytes(&bytes)?.effects;
-                if !called_for.contains(*effect) {
-                    return Err(format!("{name}: its scene does not use it").into());
-                }
-                format!("{:.2}", count(folder, &blob, &row.instance, "classic", SMALL)?.per_ray()[0])
-            }
-            None => "-".into(),
-        };
+        let mut scene = row.base.scene();
+        (row.used)(&mut scene);
+        let blob = folder.bake("used", &scene)?;
+        let bytes = callgrind::read(&blob)?;
+        if !Scene::from_bytes(&bytes)?.effects.contains(*effect) {
+            return Err(format!("{name}: its scene does not use it").into());
+        }
+        let used = count(folder, &blob, &row.instance, "classic", SMALL)?.per_ray()[0];
         let [absent, present] = [base.counted, present].map(|c| c.per_ray()[0]);
         let with = text.bytes((row.instance.step)())?;
         let more = with as i64 - base.text as i64;
-        let [absent_text, present_text] = [absent, present].map(|x| format!("{x:.2}"));
+        let [absent_text, present_text, used_text] = [absent, present, used].map(|x| format!("{x:.2}"));
         table.add(
-            [(*name).into(), row.base.name().into(), absent_text, present_text, used, percent(present, absent)]
+            [(*name).into(), row.base.name().into(), absent_text, present_text, used_text, percent(present, absent)]
                 .into_iter()
                 .chain([base.text.to_string(), with.to_string(), more.to_string()]),
         );
@@ -203,7 +211,8 @@ fn scenes(folder: &Folder, args: &Args) -> Result<Table, Box<dyn Error>> {
     let mut table = Table::new(SCENES, columns);
     let before = Results::read("instructions-before-media")?;
     let before = before.tables.first().ok_or("no table of the counts before")?;
-    let column = before.column("step per ray").ok_or("no column 'step per ray' in the counts before")?;
+    let column = |name: &str| before.column(name).ok_or_else(|| format!("no column '{name}' in the counts before"));
+    let [rays, per_ray] = [column("rays")?, column("step per ray")?];
     for (scene, exact) in EXACT {
         let Some(description) = callgrind::description(scene, &args.scenes)? else { continue };
         let blob = folder.bake(scene, &description)?;
@@ -216,18 +225,25 @@ fn scenes(folder: &Folder, args: &Args) -> Result<Table, Box<dyn Error>> {
         let smallest = Instance::of_set(AnyProfile::smallest(called_for));
         let full = Instance::of_set(AnyProfile::Full);
         for strategy in ["classic", "ears"] {
-            let old: f64 =
-                before.row(&[scene, strategy]).ok_or("a row missing in the counts before")?[column].parse()?;
+            let old = before.row(&[scene, strategy]);
+            let pixels = if old.is_some() { PIXELS } else { SMALL };
             let mut counted = Vec::new();
             for instance in [exact, smallest, full] {
-                counted.push(count(folder, &blob, &instance, strategy, PIXELS)?);
+                counted.push(count(folder, &blob, &instance, strategy, pixels)?);
             }
             if counted.iter().any(|c| c.rays != counted[0].rays) {
                 return Err(format!("{scene}, {strategy}: the paths depend on the profile").into());
             }
+            // other paths are another picture
+            let old: Option<f64> = match old.filter(|row| row[rays] == counted[0].rays.to_string()) {
+                Some(row) => Some(row[per_ray].parse()?),
+                None => None,
+            };
             let [exact, smaller, full] = [0, 1, 2].map(|i: usize| counted[i].per_ray()[0]);
-            let figures = [old, exact, smaller, full].map(|x| format!("{x:.2}"));
-            let ratios = [percent(smaller, old), percent(full, smaller)];
+            let known = |text: Option<String>| text.unwrap_or("-".into());
+            let figures = [exact, smaller, full].map(|x| format!("{x:.2}"));
+            let figures = [known(old.map(|x| format!("{x:.2}")))].into_iter().chain(figures);
+            let ratios = [known(old.map(|old| percent(smaller, old))), percent(full, smaller)];
             let names = [scene, strategy, smallest.name].map(String::from);
             table.add(names.into_iter().chain(figures).chain(ratios));
             eprintln!("{}", table.last());

@@ -11,9 +11,8 @@ use super::json::Place;
 use super::loader::Loader;
 use super::presets::{PRESETS, Preset};
 use crate::description::{Density, Medium, SceneDescription};
-use croupier::unstable::scene::blob::{
-    MAX_ANISOTROPY, MAX_COEFFICIENT, MAX_EMISSION, MAX_MEDIA, MAX_SIDE, MaterialKind, MediumKind,
-};
+use croupier::unstable::bsdf::{Lobes, facts};
+use croupier::unstable::scene::blob::{MAX_ANISOTROPY, MAX_COEFFICIENT, MAX_EMISSION, MAX_MEDIA, MAX_SIDE, MediumKind};
 use std::path::Path;
 
 /// Only value of `dtype`.
@@ -224,6 +223,9 @@ fn densities(bytes: &[u8], [nx, ny, nz]: [u32; 3]) -> Result<Vec<f32>, String> {
     }
 }
 
+/// Lobes of models that are both interfaces at once: they reflect, and let the rest pass straight on.
+const SHEET: Lobes = Lobes::REFLECTION.with(Lobes::STRAIGHT);
+
 /// Puts before each medium what is behind the materials that it is in front of, where no medium is: nothing, as a
 /// medium of zeros. Opaque materials let no path in, and a sheet has no inside.
 fn clear_interiors(scene: &SceneDescription, drafts: Vec<Draft>) -> Vec<Draft> {
@@ -232,7 +234,7 @@ fn clear_interiors(scene: &SceneDescription, drafts: Vec<Draft>) -> Vec<Draft> {
     for draft in drafts {
         for boundary in draft.exterior_of.iter().copied() {
             let material = &scene.materials[boundary as usize];
-            let sheet = material.model.kind() == MaterialKind::ThinDielectric;
+            let sheet = facts(material.model.kind()).lobes.contains(SHEET);
             let encloses = material.model.is_transmissive() && !sheet;
             if encloses && !bounded.contains(&boundary) {
                 bounded.push(boundary);
