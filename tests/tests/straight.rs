@@ -70,7 +70,7 @@ fn panes_before_delta_lights_are_a_factor() {
 }
 
 /// Area lights from tiny to huge and the environment behind one pane or two, which light samples and scattered rays both
-/// find. Killed by: the weight of a ray that has forgotten its density behind a pane, or where it began; light that
+/// find. Killed by: the weight of a ray that has forgotten its density behind a pane, or how far it has come; light that
 /// counts in full by both techniques.
 #[test]
 fn panes_before_area_lights_follow_quadrature() {
