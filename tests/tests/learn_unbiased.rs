@@ -219,7 +219,7 @@ fn choices_do_not_bias() {
     check("no split budget", "ears:plain", &|s| s.split_budget = 0);
     check("everything small", "ears", &|s| {
         (s.ring, s.learning.ledger, s.learning.cache_bytes, s.learning.pixel_estimator) =
-            (16, 4, 16 << 10, PixelEstimator::Blocks);
+            (16, 4, 20 << 10, PixelEstimator::Blocks);
         (s.adaptive, s.shadow_roulette, s.control_variate) = (true, true, ControlVariate::Cached);
     });
     check("adaptive", "ears", &|s| s.adaptive = true);

@@ -53,7 +53,7 @@ fn schedules_do_not_change_a_bit() {
 #[test]
 fn schedules_do_not_change_what_is_learned() {
     for (name, scene) in
-        [("cornell", cornell([24, 20])), ("everything", everything([24, 20])), ("misty", misty([36, 28]))]
+        [("cornell", cornell([24, 20])), ("everything", everything([24, 20])), ("misty", misty([56, 40]))]
     {
         let scene = blob(&scene);
         for all in [false, true] {
@@ -87,7 +87,7 @@ fn schedules_do_not_change_what_is_learned() {
             assert!(c.samples_logged > 1000 && c.paths_terminated > 100 && c.splits > 100, "{c:?}");
             assert!(
                 learned[2].1[0].variance > 0.0
-                    && (!all || c.shadow_rays_terminated > 100 && c.light_samples_skipped > 10),
+                    && (!all || c.shadow_rays_terminated > 100 && c.light_samples_skipped > 5),
                 "{c:?}"
             );
             for (schedule, image, other) in &seen[1..] {

@@ -1,5 +1,5 @@
 //! Every strategy has the same mean as none in a scene with fog, smoke in a grid, marble, a pane and a cut-out: the short
-//! version of `benches/src/bin/equivalence.rs`, which tests the same scene within 0.2 %.
+//! version of `benches/src/bin/equivalence/`, which tests the same scene within 0.2 %.
 
 use croupier::unstable::learn::ControlVariate;
 use croupier::{Counters, Settings, Strategy};

@@ -82,7 +82,7 @@ pub(super) fn walk_packet<const ANY: bool, B: Blocking>(
     group: u32,
     hits: &mut Hits,
     stack: &mut Keys,
-    blocking: B,
+    blocking: &mut B,
 ) -> u32 {
     let mut keys: Keys = [0; STACK];
     let lead = group.trailing_zeros() as usize & 7;

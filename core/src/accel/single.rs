@@ -73,7 +73,7 @@ pub(super) fn test_leaf<const ANY: bool, const EARLY: bool, B: Blocking>(
     i: usize,
     entry: f32,
     best: &mut Hit1,
-    blocking: B,
+    blocking: &mut B,
 ) -> bool {
     let axes = s.axes(i);
     let line = Line {
@@ -132,7 +132,7 @@ pub(super) fn walk<const ANY: bool, B: Blocking>(
     (s, lanes): (&Setup, u32),
     hits: &mut Hits,
     stack: &mut Keys,
-    blocking: B,
+    blocking: &mut B,
 ) -> u32 {
     let (mut found, deep) = take_turns::<ANY, { STACK / 8 }, B>(tree, root, (s, lanes), hits, stack, blocking);
     for i in Mask8::from_bits(deep).lanes() {
@@ -150,7 +150,7 @@ fn take_turns<const ANY: bool, const ROOM: usize, B: Blocking>(
     (s, lanes): (&Setup, u32),
     hits: &mut Hits,
     stack: &mut Keys,
-    blocking: B,
+    blocking: &mut B,
 ) -> (u32, u32) {
     let mut current: [u64; 8] = core::array::from_fn(|i| key(entry[i], root));
     let mut tops = [0usize; 8];

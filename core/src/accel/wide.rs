@@ -11,7 +11,6 @@ use super::{Intersector, Occlusion8};
 use crate::geometry::{Hit8, Ray8};
 use crate::scene::Scene;
 use crate::scene::blob::{Leaf, NONE, Node};
-use core::cell::Cell;
 use croupier_simd::{F32x8, Mask8, U32x8};
 
 /// Built-in intersector: the scene's own tree of 8-wide nodes and 8-triangle leaves.
@@ -51,7 +50,7 @@ impl<'s> WideBvh<'s> {
     /// Traces the valid rays of `s`. Closest: improves `hits`. Any: returns the lanes with a hit
     /// that blocks.
     #[inline(always)]
-    fn trace<const ANY: bool, B: Blocking>(&self, s: &Setup, hits: &mut Hits, blocking: B) -> u32 {
+    fn trace<const ANY: bool, B: Blocking>(&self, s: &Setup, hits: &mut Hits, blocking: &mut B) -> u32 {
         let tree = (self.nodes, self.leaves);
         let mut stack: Keys = [0; STACK];
         let (mut left, mut single, mut occluded) = (s.valid, 0, 0);
@@ -76,7 +75,7 @@ impl Intersector for WideBvh<'_> {
         let s = Setup::new(rays, active, self.extent);
         let mut hits = Hits::none(s.limit);
         if !self.nodes.is_empty() && s.valid != 0 {
-            self.trace::<false, _>(&s, &mut hits, Everything);
+            self.trace::<false, _>(&s, &mut hits, &mut Everything);
         }
         let triangle = U32x8::new(hits.triangle);
         let hit = !triangle.eq(U32x8::splat(NONE));
@@ -94,16 +93,16 @@ impl Intersector for WideBvh<'_> {
         if self.nodes.is_empty() || s.valid == 0 {
             return Mask8::NONE;
         }
-        Mask8::from_bits(self.trace::<true, _>(&s, &mut Hits::none(s.limit), Everything))
+        Mask8::from_bits(self.trace::<true, _>(&s, &mut Hits::none(s.limit), &mut Everything))
     }
 
     fn occluded_by(&self, rays: &Ray8, active: Mask8, blocks: &dyn Fn(u32) -> bool) -> Occlusion8 {
         let s = Setup::new(rays, active, self.extent);
-        let passed = [const { Cell::new(0) }; 8];
+        let mut asked = Asked { blocks, passed: [0; 8] };
         let mut blocked = 0;
         if !self.nodes.is_empty() && s.valid != 0 {
-            blocked = self.trace::<true, _>(&s, &mut Hits::none(s.limit), Asked { blocks, passed: &passed });
+            blocked = self.trace::<true, _>(&s, &mut Hits::none(s.limit), &mut asked);
         }
-        Occlusion8 { blocked: Mask8::from_bits(blocked), passed: U32x8::from_fn(|i| passed[i].get()) }
+        Occlusion8 { blocked: Mask8::from_bits(blocked), passed: U32x8::new(asked.passed) }
     }
 }

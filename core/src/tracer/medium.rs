@@ -8,7 +8,6 @@ use super::ring::Ring;
 use super::shading::Arrival8;
 use crate::geometry::Hit8;
 use crate::media::{self, Segment8};
-use crate::scene::Effects;
 use crate::world::World;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
@@ -33,22 +32,8 @@ impl Collision8 {
 
 /// Sends the rays through the media that they are inside of. What the media emit is added; rays that scatter, end or stop
 /// on the way do not reach their hits: they are taken out of `hit`, and those that end or wait out of `rays`.
-#[inline(always)]
-pub(crate) fn cross_media<W: World>(
-    world: &W,
-    book: &mut Bookkeeping<'_>,
-    ring: &mut Ring<'_>,
-    rays: &mut RayState8,
-    hit: &mut Hit8,
-) -> Collision8 {
-    if !W::EFFECTS.contains(Effects::MEDIA) || (rays.active & rays.media.inside()).none() {
-        return Collision8::NONE;
-    }
-    fly(world, book, ring, rays, hit)
-}
-
 #[inline(never)]
-fn fly<W: World>(
+pub(crate) fn cross_media<W: World>(
     world: &W,
     book: &mut Bookkeeping<'_>,
     ring: &mut Ring<'_>,

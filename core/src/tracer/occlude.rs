@@ -111,7 +111,7 @@ fn walk<W: World>(world: &W, book: &mut Bookkeeping<'_>, samples: &Samples8, s: 
         left = U32x8::select(left.eq(none), none, left - U32x8::splat(1));
     }
     book.counters.passages_cut += u64::from(active.count());
-    s.found.pixel = s.found.pixel * transmittance;
-    s.found.local = s.found.local * transmittance;
+    s.found.pixel *= transmittance;
+    s.found.local *= transmittance;
     arrived
 }

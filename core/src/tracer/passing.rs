@@ -132,3 +132,57 @@ pub(crate) fn pass<W: World>(
     book.counters.passed.count(passed.count());
     passed
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Killed by: two fields in one column, a row or column that a vertex keeps elsewhere, a density that forgets that
+    /// light sampling cannot reach its ray, a key that is drawn from twice.
+    #[test]
+    fn rays_survive_the_ring() {
+        let f = |k: usize| F32x8::from_fn(|i| (100 * k + i) as f32);
+        let u = |k: usize| U32x8::from_fn(|i| (1000 * k + i) as u32);
+        let v3 = |k: usize| Vec3x8::new(f(k), f(k + 1), f(k + 2));
+        let skip_mis = Mask8::from_bits(0b1010_0110);
+        let rays = RayState8 {
+            active: Mask8::all_lanes(),
+            ray: Ray8::unbounded(v3(1), v3(4)),
+            from: v3(7),
+            normal: v3(10),
+            travelled: f(13),
+            media: MediaSet8::unpack(u(14) << 8).0,
+            beta: v3(15),
+            weight: v3(18),
+            pdf: f(21),
+            skip_mis,
+            path: Path8 { root: u(22), record: u(23), depth: U32x8::from_fn(|i| 193 + i as u32) },
+            key: Key8 { lo: u(24), hi: u(25) },
+            albedo_product: f(26),
+            error_weight: v3(27),
+        };
+        let records = PathVertex::of_columns(rays.columns());
+        for (i, r) in records.iter().enumerate() {
+            assert_eq!((r.count(), r.with_nee()), (1, 0));
+            assert_eq!((r.root(), r.record()), (22_000 + i as u32, 23_000 + i as u32));
+        }
+        let columns = PathVertex::columns(core::array::from_fn(|i| &records[7 - i]));
+        let back = RayState8::from_columns(columns, Mask8::first(5));
+        assert_eq!(back.active.bits(), 0b1_1111);
+        for i in 0..8 {
+            let vectors = |r: &RayState8, i| {
+                [r.ray.o, r.ray.d, r.from, r.normal, r.beta, r.weight, r.error_weight].map(|v| v.lane(i))
+            };
+            assert_eq!(vectors(&back, i), vectors(&rays, 7 - i));
+            let numbers = |r: &RayState8, i| [r.travelled, r.albedo_product, r.ray.tmax].map(|x| x.lane(i));
+            assert_eq!(numbers(&back, i), numbers(&rays, 7 - i));
+            assert_eq!(
+                (back.path.lane(i), back.media.met().lane(i)),
+                (rays.path.lane(7 - i), rays.media.met().lane(7 - i))
+            );
+            assert_eq!((back.key.lo.lane(i), back.key.hi.lane(i)), (rays.key.lo.lane(7 - i), rays.key.hi.lane(7 - i)));
+            assert_eq!(back.skip_mis.lane(i), rays.skip_mis.lane(7 - i));
+            assert!(back.skip_mis.lane(i) || back.pdf.lane(i) == rays.pdf.lane(7 - i));
+        }
+    }
+}

@@ -19,7 +19,7 @@
 use super::camera_rays::camera_rays;
 use super::emission;
 use super::job::Job;
-use super::medium::{arrive_in_media, cross_media};
+use super::medium::{Collision8, arrive_in_media, cross_media};
 use super::nee::{sample_lights, shadow_rays};
 use super::occlude::occlude;
 use super::packets::RayKind;
@@ -77,7 +77,8 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
     }
 
     let mut hit = trace(world, book, &rays, kind);
-    let collision = cross_media(world, book, ring, &mut rays, &mut hit);
+    let in_media = W::EFFECTS.contains(Effects::MEDIA) && (rays.active & rays.media.inside()).any();
+    let collision = if in_media { cross_media(world, book, ring, &mut rays, &mut hit) } else { Collision8::NONE };
     let escaped = rays.active.and_not(hit.hit | collision.mask);
     if escaped.any() {
         if let Some(found) = emission::environment(world, &rays, escaped) {
@@ -91,7 +92,7 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
 
     let mut hit = SurfaceHit8::gather(world.scene(), &hit);
     if W::EFFECTS.intersects(Effects::STRAIGHT) {
-        hit.t = hit.t + rays.travelled;
+        hit.t += rays.travelled;
     }
     let point = hit.point();
     book.counters.surface.count(hit.mask.count());
