@@ -147,7 +147,7 @@ pub type Sums = [f64; FIELDS];
 /// Reader of saved bytes, in f64.
 pub struct Oracle {
     nodes: Vec<OracleNode>,
-    roots: [usize; 4],
+    roots: [usize; 6],
     lo: [f64; 3],
     edge: f64,
     /// Sums per leaf and bin.
@@ -167,9 +167,9 @@ impl Oracle {
     /// Reads saved bytes.
     pub fn new(bytes: &[u8]) -> Self {
         let f = |i: usize| f64::from(f32::from_le_bytes(bytes[28 + 4 * i..32 + 4 * i].try_into().unwrap()));
-        let mut o = Self { nodes: vec![], roots: [0; 4], lo: [f(0), f(1), f(2)], edge: f(3), leaves: vec![] };
+        let mut o = Self { nodes: vec![], roots: [0; 6], lo: [f(0), f(1), f(2)], edge: f(3), leaves: vec![] };
         let (mut shape, mut sums) = (bytes[64..].iter(), bytes[sums_at(bytes)..].chunks_exact(8));
-        o.roots = [0, 1, 2, 3].map(|_| o.read(&mut shape, &mut sums));
+        o.roots = [0; 6].map(|_| o.read(&mut shape, &mut sums));
         assert!(sums.next().is_none());
         o
     }

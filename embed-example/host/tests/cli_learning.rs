@@ -153,7 +153,7 @@ fn flags_that_do_not_fit_together_are_status_1() {
     let dir = tempfile::tempdir().unwrap();
     for (arguments, said) in [
         (&["--cache-bytes", "60KiB", "--shards", "16"][..], "cache of 61440 bytes: with so many shards it needs"),
-        (&["--cache-bytes", "11KiB"], "cache of 11264 bytes: with so many shards it needs"),
+        (&["--cache-bytes", "17KiB"], "cache of 17408 bytes: with so many shards it needs"),
         (&["--shards", "65536"], "cache of 25165824 bytes: with so many shards it needs"),
         (&["--control-variate", "0.5", "--rrs", "threshold"], "cannot serve threshold"),
         (&["--control-variate", "cached", "--rrs", "classic"], "cached mean needs"),
@@ -165,7 +165,7 @@ fn flags_that_do_not_fit_together_are_status_1() {
             assert!(error.contains(said) && error.lines().count() == 1, "{arguments:?}: {error}");
         }
     }
-    for fit in [&["--cache-bytes", "60KiB", "--shards", "15"][..], &["--cache-bytes", "32KiB"]] {
+    for fit in [&["--cache-bytes", "60KiB", "--shards", "8"][..], &["--cache-bytes", "32KiB"]] {
         let out = croupier(dir.path(), &[&["info", "missing.crp"], fit].concat());
         assert!(text(&out.stderr).contains("cannot read missing.crp"), "{fit:?}: {}", text(&out.stderr));
     }
@@ -274,7 +274,7 @@ fn everything_at_once() {
         assert!(words.contains(part), "{words}");
     }
     let crowded =
-        ["--rrs", "ears", "--spp", "200", "--learn-samples", "64", "--stats", "--cache-bytes", "17KiB", "-o", "w.exr"];
+        ["--rrs", "ears", "--spp", "200", "--learn-samples", "64", "--stats", "--cache-bytes", "25KiB", "-o", "w.exr"];
     let words = text(&render(dir, &crowded).stdout);
     assert!(words.contains(" subdivisions refused so far for lack of memory"), "{words}");
 }
@@ -293,7 +293,7 @@ fn every_flag_changes_the_picture() {
         &["--objective", "absolute"],
         &["--norm", "luminance"],
         &["--norm", "max"],
-        &["--cache-bytes", "17KiB"],
+        &["--cache-bytes", "25KiB"],
         &["--ring", "16"],
         &["--split-budget", "0"],
         &["--ledger", "16"],
