@@ -19,7 +19,7 @@ const IN_ORDER: Schedule = Schedule::InOrder(1 << 20);
 fn whole_leaves(scene: &[u8], max_depth: u32) -> Settings {
     let s = settings(scene, "ears:plain");
     let learning = Learning {
-        cache_bytes: 16_000,
+        cache_bytes: 20_000,
         ledger: 1 << 14,
         pixel_estimator: PixelEstimator::Blocks,
         objective: Objective::Absolute,
@@ -77,7 +77,7 @@ fn both(description: &SceneDescription, max_depth: u32, iterations: &[u32]) -> B
     );
 
     let size = CacheSize::within(s.learning.cache_bytes, 1).unwrap();
-    assert_eq!(size.leaves(), 4);
+    assert_eq!(size.leaves(), 6);
     let mut block = AlignedBytes::zeroed(Cache::layout(size).unwrap().size);
     let bounds = [scene.info.bounds_min, scene.info.bounds_max];
     let cache = Cache::new(size, bounds, s.learning.objective, block.as_mut()).unwrap();
@@ -195,7 +195,7 @@ fn faces_and_materials_in_one_cell_stay_apart() {
         (s.learning.objective, s.learning.decay) = (objective, 0.0);
         let mut found = Vec::new();
         learning(&scene, &s, &[16, 16, 0], IN_ORDER, &mut |_, l: &mut dyn Learned| found = bins(l));
-        assert_eq!(found.len(), 64, "one leaf for each kind");
+        assert_eq!(found.len(), 96, "one leaf for each kind");
         let of = |kind: VertexKind| {
             let leaf = found[16 * kind as usize..][..16].iter().filter(|b| b[0] > 0.0);
             let mut means: Vec<f64> = leaf.map(|b| b[3] / b[0]).collect();

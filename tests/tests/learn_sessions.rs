@@ -105,7 +105,7 @@ fn counts_agree_and_decay() {
 fn full_bins_refuse_and_count() {
     let scene = blob(&cornell([16, 16]));
     let mut s = learns(&scene, "ears", 3);
-    s.learning.cache_bytes = 16_000;
+    s.learning.cache_bytes = 20_000;
     // so that first vertices are logged in the first iteration
     s.learning.objective = Objective::Absolute;
     s.learning.samples = u32::MAX;
