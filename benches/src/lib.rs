@@ -1,5 +1,5 @@
-//! What the benchmarks share: scenes with their references, CPU time, counted instructions, watched renders, medians, generated results, and
-//! the check of the figures that documents cite from them.
+//! What the benchmarks share: scenes with their references, CPU time, counted instructions, watched renders, medians,
+//! generated results, and the check of the figures that documents cite from them.
 
 pub mod callgrind;
 pub mod clock;

@@ -79,9 +79,11 @@ pub struct Counters {
     pub max_length_reached: u64,
     /// Light samples so near to a point light that the distance was clamped to a larger one (NUMERICS SOL-5).
     pub distances_clamped: u64,
-    /// Rays whose steps through a medium were so many that roulette decided whether they go on.
+    /// Rays whose steps through a medium were so many that roulette decided whether they go on, and shadow rays that were
+    /// cut after 4096 steps in spite of it.
     pub media_roulettes: u64,
-    /// Shadow rays that were taken for blocked behind more surfaces than [`crate::unstable::MAX_PASSED`]; this loses light.
+    /// Shadow rays that were taken for blocked behind more surfaces than [`crate::unstable::MAX_PASSED`]: light that is
+    /// lost.
     pub passages_cut: u64,
     /// Contributions or weights that were not finite and were not added.
     pub non_finite: u64,

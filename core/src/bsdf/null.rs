@@ -1,4 +1,5 @@
-//! Index-matched boundary: all light passes straight on ([`Bsdf::straight`]), so that nothing is scattered. No parameters.
+//! Index-matched boundary: all light passes straight on ([`Bsdf::straight`]), so that nothing is scattered. No
+//! parameters.
 
 use super::{Bsdf, CacheDirection, Eval8, Inputs8, Lobes, Sample8, lobes};
 use crate::scene::Scene;

@@ -125,7 +125,8 @@ impl LightSample8 {
 /// ```
 pub trait LightSelector {
     /// Index in [`Records::lights`](crate::scene::Records::lights) and its probability from a 32-bit random number, for
-    /// points with unit normals, world space. No such light, or a probability of 0: no light is sampled.
+    /// points with unit normals, world space; normals are 0 at points in media, where nothing may be left out for its
+    /// direction. No such light, or a probability of 0: no light is sampled.
     fn select(&self, point: Vec3x8, normal: Vec3x8, r: U32x8) -> (U32x8, F32x8);
 
     /// Probability that [`Self::select`] picks `light` in the lanes of `mask`, 0 in the others.
@@ -242,8 +243,8 @@ const _: () = {
 
 /// Chooses a light and a direction to it for every active lane.
 ///
-/// `p` are the reference points, `n` their unit normals (a hint for the selector only; nothing below the horizon is
-/// dropped, since surfaces may transmit). `words` are four independent 32-bit random numbers: the first chooses the
+/// `p` are the reference points, `n` their unit normals, 0 in media (a hint for the selector only; nothing below
+/// the horizon is dropped, since surfaces may transmit). `words` are four independent 32-bit random numbers: the first chooses the
 /// light, the others the position on it. Lanes that come out not `valid` scatter no direct light in this sample: black,
 /// edge-on, behind the light, touching it, or at a distance whose square overflows.
 ///

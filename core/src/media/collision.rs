@@ -81,7 +81,12 @@ impl Weights8 {
         let real = (media.sigma_t / self.sigma) * fraction;
         // rounding may take a density above its majorant (NUMERICS MED-6)
         let null = real.map(|x| F32x8::ZERO.max(1.0 - x));
-        self.emitted += (self.weight * absorbed * media.emission).zero_unless(lanes);
+        // a channel without weight may have coefficients that overflow
+        let emitted = self.weight * absorbed * media.emission;
+        let dead = |w: F32x8, e: F32x8| w.gt(F32x8::ZERO).zero_unless(e);
+        let emitted =
+            Vec3x8::new(dead(self.weight.x, emitted.x), dead(self.weight.y, emitted.y), dead(self.weight.z, emitted.z));
+        self.emitted += emitted.zero_unless(lanes);
         let carried = self.share * self.weight;
         let sum = |x: Vec3x8| {
             let of = |b: F32x8, x: F32x8| b.gt(F32x8::ZERO).zero_unless(b * x);

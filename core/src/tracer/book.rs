@@ -23,7 +23,7 @@ use crate::learn::cache::NO_BIN;
 use crate::learn::cache::Training;
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::rrs::Norm;
-use crate::settings::Settings;
+use crate::settings::{MAX_PATH_LENGTH, Settings};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// All that a shard keeps beyond a packet, but for the vertices that wait.
@@ -230,7 +230,8 @@ impl<'m> Bookkeeping<'m> {
         }
     }
 
-    /// Tells the statistics what came of the shadow rays of `samples`: those of `visible` met nothing.
+    /// Tells the statistics what came of the shadow rays of `samples`: those of `visible` met nothing that
+    /// blocks.
     pub(super) fn learn_shadow_rays(&mut self, samples: &Samples8, s: &ShadowRays8, visible: Mask8) {
         if self.training.is_none() {
             return;
@@ -249,6 +250,14 @@ impl<'m> Bookkeeping<'m> {
         for i in (visible & logged).lanes() {
             let (x, scale) = (local.lane(i), self.ledger.scale(v.path.record.lane(i)));
             training.log_nee(v.bin.lane(i), [0, 1, 2].map(|c| x[c] * scale[c]), v.nee_probability.lane(i));
+        }
+    }
+
+    /// Counts the lanes of `ended`, whose paths are as long as paths can be, if the settings ask for longer ones.
+    #[inline(always)]
+    pub(super) fn count_longest(&mut self, settings: &Settings, ended: Mask8) {
+        if settings.max_depth > MAX_PATH_LENGTH {
+            self.counters.max_length_reached += u64::from(ended.count());
         }
     }
 

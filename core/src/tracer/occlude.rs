@@ -1,5 +1,5 @@
 //! Stage `occlude`: shadow rays. In scenes of opaque things any hit blocks; elsewhere rays walk from surface to surface
-//! and gather a transmittance.
+//! and multiply a transmittance.
 
 use super::book::Bookkeeping;
 use super::crossing::{across, media_towards};

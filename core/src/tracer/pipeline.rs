@@ -33,7 +33,6 @@ use super::state::State;
 use super::trace::trace;
 use crate::geometry::SurfaceHit8;
 use crate::scene::Effects;
-use crate::settings::MAX_PATH_LENGTH;
 use crate::world::World;
 use croupier_simd::{Mask8, U32x8, Vec3x8};
 
@@ -53,8 +52,10 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
         Refill::Done => return false,
         Refill::Camera => camera_rays(world, job, index, cursor, book),
         Refill::Straight(taken) if W::EFFECTS.intersects(Effects::STRAIGHT) => straight_rays(ring, &taken),
-        // nothing lets rays pass: none waits
-        Refill::Straight(_) => return true,
+        Refill::Straight(_) => {
+            debug_assert!(false, "nothing lets rays pass, and one waits");
+            return true;
+        }
         Refill::Samples(taken) => {
             let samples = samples(world, ring, book, &taken);
             let light = sample_lights(world, &samples);
@@ -103,13 +104,11 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
     // segments may end here, and camera samples are looked at all the same
     let met = hit.mask | collision.mask;
     let alive = met & rays.path.depth.lt(U32x8::splat(world.max_depth()));
-    if settings.max_depth > MAX_PATH_LENGTH {
-        book.counters.max_length_reached += u64::from(met.and_not(alive).count());
-    }
     let first = met & rays.path.depth.eq(U32x8::splat(1));
     let wants_aovs = book.wants_aovs() && first.any();
     let may_pass = may_pass::<W>(world.scene());
     if alive.none() && !wants_aovs && !may_pass {
+        book.count_longest(settings, met);
         book.close_lanes(met, &rays.path);
         return true;
     }
@@ -121,6 +120,7 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
         met = met.and_not(passed);
         arrival.active = arrival.active.and_not(passed);
     }
+    book.count_longest(settings, met.and_not(alive));
     if W::EFFECTS.contains(Effects::MEDIA) && collision.mask.any() {
         arrive_in_media(&rays, &collision, &mut arrival);
     }

@@ -134,7 +134,9 @@ impl Materials8 {
             let by_model = hit.mask & bsdf::lanes_of(bsdf::straight_kinds(), &kind);
             let material = U32x8::new(hit.material);
             let of = |mask| StraightOf { scene, material, reflectance, ns, wo, mask };
-            straight = by_model.select(each_kind(W::EFFECTS, by_model, &kind, of).x, straight);
+            let share = each_kind(W::EFFECTS, by_model, &kind, of).x;
+            // through the holes, and through the rest
+            straight = by_model.select(straight + (1.0 - straight) * share, straight);
             if W::EFFECTS.contains(Effects::MEDIA) && media.inside().any() {
                 let hidden = hit.mask & media.hides(&media_behind(scene, &hit.material));
                 straight = hidden.select(F32x8::ONE, straight);
@@ -215,8 +217,8 @@ pub(crate) fn albedo<W: World>(world: &W, a: &Arrival8, active: Mask8) -> Vec3x8
     Vec3x8::select(phase, vertex.reflectance, of)
 }
 
-/// What the kernels (of the lanes of one kind each) say in the lanes of `active` for the model of the kind; 1 for kinds outside the constant
-/// `profile`, 0 in other lanes.
+/// What `kernel`, called with the lanes of one kind, says for its model in the lanes of `active`; 1 for kinds outside the
+/// constant `profile`, 0 in other lanes.
 #[inline(always)]
 fn each_kind<'s, V: Visitor<'s, Out = Vec3x8>>(
     profile: Effects,

@@ -3,7 +3,7 @@
 use super::book::Bookkeeping;
 use super::packets::{RayKind, RayState8};
 use crate::accel::Intersector;
-use crate::cost::COST_BOUNCE;
+use crate::cost::{COST_BOUNCE, COST_CAMERA, COST_STRAIGHT};
 use crate::geometry::Hit8;
 use crate::world::World;
 
@@ -12,13 +12,19 @@ use crate::world::World;
 pub(crate) fn trace<W: World>(world: &W, book: &mut Bookkeeping<'_>, rays: &RayState8, kind: RayKind) -> Hit8 {
     let n = rays.active.count();
     book.counters.trace.count(n);
-    match kind {
+    let cost = match kind {
         // counted where they begin
-        RayKind::Camera => (),
-        RayKind::Scattered => book.counters.scatter_rays += u64::from(n),
-        RayKind::Straight => book.counters.straight_rays += u64::from(n),
-    }
-    book.charge(rays.active, &rays.path, COST_BOUNCE);
+        RayKind::Camera => COST_CAMERA,
+        RayKind::Scattered => {
+            book.counters.scatter_rays += u64::from(n);
+            COST_BOUNCE
+        }
+        RayKind::Straight => {
+            book.counters.straight_rays += u64::from(n);
+            COST_STRAIGHT
+        }
+    };
+    book.charge(rays.active, &rays.path, cost);
     let mut hit = world.intersector().closest(&rays.ray, rays.active);
     // a host's intersector may answer for lanes that it was not asked about
     hit.hit &= rays.active;

@@ -3,7 +3,7 @@
 //! A medium fills the inside of the boundaries that refer to it ([`Material::medium`](super::Material::medium)), front
 //! sides outwards. Where several overlap, the first record wins: a path carries the set of media that it is inside of,
 //! and the lowest index in it is the medium that it meets. A boundary inside a medium of lower index is passed as if it
-//! were not there. Boundaries of one and the same medium must not overlap each other.
+//! were not there, though it emits if it is a light. Boundaries of one and the same medium must not overlap each other.
 
 use bytemuck::{Pod, Zeroable};
 

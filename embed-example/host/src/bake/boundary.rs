@@ -10,7 +10,7 @@ use crate::description::{SceneDescription, Triangle};
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// Every medium has a boundary, which is closed and faces outwards. Indices of vertices and materials have been
+/// Every medium has a boundary, which is closed and as a whole faces outwards. Indices of vertices and materials have been
 /// checked, those of media are checked with the materials.
 pub(super) fn check(scene: &SceneDescription) -> Result<(), BakeError> {
     if scene.media.is_empty() {
