@@ -1,7 +1,7 @@
 //! Reasons for which a scene calls for its effects, as data: what of it uses each. Counts are of what triangles use;
 //! materials, textures and media that no triangle leads to do not count.
 //!
-//! The table is [`REASONS`], a row per effect; effects of materials need none.
+//! The table is `REASONS`, a row per effect; effects of materials need none.
 
 use croupier::Scene;
 use croupier::unstable::Effects;
