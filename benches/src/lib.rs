@@ -3,6 +3,7 @@
 
 pub mod callgrind;
 pub mod clock;
+pub mod exit;
 pub mod figures;
 pub mod measure;
 pub mod provenance;

@@ -1,8 +1,9 @@
 //! Meshes, random rays and an f64 brute-force oracle for traversal.
 
+use crate::records::none;
 use croupier::unstable::geometry::Ray8;
 use croupier::unstable::scene::blob::{Camera, NONE, SceneInfo, Triangle, Vertex};
-use croupier::unstable::scene::{Effects, Records, Scene};
+use croupier::unstable::scene::{Records, Scene};
 use croupier::unstable::simd::{F32x8, Vec3x8};
 use croupier_host::bvh::{Effort, Tree, build};
 
@@ -158,27 +159,11 @@ impl Mesh {
     /// As a scene of bare geometry.
     pub fn scene(&self) -> Scene<'_> {
         Scene::assume_valid(Records {
-            info: &self.info,
             nodes: &self.tree.nodes,
             leaves: &self.tree.leaves,
             triangles: &self.records,
             vertices: &self.vertices,
-            materials: &[],
-            textures: &[],
-            texels: &[],
-            tables: &[],
-            lights: &[],
-            light_alias: &[],
-            environment: None,
-            env_texels: &[],
-            env_alias: &[],
-            camera: &self.camera,
-            media: &[],
-            densities: &[],
-            majorants: &[],
-            names: &[],
-            effects: Effects::default(),
-            hash: 0,
+            ..none(&self.info, &self.camera)
         })
     }
 }

@@ -18,6 +18,7 @@ pub mod media_scene;
 pub mod minimum;
 pub mod model;
 pub mod quadrature;
+mod records;
 pub mod replay;
 pub mod runner;
 pub mod scenes;

@@ -1,9 +1,10 @@
 //! Small scenes for light tests, put together without baking.
 
+use crate::records::none;
 use bytemuck::Zeroable;
 use croupier::Scene;
+use croupier::unstable::scene::Records;
 use croupier::unstable::scene::blob::*;
-use croupier::unstable::scene::{Effects, Records};
 use croupier_host::{alias, environment};
 
 /// Owns what a [`Scene`] borrows.
@@ -117,27 +118,16 @@ impl LightScene {
     /// The scene. Nothing validates it: tests may hand over nonsense.
     pub fn scene(&self) -> Scene<'_> {
         Scene::assume_valid(Records {
-            info: &self.info,
-            nodes: &[],
-            leaves: &[],
             triangles: &self.triangles,
             vertices: &self.vertices,
-            materials: &[],
             textures: &self.textures,
             texels: &self.texels,
-            tables: &[],
             lights: &self.lights,
             light_alias: &self.light_alias,
             environment: self.environment.as_ref(),
             env_texels: &self.env_texels,
             env_alias: &self.env_alias,
-            camera: &self.camera,
-            media: &[],
-            densities: &[],
-            majorants: &[],
-            names: &[],
-            effects: Effects::default(),
-            hash: 0,
+            ..none(&self.info, &self.camera)
         })
     }
 }

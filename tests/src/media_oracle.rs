@@ -1,6 +1,7 @@
 //! Media for tests: scenes of media alone, put together without baking, and their f64 oracles, written from the formulas
 //! without looking at the vector code.
 
+use crate::records::none;
 use bytemuck::Zeroable;
 use croupier::Scene;
 use croupier::unstable::scene::blob::*;
@@ -85,27 +86,11 @@ impl MediaScene {
     /// The scene. Nothing validates it: tests may hand over nonsense.
     pub fn scene(&self) -> Scene<'_> {
         Scene::assume_valid(Records {
-            info: &self.info,
-            nodes: &[],
-            leaves: &[],
-            triangles: &[],
-            vertices: &[],
-            materials: &[],
-            textures: &[],
-            texels: &[],
-            tables: &[],
-            lights: &[],
-            light_alias: &[],
-            environment: None,
-            env_texels: &[],
-            env_alias: &[],
-            camera: &self.camera,
             media: &self.media,
             densities: &self.densities,
             majorants: &self.majorants,
-            names: &[],
             effects: Effects::MEDIA.with(Effects::GRID_MEDIA),
-            hash: 0,
+            ..none(&self.info, &self.camera)
         })
     }
 

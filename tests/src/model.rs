@@ -1,6 +1,7 @@
 //! The model under test: the kernels of the core with the parameters of cases, as objects.
 
 use crate::bsdf::Case;
+use crate::records::none;
 use croupier::unstable::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch_in};
 use croupier::unstable::scene::blob::{Camera, Material, SceneInfo};
 use croupier::unstable::scene::{Effects, Records, Scene};
@@ -29,27 +30,9 @@ pub fn packet(cases: [&Case; 8], active: Mask8, profile: Effects) -> Box<dyn Mod
         }
     }
     let scene = Scene::assume_valid(Records {
-        info: leak::<SceneInfo>(bytemuck::Zeroable::zeroed()),
-        nodes: &[],
-        leaves: &[],
-        triangles: &[],
-        vertices: &[],
         materials: materials.leak(),
-        textures: &[],
-        texels: &[],
         tables: tables.leak(),
-        lights: &[],
-        light_alias: &[],
-        environment: None,
-        env_texels: &[],
-        env_alias: &[],
-        camera: leak::<Camera>(bytemuck::Zeroable::zeroed()),
-        media: &[],
-        densities: &[],
-        majorants: &[],
-        names: &[],
-        effects: Effects::default(),
-        hash: 0,
+        ..none(leak::<SceneInfo>(bytemuck::Zeroable::zeroed()), leak::<Camera>(bytemuck::Zeroable::zeroed()))
     });
     let garbage = |i: usize| if active.lane(i) { i as u32 + 1 } else { 0xdead_beef };
     let colour = |i: usize| if active.lane(i) { cases[i].material.reflectance } else { [f32::NAN; 3] };

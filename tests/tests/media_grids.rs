@@ -69,7 +69,7 @@ fn majorants_hold_along_every_walk() {
             });
             let o = Vec3x8::from_fn(|i| std::array::from_fn(|a| (inside[i][a] - far * d[i][a]) as f32));
             let s = Segment8 { o, d: Vec3x8::from_fn(|i| d[i].map(|x| x as f32)), tmax: F32x8::INFINITY };
-            let path = Path8::new(&s, Mask8::all_lanes());
+            let path = Span8::new(&s, Mask8::all_lanes());
             let mut walk = BrickWalk8::new(&grids, &path, Mask8::all_lanes());
             assert!(far > 3.0 || walk.inside.all());
             let (mut live, mut at, mut bricks) = (walk.inside, F32x8::ZERO, 0);

@@ -8,6 +8,7 @@
 use clap::Parser;
 use cpu_time::ProcessTime;
 use croupier::Strategy;
+use croupier_benches::exit::exit_code;
 use croupier_benches::provenance;
 use croupier_benches::results::{Results, Table};
 use croupier_benches::stats::digits;
@@ -148,11 +149,5 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
 }
 
 fn main() -> ExitCode {
-    match run(&Args::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(e) => {
-            eprintln!("{NAME}: {e}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code(NAME, run(&Args::parse()).map(|()| true))
 }

@@ -25,6 +25,7 @@
 //! [`time_to`]: croupier_benches::stats::time_to
 
 use clap::Parser;
+use croupier_benches::exit::exit_code;
 use croupier_benches::measure::{Run, Snapshot, render};
 use croupier_benches::results::{Results, Table};
 use croupier_benches::stats::{Median, coverage, digits, geometric_mean};
@@ -454,11 +455,5 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
 }
 
 fn main() -> ExitCode {
-    match run(&Args::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(e) => {
-            eprintln!("efficiency: {e}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code("efficiency", run(&Args::parse()).map(|()| true))
 }

@@ -14,6 +14,7 @@
 use clap::Parser;
 use croupier::{Plan, Scene, Settings};
 use croupier_benches::callgrind::{self, Counted, Folder};
+use croupier_benches::exit::exit_code;
 use croupier_benches::results::{Results, Table};
 use croupier_benches::variant::Variant;
 use croupier_benches::{provenance, serial};
@@ -198,12 +199,5 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
 }
 
 fn main() -> ExitCode {
-    match run(&Args::parse()) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(e) => {
-            eprintln!("{NAME}: {e}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code(NAME, run(&Args::parse()))
 }

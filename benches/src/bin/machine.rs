@@ -8,6 +8,7 @@
 use clap::Parser;
 use croupier::unstable::BYTES_PER_PATH;
 use croupier::{Counters, Plan, Scene, Settings, Strategy};
+use croupier_benches::exit::exit_code;
 use croupier_benches::results::{Results, Table};
 use croupier_benches::serial;
 use croupier_host::bake::{BakeOptions, Baked, bake};
@@ -213,12 +214,5 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
 }
 
 fn main() -> ExitCode {
-    match run(&Args::parse()) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(e) => {
-            eprintln!("machine: {e}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code(NAME, run(&Args::parse()))
 }

@@ -20,6 +20,7 @@
 
 use clap::Parser;
 use croupier::{Scene, Settings};
+use croupier_benches::exit::exit_code;
 use croupier_benches::results::{Results, Table};
 use croupier_benches::subject::Subject;
 use croupier_benches::variant::Variant;
@@ -427,12 +428,5 @@ fn main() -> ExitCode {
         println!("skipped: there is no folder {}", args.scenes.display());
         return ExitCode::SUCCESS;
     }
-    match run(&args) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(e) => {
-            eprintln!("references: {e}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code(NAME, run(&args))
 }

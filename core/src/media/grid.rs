@@ -25,7 +25,7 @@ use super::coefficients::Media8;
 use super::collision::{Weights8, albedo};
 use super::density::Grids8;
 use super::majorants::BrickWalk8;
-use super::segment::{Flight8, Passage8, Path8, Segment8};
+use super::segment::{Flight8, Passage8, Segment8, Span8};
 use crate::rng::Key8;
 use crate::sampler::{MAX_FLIGHT_STEPS, MAX_TRANSMITTANCE_STEPS};
 use crate::scene::Scene;
@@ -84,7 +84,7 @@ struct Tracker8<'a, 's> {
 
 impl<'a, 's> Tracker8<'a, 's> {
     #[inline(always)]
-    fn new(scene: &'a Scene<'s>, medium: U32x8, path: &Path8, active: Mask8) -> Self {
+    fn new(scene: &'a Scene<'s>, medium: U32x8, path: &Span8, active: Mask8) -> Self {
         let grids = Grids8::gather(scene, medium, active);
         let walk = BrickWalk8::new(&grids, path, active);
         let live = walk.inside;
@@ -138,7 +138,7 @@ pub(super) fn fly(
     key: Key8,
     active: Mask8,
 ) -> Flight8 {
-    let path = Path8::new(segment, active);
+    let path = Span8::new(segment, active);
     let mut weights = Weights8::new(media, beta);
     let usable = path.usable & weights.alive();
     let mut tracker = Tracker8::new(scene, medium, &path, usable);
@@ -193,7 +193,7 @@ pub(super) fn transmittance(
     key: Key8,
     active: Mask8,
 ) -> Passage8 {
-    let path = Path8::new(segment, active);
+    let path = Span8::new(segment, active);
     let mut tracker = Tracker8::new(scene, medium, &path, path.usable);
     let mut t = Vec3x8::ONE;
     let mut sigma = media.largest(t);

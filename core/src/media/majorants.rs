@@ -13,7 +13,7 @@
 //! *Parallel axes.* A component below 1e-18 of the direction meets no plane: the walk stays in its layer of bricks.
 
 use super::density::Grids8;
-use super::segment::Path8;
+use super::segment::Span8;
 use crate::scene::Scene;
 use crate::scene::blob::BRICK;
 use croupier_simd::{F32x8, I32x8, Mask8, U32x8, Vec3x8};
@@ -78,7 +78,7 @@ pub struct BrickWalk8 {
 impl BrickWalk8 {
     /// Walks at the beginning of the part of `path` in the boxes of `grids`.
     #[inline(always)]
-    pub fn new(grids: &Grids8, path: &Path8, active: Mask8) -> Self {
+    pub fn new(grids: &Grids8, path: &Span8, active: Mask8) -> Self {
         let per_cell = 1.0 / BRICK as f32;
         let o = (path.o - grids.min) * grids.scale * per_cell;
         let rate = path.d * grids.scale * per_cell;

@@ -21,5 +21,5 @@ mod tracking;
 
 pub use density::{Grids8, density};
 pub use majorants::BrickWalk8;
-pub use segment::{Flight8, Passage8, Path8, Segment8};
+pub use segment::{Flight8, Passage8, Segment8, Span8};
 pub use tracking::{fly, transmittance};

@@ -82,7 +82,7 @@ pub struct Passage8 {
 
 /// Segments by arc length.
 #[derive(Clone, Copy, Debug)]
-pub struct Path8 {
+pub struct Span8 {
     /// Origins, world space.
     pub o: Vec3x8,
     /// Unit directions; 0 where the segment is a point.
@@ -95,7 +95,7 @@ pub struct Path8 {
     pub usable: Mask8,
 }
 
-impl Path8 {
+impl Span8 {
     /// Segments of the lanes in `active`.
     #[inline(always)]
     pub fn new(segment: &Segment8, active: Mask8) -> Self {

@@ -3,7 +3,7 @@
 use super::coefficients::Media8;
 use super::collision::{Weights8, albedo};
 use super::grid::{self, choice, optical_depth};
-use super::segment::{Flight8, Passage8, Path8, Segment8};
+use super::segment::{Flight8, Passage8, Segment8, Span8};
 use crate::rng::Key8;
 use crate::scene::{Effects, Scene};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -56,7 +56,7 @@ pub fn transmittance(
     active: Mask8,
 ) -> Passage8 {
     let media = Media8::gather(scene, medium, active);
-    let path = Path8::new(segment, active);
+    let path = Span8::new(segment, active);
     let passes = optical_thickness(media.sigma_t, &path).map(|tau| (-tau).exp());
     if !effects.contains(Effects::GRID_MEDIA) {
         return Passage8 { transmittance: passes.zero_unless(path.usable), steps: 0, roulettes: 0 };
@@ -71,7 +71,7 @@ pub fn transmittance(
 
 /// sigma times the length, 0 where sigma is 0, also along segments without an end (NUMERICS MED-2, MED-4).
 #[inline(always)]
-fn optical_thickness(sigma: Vec3x8, path: &Path8) -> Vec3x8 {
+fn optical_thickness(sigma: Vec3x8, path: &Span8) -> Vec3x8 {
     sigma.map(|x| x.gt(F32x8::ZERO).zero_unless(x * path.length))
 }
 
@@ -85,7 +85,7 @@ fn absorbed(x: F32x8) -> F32x8 {
 /// [`fly`] through homogeneous media.
 #[inline(always)]
 fn fly_homogeneous(media: &Media8, segment: &Segment8, beta: Vec3x8, key: Key8, active: Mask8) -> Flight8 {
-    let path = Path8::new(segment, active);
+    let path = Span8::new(segment, active);
     let mut weights = Weights8::new(media, beta);
     let usable = path.usable & weights.alive();
     let scatters = media.sigma_s.any_positive();

@@ -20,6 +20,7 @@ use croupier::unstable::profile::{AnyProfile, Custom};
 use croupier::unstable::{BYTES_PER_PATH, Effects};
 use croupier::{Plan, Scene, Settings};
 use croupier_benches::callgrind::{self, Counted, Folder};
+use croupier_benches::exit::exit_code;
 use croupier_benches::provenance;
 use croupier_benches::results::{Results, Table};
 use croupier_benches::variant::Variant;
@@ -313,12 +314,5 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
 }
 
 fn main() -> ExitCode {
-    match run(&Args::parse()) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(e) => {
-            eprintln!("{NAME}: {e}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code(NAME, run(&Args::parse()))
 }

@@ -26,6 +26,7 @@ mod rows;
 use clap::Parser;
 use croupier::unstable::learn::Learning;
 use croupier::{Counters, Settings, Strategy};
+use croupier_benches::exit::exit_code;
 use croupier_benches::results::{Results, Table};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
@@ -357,12 +358,5 @@ fn main() -> ExitCode {
         println!("skipped: there is no folder {}", args.scenes.display());
         return ExitCode::SUCCESS;
     }
-    match run(&args) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(e) => {
-            eprintln!("equivalence: {e}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code(NAME, run(&args))
 }

@@ -18,6 +18,7 @@ use croupier::unstable::accel::{Intersector, WideBvh};
 use croupier::unstable::geometry::{Hit8, Ray8};
 use croupier::unstable::simd::Mask8;
 use croupier_benches::clock::Clock;
+use croupier_benches::exit::exit_code;
 use croupier_benches::results::{Results, Table};
 use croupier_host::bvh::{self, Effort};
 use glam::Vec3A;
@@ -313,11 +314,5 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
 }
 
 fn main() -> ExitCode {
-    match run(&Args::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(e) => {
-            eprintln!("{NAME}: {e}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code(NAME, run(&Args::parse()).map(|()| true))
 }

@@ -1,0 +1,31 @@
+//! Scenes from a few sections.
+
+use croupier::unstable::scene::blob::{Camera, SceneInfo};
+use croupier::unstable::scene::{Effects, Records};
+
+/// Records of a scene in which there is nothing, for `..none(info, camera)`.
+pub(crate) fn none<'s>(info: &'s SceneInfo, camera: &'s Camera) -> Records<'s> {
+    Records {
+        info,
+        nodes: &[],
+        leaves: &[],
+        triangles: &[],
+        vertices: &[],
+        materials: &[],
+        textures: &[],
+        texels: &[],
+        tables: &[],
+        lights: &[],
+        light_alias: &[],
+        environment: None,
+        env_texels: &[],
+        env_alias: &[],
+        camera,
+        media: &[],
+        densities: &[],
+        majorants: &[],
+        names: &[],
+        effects: Effects::default(),
+        hash: 0,
+    }
+}
