@@ -26,7 +26,7 @@ impl Plan {
         let pixels = s.size[0] as usize * s.size[1] as usize;
         let session = Measure::new().add::<PixelStats>(pixels).add::<PixelAov>(if s.aovs { pixels } else { 0 });
         let session = LearnedState::measure(session, &s.needs(cache));
-        let job = Job { settings: s, tiles: Tiles::new(s.size, s.shards), cache };
+        let job = Job { settings: s, tiles: Tiles::new(s.size, s.shards), cache, fingerprint: s.fingerprint() };
         Ok(Self {
             job,
             session: session.layout().ok_or(SettingsError::Memory)?,
@@ -57,5 +57,17 @@ impl<'m> Shard<'m> {
     /// An index beyond the plan's shards, or a block that does not fit.
     pub fn new(plan: &Plan, index: u32, block: &'m mut [u8]) -> Result<Self, ShardError> {
         Self::carve(&plan.job, plan.shard, index, block)
+    }
+
+    /// Takes up the shard that [`Self::suspend`] has left in the block, which may have moved since; the plan must be equal
+    /// to the one it was made with. Takes a fixed, short time.
+    ///
+    /// The bytes are checked as far as that takes no longer. If others have changed them since, the picture may be wrong
+    /// or a step may panic; memory stays safe.
+    ///
+    /// # Errors
+    /// A block that does not fit or holds no such shard, or one that was resumed and not suspended since.
+    pub fn resume(plan: &Plan, index: u32, block: &'m mut [u8]) -> Result<Self, ShardError> {
+        Self::reopen(&plan.job, plan.shard, index, block)
     }
 }

@@ -120,6 +120,11 @@ impl Tiles {
         (tile..self.columns * self.rows).find(|&t| self.owner(t) == shard)
     }
 
+    /// Number of tiles, of all shards.
+    pub(crate) fn count(&self) -> usize {
+        self.columns as usize * self.rows as usize
+    }
+
     /// Upper bound of the tiles that a shard owns.
     pub(crate) fn most_tiles(&self) -> usize {
         // per row of tiles the owners run through all shards in turn

@@ -5,9 +5,11 @@ use crate::accel::Intersector;
 use crate::learn::LearnedState;
 use crate::light::LightSelector;
 use crate::scene::{Effects, Scene};
+use bytemuck::{Pod, Zeroable};
 
 /// One round of camera samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Iteration {
     /// 1 for the first; 0 before it.
     pub number: u64,

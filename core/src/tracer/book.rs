@@ -24,6 +24,7 @@ use crate::learn::cache::Training;
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::rrs::Norm;
 use crate::settings::{MAX_PATH_LENGTH, Settings};
+use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// All that a shard keeps beyond a packet, but for the vertices that wait.
@@ -39,6 +40,18 @@ pub(crate) struct Bookkeeping<'m> {
     outlier: f32,
     /// How the errors of the channels become one.
     norm: Norm,
+}
+
+/// What the books hold besides their slabs and sums.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct BookRecord {
+    counters: Counters,
+    free_roots: u64,
+    free_records: u64,
+    used_bins: u64,
+    outlier: f32,
+    reserved: u32,
 }
 
 /// Camera samples in flight: every waiting vertex may have its own, and so may the lanes of a packet.
@@ -66,21 +79,49 @@ impl<'m> Bookkeeping<'m> {
             roots: Roots::carve(c, roots_capacity(s))?,
             ledger: Ledger::carve(c, ledger_capacity(s))?,
             training: job.cache.map(|size| Training::carve(c, size)).transpose()?,
-            pixels: c.take(pixels)?,
-            aovs: c.take(if s.aovs { pixels } else { 0 })?,
+            pixels: c.take_unset(pixels)?,
+            aovs: c.take_unset(if s.aovs { pixels } else { 0 })?,
             counters: Counters::default(),
             outlier: f32::INFINITY,
             norm: s.learning.norm,
         })
     }
 
-    /// Begins an iteration with empty books.
-    pub(crate) fn begin(&mut self, learned: &LearnedState<'_>) {
+    /// All but slabs and sums, for [`Self::resume`].
+    pub(crate) fn suspend(&self) -> BookRecord {
+        BookRecord {
+            counters: self.counters,
+            free_roots: self.roots.suspend(),
+            free_records: self.ledger.suspend(),
+            used_bins: self.training.as_ref().map_or(0, Training::suspend),
+            outlier: self.outlier,
+            reserved: 0,
+        }
+    }
+
+    /// Goes on with the slabs and sums that the memory holds; `None` if the record is not that of such books.
+    pub(crate) fn resume(&mut self, r: &BookRecord) -> Option<()> {
+        self.roots.resume(r.free_roots)?;
+        self.ledger.resume(r.free_records)?;
+        if let Some(training) = &mut self.training {
+            training.resume(r.used_bins)?;
+        }
+        (self.counters, self.outlier) = (r.counters, r.outlier);
+        Some(())
+    }
+
+    /// Empties the books.
+    pub(crate) fn reset(&mut self) {
         self.roots.reset();
         self.ledger.reset();
         self.counters = Counters::default();
         self.pixels.fill(PixelSums::default());
         self.aovs.fill(PixelAov::default());
+    }
+
+    /// Begins an iteration with empty books.
+    pub(crate) fn begin(&mut self, learned: &LearnedState<'_>) {
+        self.reset();
         self.outlier = learned.outlier();
         if let Some(t) = &mut self.training {
             t.clear(learned.used_bins());

@@ -14,6 +14,7 @@ use crate::rng::Key8;
 use crate::scene::Effects;
 use crate::tiles::{TILE_PIXELS, Tiles};
 use crate::world::World;
+use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Where a shard is in its camera samples.
@@ -31,7 +32,33 @@ pub(super) struct CameraCursor {
     sample: u32,
 }
 
+/// A cursor as numbers.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct CursorRecord {
+    /// [`NO_TILE`] if none is left.
+    tile: u32,
+    base: u32,
+    slot: u32,
+    sample: u32,
+}
+
+const NO_TILE: u32 = u32::MAX;
+
 impl CameraCursor {
+    pub(super) fn suspend(&self) -> CursorRecord {
+        let Self { tile, base, slot, sample, .. } = *self;
+        CursorRecord { tile: tile.unwrap_or(NO_TILE), base, slot, sample }
+    }
+
+    /// `None` if there is no such tile or slot.
+    pub(super) fn resume(tiles: &Tiles, r: &CursorRecord) -> Option<Self> {
+        let CursorRecord { tile, base, slot, sample } = *r;
+        let tile = (tile != NO_TILE).then_some(tile);
+        let sound = slot < TILE_PIXELS && tile.is_none_or(|tile| (tile as usize) < tiles.count());
+        sound.then(|| Self { tile, start: tile.map_or([0; 2], |tile| tiles.start(tile)), base, slot, sample })
+    }
+
     pub(super) fn new(tiles: &Tiles, shard: u32, samples: u32) -> Self {
         let tile = if samples == 0 { None } else { tiles.next_of(shard, 0) };
         Self { tile, start: tile.map_or([0; 2], |tile| tiles.start(tile)), base: 0, slot: 0, sample: 0 }

@@ -15,10 +15,20 @@ impl<'m> FreeList<'m> {
         m.add::<u32>(capacity)
     }
 
+    /// A list without free slots, until [`Self::reset`] or [`Self::resume`].
     pub(crate) fn carve(c: &mut Carver<'m>, capacity: usize) -> Result<Self, MemoryError> {
-        let mut list = Self { slots: c.take_unset(capacity)?, len: 0 };
-        list.reset();
-        Ok(list)
+        Ok(Self { slots: c.take_unset(capacity)?, len: 0 })
+    }
+
+    /// How many are free, for [`Self::resume`].
+    pub(crate) fn suspend(&self) -> u64 {
+        self.len as u64
+    }
+
+    /// Goes on with the slots that the memory holds; `None` if so many cannot be free.
+    pub(crate) fn resume(&mut self, len: u64) -> Option<()> {
+        self.len = usize::try_from(len).ok().filter(|&len| len <= self.slots.len())?;
+        Some(())
     }
 
     /// All slots are free.

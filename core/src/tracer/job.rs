@@ -11,6 +11,8 @@ pub(crate) struct Job {
     pub tiles: Tiles,
     /// Room for statistics of the scene, if they are wanted.
     pub cache: Option<CacheSize>,
+    /// [`Settings::fingerprint`].
+    pub fingerprint: u64,
 }
 
 impl Job {

@@ -82,6 +82,16 @@ impl<'m> Ledger<'m> {
         Ok(Self { records, free: FreeList::carve(c, capacity)? })
     }
 
+    /// How many records are free, for [`Self::resume`].
+    pub(crate) fn suspend(&self) -> u64 {
+        self.free.suspend()
+    }
+
+    /// See [`FreeList::resume`].
+    pub(crate) fn resume(&mut self, free: u64) -> Option<()> {
+        self.free.resume(free)
+    }
+
     /// Forgets all that is open.
     pub(crate) fn reset(&mut self) {
         self.free.reset();
@@ -196,7 +206,9 @@ mod tests {
         let mut block: Vec<u8> = std::vec![0; layout.size + crate::memory::BLOCK_ALIGN];
         let offset = block.as_ptr().align_offset(crate::memory::BLOCK_ALIGN);
         let mut carver = Carver::new(&mut block[offset..], layout).unwrap();
-        f(&mut Ledger::carve(&mut carver, capacity).unwrap());
+        let mut ledger = Ledger::carve(&mut carver, capacity).unwrap();
+        ledger.reset();
+        f(&mut ledger);
     }
 
     struct Random(u32);

@@ -23,6 +23,7 @@
 use super::class::{PacketClass, Queue};
 use super::vertex::PathVertex;
 use crate::memory::{Carver, Measure, MemoryError};
+use bytemuck::{Pod, Zeroable};
 use croupier_simd::U32x8;
 
 /// The vertex of a queue that was stored last is the first to leave.
@@ -69,17 +70,48 @@ pub(crate) struct Ring<'m> {
 
 const _: () = assert!(Queue::COUNT <= u32::BITS as usize);
 
+/// What a ring holds besides its slots and links.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct RingRecord {
+    free_len: u64,
+    free: u32,
+    occupied: u32,
+    last: [u32; Queue::COUNT],
+    pending: [u32; Queue::COUNT],
+}
+
 impl<'m> Ring<'m> {
     pub(crate) fn measure(m: Measure, capacity: usize) -> Measure {
         m.add::<PathVertex>(capacity).add::<u32>(capacity)
     }
 
+    /// A ring without free slots, until [`Self::reset`] or [`Self::resume`].
     pub(crate) fn carve(c: &mut Carver<'m>, capacity: usize) -> Result<Self, MemoryError> {
         let (slots, next) = (c.take_unset(capacity)?, c.take_unset(capacity)?);
         let (last, pending) = ([NONE; Queue::COUNT], [0; Queue::COUNT]);
-        let mut ring = Self { slots, next, free: NONE, free_len: 0, last, pending, occupied: 0 };
-        ring.reset();
-        Ok(ring)
+        Ok(Self { slots, next, free: NONE, free_len: 0, last, pending, occupied: 0 })
+    }
+
+    /// All but slots and links, for [`Self::resume`].
+    pub(crate) fn suspend(&self) -> RingRecord {
+        let Self { free, free_len, last, pending, occupied, .. } = *self;
+        RingRecord { free_len: free_len as u64, free, occupied, last, pending }
+    }
+
+    /// Goes on with the slots and links that the memory holds; `None` if the record is not that of such a ring.
+    pub(crate) fn resume(&mut self, r: &RingRecord) -> Option<()> {
+        let slots = self.next.len();
+        self.free_len = usize::try_from(r.free_len).ok().filter(|&n| n <= slots)?;
+        let in_use = |q: usize| r.occupied >> q & 1 == 1;
+        let sound = |(q, &slot): (usize, &u32)| if in_use(q) { (slot as usize) < slots } else { slot == NONE };
+        let queues =
+            r.occupied.checked_shr(Queue::COUNT as u32).unwrap_or(0) == 0 && r.last.iter().enumerate().all(sound);
+        if !queues || (self.free_len > 0 && r.free as usize >= slots) {
+            return None;
+        }
+        (self.free, self.last, self.pending, self.occupied) = (r.free, r.last, r.pending, r.occupied);
+        Some(())
     }
 
     /// Forgets all that waits.
@@ -229,7 +261,9 @@ mod tests {
         let mut block: Vec<u8> = std::vec![0xAB; layout.size + BLOCK_ALIGN];
         let offset = block.as_ptr().align_offset(BLOCK_ALIGN);
         let mut carver = Carver::new(&mut block[offset..], layout).unwrap();
-        f(&mut Ring::carve(&mut carver, capacity).unwrap());
+        let mut ring = Ring::carve(&mut carver, capacity).unwrap();
+        ring.reset();
+        f(&mut ring);
     }
 
     fn class(n: u32) -> PacketClass {

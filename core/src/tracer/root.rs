@@ -72,6 +72,16 @@ impl<'m> Roots<'m> {
         Ok(Self { slots, free: FreeList::carve(c, capacity)? })
     }
 
+    /// How many slots are free, for [`Self::resume`].
+    pub(crate) fn suspend(&self) -> u64 {
+        self.free.suspend()
+    }
+
+    /// See [`FreeList::resume`].
+    pub(crate) fn resume(&mut self, free: u64) -> Option<()> {
+        self.free.resume(free)
+    }
+
     /// Forgets all that is open.
     pub(crate) fn reset(&mut self) {
         self.free.reset();

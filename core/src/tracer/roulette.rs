@@ -22,17 +22,34 @@ use rand_pcg::Pcg32;
 /// Numbers of the combs of one shard in one iteration: one for each packet, so they depend on the order of packets,
 /// which is a function of scene and settings.
 #[derive(Debug)]
-pub(crate) struct CombNumbers(Pcg32);
+pub(crate) struct CombNumbers {
+    generator: Pcg32,
+    /// How many were drawn.
+    drawn: u64,
+}
 
 impl CombNumbers {
     pub(super) fn new(seed: u64, iteration: u64, shard: u32) -> Self {
         let stream = (iteration << 20 | u64::from(shard)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        Self(Pcg32::seed_from_u64(seed ^ stream))
+        Self { generator: Pcg32::seed_from_u64(seed ^ stream), drawn: 0 }
+    }
+
+    /// How many numbers were drawn, for [`Self::resume`].
+    pub(super) fn suspend(&self) -> u64 {
+        self.drawn
+    }
+
+    /// Goes on after so many numbers.
+    pub(super) fn resume(mut self, drawn: u64) -> Self {
+        self.generator.advance(drawn);
+        self.drawn = drawn;
+        self
     }
 
     /// 32 random bits.
     fn next(&mut self) -> u32 {
-        self.0.next_u32()
+        self.drawn += 1;
+        self.generator.next_u32()
     }
 }
 

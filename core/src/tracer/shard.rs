@@ -3,7 +3,7 @@
 use super::camera_rays::CameraCursor;
 use super::job::Job;
 use super::pipeline::turn;
-use super::state::State;
+use super::state::{State, StateRecord};
 use crate::counters::Counters;
 use crate::film::{PixelAov, PixelSums};
 use crate::learn::cache::Training;
@@ -11,6 +11,7 @@ use crate::memory::{Carver, Layout, Measure, MemoryError};
 use crate::settings::Settings;
 use crate::tiles::TILE_PIXELS;
 use crate::world::{Iteration, World};
+use bytemuck::{Pod, Zeroable};
 use core::fmt;
 
 /// How much a step may do.
@@ -42,6 +43,11 @@ pub enum ShardError {
     },
     /// The block does not fit.
     Memory(MemoryError),
+    /// The block does not hold a suspended shard of the plan with this index.
+    NotSuspended {
+        /// Asked for.
+        index: u32,
+    },
 }
 
 impl fmt::Display for ShardError {
@@ -49,6 +55,7 @@ impl fmt::Display for ShardError {
         match self {
             Self::Index { index, shards } => write!(f, "shard {index} of a plan with {shards} shards"),
             Self::Memory(e) => write!(f, "shard: {e}"),
+            Self::NotSuspended { index } => write!(f, "the block does not hold shard {index} of this plan, suspended"),
         }
     }
 }
@@ -60,16 +67,35 @@ impl core::error::Error for ShardError {}
 #[derive(Debug)]
 pub struct Shard<'m> {
     pub(super) job: Job,
+    record: &'m mut ShardRecord,
     index: u32,
     /// Scene and iteration that the books belong to; iteration 0 is none.
     joined: (u64, Iteration),
     pub(super) state: State<'m>,
 }
 
+/// What a shard holds besides its slabs and sums, at the head of its block.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+struct ShardRecord {
+    /// [`SUSPENDED`] if the rest counts.
+    mark: u64,
+    /// [`Settings::fingerprint`].
+    settings: u64,
+    index: u64,
+    /// Content hash of the scene, and iteration.
+    scene: u64,
+    iteration: Iteration,
+    state: StateRecord,
+}
+
+/// Mark of a block that holds a suspended shard.
+const SUSPENDED: u64 = u64::from_le_bytes(*b"SHARD  1");
+
 impl<'m> Shard<'m> {
     /// Bytes of a shard; [`Self::carve`] carves in the same order.
     pub(crate) fn measure(job: &Job) -> Measure {
-        State::measure(job)
+        State::measure(Measure::new().add::<ShardRecord>(1), job)
     }
 
     /// Carves shard `index` out of a block of `layout`.
@@ -78,14 +104,49 @@ impl<'m> Shard<'m> {
         if index >= s.shards {
             return Err(ShardError::Index { index, shards: s.shards });
         }
-        let memory = ShardError::Memory;
-        let mut c = Carver::new(block, layout).map_err(memory)?;
+        let mut shard = Self::place(job, layout, index, block).map_err(ShardError::Memory)?;
+        shard.record.mark = 0;
+        shard.state.reset();
+        Ok(shard)
+    }
+
+    /// Slices of the block; what they hold stays as it is.
+    fn place(job: &Job, layout: Layout, index: u32, block: &'m mut [u8]) -> Result<Self, MemoryError> {
+        let mut c = Carver::new(block, layout)?;
         Ok(Self {
             job: *job,
+            record: c.take_one()?,
             index,
             joined: (0, Iteration::default()),
-            state: State::carve(&mut c, job).map_err(memory)?,
+            state: State::carve(&mut c, job)?,
         })
+    }
+
+    /// Gives the block back, so that [`Self::resume`] can go on with it: a host that stores shards without their
+    /// lifetime keeps the blocks. Takes a fixed, short time.
+    pub fn suspend(self) {
+        let (scene, iteration) = self.joined;
+        *self.record = ShardRecord {
+            mark: SUSPENDED,
+            settings: self.job.fingerprint,
+            index: self.index.into(),
+            scene,
+            iteration,
+            state: self.state.suspend(),
+        };
+    }
+
+    /// See [`Self::resume`].
+    pub(crate) fn reopen(job: &Job, layout: Layout, index: u32, block: &'m mut [u8]) -> Result<Self, ShardError> {
+        let mut shard = Self::place(job, layout, index, block).map_err(ShardError::Memory)?;
+        let r = *shard.record;
+        let own = r.mark == SUSPENDED && r.settings == job.fingerprint && r.index == u64::from(index);
+        own.then_some(())
+            .and_then(|()| shard.state.resume(job, index, r.iteration, &r.state))
+            .ok_or(ShardError::NotSuspended { index })?;
+        shard.record.mark = 0;
+        shard.joined = (r.scene, r.iteration);
+        Ok(shard)
     }
 
     /// Number of the shard in the plan.

@@ -1,12 +1,13 @@
 //! What a shard keeps between packets.
 
-use super::book::Bookkeeping;
-use super::camera_rays::CameraCursor;
+use super::book::{BookRecord, Bookkeeping};
+use super::camera_rays::{CameraCursor, CursorRecord};
 use super::job::Job;
-use super::ring::Ring;
+use super::ring::{Ring, RingRecord};
 use super::roulette::CombNumbers;
 use crate::memory::{Carver, Measure, MemoryError};
-use crate::world::World;
+use crate::world::{Iteration, World};
+use bytemuck::{Pod, Zeroable};
 
 /// All that changes while a shard works.
 #[derive(Debug)]
@@ -21,10 +22,21 @@ pub(crate) struct State<'m> {
     pub comb: CombNumbers,
 }
 
+/// What a shard's state holds besides its slabs and sums.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct StateRecord {
+    cursor: CursorRecord,
+    ring: RingRecord,
+    book: BookRecord,
+    /// Numbers drawn for the combs.
+    drawn: u64,
+}
+
 impl<'m> State<'m> {
     /// Bytes; [`Self::carve`] carves in the same order.
-    pub(crate) fn measure(job: &Job) -> Measure {
-        Bookkeeping::measure(Ring::measure(Measure::new(), job.settings.ring as usize), job)
+    pub(crate) fn measure(m: Measure, job: &Job) -> Measure {
+        Bookkeeping::measure(Ring::measure(m, job.settings.ring as usize), job)
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, job: &Job) -> Result<Self, MemoryError> {
@@ -34,6 +46,33 @@ impl<'m> State<'m> {
             book: Bookkeeping::carve(c, job)?,
             comb: CombNumbers::new(0, 0, 0),
         })
+    }
+
+    /// All but slabs and sums, for [`Self::resume`].
+    pub(crate) fn suspend(&self) -> StateRecord {
+        StateRecord {
+            cursor: self.cursor.suspend(),
+            ring: self.ring.suspend(),
+            book: self.book.suspend(),
+            drawn: self.comb.suspend(),
+        }
+    }
+
+    /// Goes on in `iteration` as shard `index` with the slabs and sums that the memory holds; `None` if the record is
+    /// not that of such a state.
+    pub(crate) fn resume(&mut self, job: &Job, index: u32, iteration: Iteration, r: &StateRecord) -> Option<()> {
+        self.cursor = CameraCursor::resume(&job.tiles, &r.cursor)?;
+        self.ring.resume(&r.ring)?;
+        self.book.resume(&r.book)?;
+        self.comb = CombNumbers::new(job.settings.seed, iteration.number, index).resume(r.drawn);
+        Some(())
+    }
+
+    /// Empties everything.
+    pub(crate) fn reset(&mut self) {
+        self.cursor = CameraCursor::finished();
+        self.ring.reset();
+        self.book.reset();
     }
 
     /// Joins an iteration as shard `index`; what one that was given up has left is forgotten.

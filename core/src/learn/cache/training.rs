@@ -34,6 +34,17 @@ impl<'m> Training<'m> {
         Ok(Self { records: c.take_unset(size.bins())?, shadows: c.take_unset(size.bins())?, used: 0 })
     }
 
+    /// Bins in use, for [`Self::resume`].
+    pub(crate) fn suspend(&self) -> u64 {
+        self.used as u64
+    }
+
+    /// Goes on with the sums that the memory holds; `None` if there are not so many bins.
+    pub(crate) fn resume(&mut self, used: u64) -> Option<()> {
+        self.used = usize::try_from(used).ok().filter(|&used| used <= self.records.len())?;
+        Some(())
+    }
+
     /// Forgets all sums and takes samples of bins below `used_bins` ([`super::Cache::bins`]).
     pub fn clear(&mut self, used_bins: u32) {
         self.used = (used_bins as usize).min(self.records.len());
