@@ -3,6 +3,7 @@
 use crate::accel::{Intersector, WideBvh};
 use crate::counters::Counters;
 use crate::film::{Film, PixelSums};
+use crate::instructions::{INSTRUCTION_SET, missing_instructions};
 use crate::learn::cache::Cache;
 use crate::learn::{LearnedState, PictureStatistics};
 use crate::light::{LightSelector, PowerSelector};
@@ -21,6 +22,11 @@ use core::marker::PhantomData;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SessionError {
+    /// The processor lacks instructions that this build uses ([`crate::INSTRUCTION_SET`]).
+    Instructions {
+        /// The first set that is missing.
+        missing: &'static str,
+    },
     /// The shared block does not fit.
     Memory(MemoryError),
     /// The scene calls for effects that the profile was compiled without.
@@ -55,6 +61,9 @@ pub enum SessionError {
 impl fmt::Display for SessionError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Instructions { missing } => {
+                write!(f, "this build needs a processor with {INSTRUCTION_SET}; this one lacks {missing}")
+            }
             Self::Memory(e) => write!(f, "session: {e}"),
             Self::Profile { missing } => {
                 f.write_str("the scene calls for effects outside the kernel profile:")?;
@@ -138,6 +147,9 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector> SessionBuilder<'s, P, I, 
     /// # Errors
     /// A scene that calls for effects outside the profile, or a block that does not fit.
     pub fn build<'m>(self, plan: &Plan, block: &'m mut [u8]) -> Result<Session<'s, 'm, P, I, L>, SessionError> {
+        if let Some(missing) = missing_instructions() {
+            return Err(SessionError::Instructions { missing });
+        }
         let Self { scene, intersector, selector, profile } = self;
         if !P::EFFECTS.contains(scene.effects) {
             return Err(SessionError::Profile { missing: scene.effects.without(P::EFFECTS) });
