@@ -7,6 +7,7 @@
 //!
 //! | layer | knows | must not know |
 //! |---|---|---|
+//! | `instructions` | what this build needs of the processor | what runs on it |
 //! | `memory` | sizes first, then one carve | what is stored |
 //! | `bits` | sets, one bit each | what is in them |
 //! | `names` | enumerations with names | what they stand for |
@@ -30,6 +31,7 @@
 //! | `setting` | settings by name and text | what they set |
 //! | `learn` | statistics by place and direction | materials, lights, how paths are traced |
 //! | `settings` | the caller's choices, their ranges | how they are followed |
+//! | `edit` | changes of a scene between frames | sessions, how paths are traced |
 //! | `world` | what paths read | who owns it |
 //! | `tracer` | packets, the refill ring, stages, books | files, threads, clocks |
 //! | `plan` | how many bytes a render needs | where they come from |
@@ -74,8 +76,10 @@ mod camera;
 mod cost;
 mod counters;
 mod denoise;
+mod edit;
 mod film;
 mod geometry;
+mod instructions;
 mod learn;
 mod light;
 mod media;
@@ -98,7 +102,9 @@ mod tracer;
 mod world;
 
 pub use counters::Counters;
+pub use edit::{EditError, EditableScene, SceneEdit};
 pub use film::{ErrorEstimate, Film};
+pub use instructions::{INSTRUCTION_SET, missing_instructions};
 pub use memory::{BLOCK_ALIGN, MemoryError};
 pub use plan::Plan;
 pub use rrs::Strategy;

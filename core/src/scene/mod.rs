@@ -16,4 +16,6 @@ mod view;
 pub use effects::Effects;
 pub use error::{ChildFault, Field, SceneError, SectionFault, SlotFault};
 pub use records::Records;
+pub(crate) use sections::{SectionTable, Sections};
+pub(crate) use validate::single as check;
 pub use view::Scene;

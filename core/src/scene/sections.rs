@@ -3,17 +3,38 @@
 use super::blob::{ALIGN, Header, MAGIC, Section, SectionKind, VERSION, content_hash};
 use super::error::{SceneError, SectionFault};
 use bytemuck::Pod;
+use core::ops::Range;
 
 /// Number of section kinds.
 const KINDS: usize = SectionKind::ALL.len();
 
-/// A blob whose header, hash and section table are sound.
-#[derive(Clone, Copy)]
-pub(super) struct Sections<'s> {
-    blob: &'s [u8],
+/// Where the sections of a blob are.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SectionTable {
     entries: [Option<Section>; KINDS],
     /// Content hash, verified.
-    pub(super) hash: u64,
+    pub(crate) hash: u64,
+}
+
+/// A blob whose header, hash and section table are sound.
+#[derive(Clone, Copy)]
+pub(crate) struct Sections<'s> {
+    blob: &'s [u8],
+    table: SectionTable,
+}
+
+impl SectionTable {
+    fn entry(&self, kind: SectionKind) -> Option<Section> {
+        self.entries.get(kind as usize).copied().flatten()
+    }
+
+    /// Bytes of record `index` of section `kind` within the blob.
+    pub(crate) fn record(&self, kind: SectionKind, index: u32) -> Option<Range<usize>> {
+        let s = self.entry(kind).filter(|s| u64::from(index) < s.count)?;
+        let start = u64::from(index).checked_mul(u64::from(s.stride))?.checked_add(s.offset)?;
+        let start = usize::try_from(start).ok()?;
+        Some(start..start.checked_add(s.stride as usize)?)
+    }
 }
 
 impl<'s> Sections<'s> {
@@ -53,7 +74,7 @@ impl<'s> Sections<'s> {
         let table_end = table_bytes.saturating_add(size_of::<Header>()) as u64;
         let table = content.get(..table_bytes);
         let table = table.ok_or(SceneError::Truncated { needed: table_end, given: header.length })?;
-        let mut sections = Self { blob, entries: [None; KINDS], hash: header.hash };
+        let mut sections = Self { blob, table: SectionTable { entries: [None; KINDS], hash: header.hash } };
         for entry in table.chunks_exact(size_of::<Section>()) {
             sections.enter(bytemuck::pod_read_unaligned(entry), table_end)?;
         }
@@ -69,7 +90,7 @@ impl<'s> Sections<'s> {
         }
         let end = end(&s).filter(|e| *e <= self.blob.len() as u64 && s.count <= i32::MAX as u64);
         let end = end.ok_or(bad(SectionFault::Count(s.count)))?;
-        for (other, k) in self.entries.iter().zip(SectionKind::ALL) {
+        for (other, k) in self.table.entries.iter().zip(SectionKind::ALL) {
             let Some(o) = other else { continue };
             if *k == kind {
                 return Err(bad(SectionFault::Repeated));
@@ -80,15 +101,25 @@ impl<'s> Sections<'s> {
                 return Err(bad(SectionFault::Overlaps(*k)));
             }
         }
-        if let Some(place) = self.entries.get_mut(kind as usize) {
+        if let Some(place) = self.table.entries.get_mut(kind as usize) {
             *place = Some(s);
         }
         Ok(())
     }
 
+    /// Sections of a blob with this table, which were sound; what `bytes` lacks is missing.
+    pub(crate) fn assume_sound(table: SectionTable, bytes: &'s [u8]) -> Self {
+        Self { blob: bytes, table }
+    }
+
+    /// Where they are.
+    pub(crate) fn table(&self) -> SectionTable {
+        self.table
+    }
+
     /// The records of section `kind`, none if there is no such section.
     pub(super) fn records<T: Pod>(&self, kind: SectionKind) -> Result<&'s [T], SceneError> {
-        let Some(s) = self.entries.get(kind as usize).copied().flatten() else { return Ok(&[]) };
+        let Some(s) = self.table.entry(kind) else { return Ok(&[]) };
         let bad = |fault| SceneError::Section { kind, fault };
         if s.stride as usize != size_of::<T>() {
             return Err(bad(SectionFault::Stride(s.stride)));

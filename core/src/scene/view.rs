@@ -4,7 +4,7 @@ use super::blob::*;
 use super::effects::Effects;
 use super::error::{SceneError, SectionFault};
 use super::records::Records;
-use super::sections::Sections;
+use super::sections::{SectionTable, Sections};
 use super::validate;
 use core::ops::Deref;
 
@@ -35,7 +35,19 @@ impl<'s> Scene<'s> {
     /// # Errors
     /// The first fault found, see [`SceneError`].
     pub fn from_bytes(bytes: &'s [u8]) -> Result<Self, SceneError> {
+        Self::validated(bytes).map(|(scene, _)| scene)
+    }
+
+    /// [`Self::from_bytes`], and where the sections are.
+    pub(crate) fn validated(bytes: &'s [u8]) -> Result<(Self, SectionTable), SceneError> {
         let sections = Sections::new(bytes)?;
+        let mut records = Self::records(&sections)?;
+        records.effects = validate::scene(&records)?;
+        Ok((Self(records), sections.table()))
+    }
+
+    /// The records of sound sections, without their effects.
+    pub(crate) fn records(sections: &Sections<'s>) -> Result<Records<'s>, SceneError> {
         let environment = match sections.records(SectionKind::Environment)? {
             [] => None,
             [environment] => Some(environment),
@@ -44,7 +56,7 @@ impl<'s> Scene<'s> {
                 return Err(SceneError::Section { kind: SectionKind::Environment, fault });
             }
         };
-        let mut records = Records {
+        Ok(Records {
             info: sections.one(SectionKind::Info)?,
             nodes: sections.records(SectionKind::Nodes)?,
             leaves: sections.records(SectionKind::Leaves)?,
@@ -65,10 +77,8 @@ impl<'s> Scene<'s> {
             majorants: sections.records(SectionKind::Majorants)?,
             names: sections.records(SectionKind::Names)?,
             effects: Effects::default(),
-            hash: sections.hash,
-        };
-        records.effects = validate::scene(&records)?;
-        Ok(Self(records))
+            hash: sections.table().hash,
+        })
     }
 
     /// Takes records as they are, for tests that need a part of a scene. If they break a promise of [`Scene`], pictures

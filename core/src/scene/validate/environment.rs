@@ -56,6 +56,30 @@ pub(super) fn environment(scene: &Records<'_>) -> Result<Found, SceneError> {
     Ok(Found { effects, emits: brightest.iter().zip(&e.radiance).any(|(texel, scale)| texel * scale > 0.0) })
 }
 
+/// Another rotation and scale of the environment, where `brightest` are the map's largest values by channel.
+pub(super) fn placement(e: &Environment, brightest: [f32; 3]) -> Result<(), SceneError> {
+    let at = Record { of: SectionKind::Environment, index: 0 };
+    at.all_within(Field::Emission, &e.radiance, 0.0, MAX_EMISSION)?;
+    if e.kind == EnvironmentKind::Constant as u32 {
+        return Ok(());
+    }
+    rotation(at, e)?;
+    at.within(Field::Emission, largest(&brightest) * largest(&e.radiance), 0.0, MAX_EMISSION)
+}
+
+/// Largest values of the map by channel.
+pub(super) fn brightest(scene: &Records<'_>) -> [f32; 3] {
+    let mut brightest = [0.0f32; 3];
+    for texel in scene.env_texels {
+        brightest.iter_mut().zip(texel).for_each(|(b, x)| *b = b.max(*x));
+    }
+    brightest
+}
+
+fn largest(rgb: &[f32; 3]) -> f32 {
+    rgb.iter().fold(0.0f32, |a, b| a.max(*b))
+}
+
 /// Rows are unit and at right angles, within 2e-3.
 fn rotation(at: Record, e: &Environment) -> Result<(), SceneError> {
     let [x, y, z] = e.to_local;
@@ -68,12 +92,10 @@ fn rotation(at: Record, e: &Environment) -> Result<(), SceneError> {
 
 /// Texels, and the brightest under the largest scale, are legal radiances. Returns the brightest of each channel.
 fn radiance(scene: &Records<'_>, e: &Environment) -> Result<[f32; 3], SceneError> {
-    let mut brightest = [0.0f32; 3];
     for (at, texel) in records(SectionKind::EnvTexels, scene.env_texels) {
         at.all_within(Field::Emission, texel, 0.0, MAX_EMISSION)?;
-        brightest.iter_mut().zip(texel).for_each(|(b, x)| *b = b.max(*x));
     }
-    let largest = |rgb: &[f32; 3]| rgb.iter().fold(0.0f32, |a, b| a.max(*b));
+    let brightest = brightest(scene);
     let at = Record { of: SectionKind::Environment, index: 0 };
     at.within(Field::Emission, largest(&brightest) * largest(&e.radiance), 0.0, MAX_EMISSION)?;
     Ok(brightest)

@@ -10,19 +10,25 @@ use crate::scene::{Effects, Records};
 pub(super) fn lights(scene: &Records<'_>) -> Result<Effects, SceneError> {
     let mut effects = Effects::default();
     for (at, l) in records(SectionKind::Lights, scene.lights) {
-        let kind = LightKind::from_u32(l.kind);
-        let kind = kind.ok_or(SceneError::Kind { of: at.of, index: at.index(), found: l.kind })?;
-        at.zero(l.reserved == 0 && l.params.map(f32::to_bits) == [0; 6])?;
-        at.finite(Field::Area, &[l.area])?;
-        at.finite(Field::Direction, &l.vector)?;
-        field(scene, at, l, LightField::Emission)?;
-        kind.fields().iter().try_for_each(|f| field(scene, at, l, *f))?;
+        let kind = light(scene, at, l)?;
         // The environment's own kind says what it calls for.
         if !kind.fields().contains(&LightField::Environment) {
             effects = effects.with(Effects::of_light(kind));
         }
     }
     Ok(effects)
+}
+
+/// One light; its kind.
+pub(super) fn light(scene: &Records<'_>, at: Record, l: &Light) -> Result<LightKind, SceneError> {
+    let kind = LightKind::from_u32(l.kind);
+    let kind = kind.ok_or(SceneError::Kind { of: at.of, index: at.index(), found: l.kind })?;
+    at.zero(l.reserved == 0 && l.params.map(f32::to_bits) == [0; 6])?;
+    at.finite(Field::Area, &[l.area])?;
+    at.finite(Field::Direction, &l.vector)?;
+    field(scene, at, l, LightField::Emission)?;
+    kind.fields().iter().try_for_each(|f| field(scene, at, l, *f))?;
+    Ok(kind)
 }
 
 /// One field of a light that uses it.

@@ -22,22 +22,24 @@ pub(super) fn textures(scene: &Records<'_>) -> Result<(), SceneError> {
 
 /// Every material's kind, references and the parameters that the kind uses; the others are finite.
 pub(super) fn materials(scene: &Records<'_>) -> Result<(), SceneError> {
-    for (at, m) in records(SectionKind::Materials, scene.materials) {
-        let kind = MaterialKind::from_u32(m.kind);
-        let kind = kind.ok_or(SceneError::Kind { of: at.of, index: at.index(), found: m.kind })?;
-        at.zero(m.flags & !MATERIAL_FLAGS == 0)?;
-        at.finite(Field::Alpha, &[m.alpha])?;
-        at.finite(Field::Eta, &m.eta)?;
-        at.finite(Field::Extinction, &m.k)?;
-        at.finite(Field::InternalReflectance, &[m.fdr])?;
-        // What arrives at a surface reads these before it looks at the kind.
-        at.follow_if_any(SectionKind::Textures, m.texture, scene.textures)?;
-        at.follow_if_any(SectionKind::Media, m.medium, scene.media)?;
-        parameter(at, m, Parameter::Reflectance)?;
-        kind.facts().parameters.iter().try_for_each(|p| parameter(at, m, *p))?;
-        tables(scene, at, m, kind)?;
-    }
-    Ok(())
+    records(SectionKind::Materials, scene.materials).try_for_each(|(at, m)| material(scene, at, m))
+}
+
+/// One material.
+pub(super) fn material(scene: &Records<'_>, at: Record, m: &Material) -> Result<(), SceneError> {
+    let kind = MaterialKind::from_u32(m.kind);
+    let kind = kind.ok_or(SceneError::Kind { of: at.of, index: at.index(), found: m.kind })?;
+    at.zero(m.flags & !MATERIAL_FLAGS == 0)?;
+    at.finite(Field::Alpha, &[m.alpha])?;
+    at.finite(Field::Eta, &m.eta)?;
+    at.finite(Field::Extinction, &m.k)?;
+    at.finite(Field::InternalReflectance, &[m.fdr])?;
+    // What arrives at a surface reads these before it looks at the kind.
+    at.follow_if_any(SectionKind::Textures, m.texture, scene.textures)?;
+    at.follow_if_any(SectionKind::Media, m.medium, scene.media)?;
+    parameter(at, m, Parameter::Reflectance)?;
+    kind.facts().parameters.iter().try_for_each(|p| parameter(at, m, *p))?;
+    tables(scene, at, m, kind)
 }
 
 /// The tables of a material, one behind the other from `table` on; a material without any refers to none.

@@ -34,6 +34,33 @@ pub(super) fn scene(scene: &Records<'_>) -> Result<Effects, SceneError> {
     Ok(surfaces.with(lights).with(environment.effects).with(lens))
 }
 
+/// Checks of single records that take the places of others in a validated scene; each gives the effects that it calls
+/// for.
+pub(crate) mod single {
+    use super::*;
+
+    pub(crate) fn camera(c: &Camera) -> Result<Effects, SceneError> {
+        super::camera(c)
+    }
+
+    pub(crate) fn material(scene: &Records<'_>, index: u32, m: &Material) -> Result<Effects, SceneError> {
+        materials::material(scene, Record { of: SectionKind::Materials, index: index as usize }, m)?;
+        Ok(materials::effects(m).with(media::effects(scene, m)))
+    }
+
+    pub(crate) fn light(scene: &Records<'_>, index: u32, l: &Light) -> Result<(), SceneError> {
+        lights::light(scene, Record { of: SectionKind::Lights, index: index as usize }, l).map(|_| ())
+    }
+
+    pub(crate) fn environment(e: &Environment, brightest: [f32; 3]) -> Result<(), SceneError> {
+        environment::placement(e, brightest)
+    }
+
+    pub(crate) fn brightest(scene: &Records<'_>) -> [f32; 3] {
+        environment::brightest(scene)
+    }
+}
+
 fn info(info: &SceneInfo) -> Result<(), SceneError> {
     let at = Record { of: SectionKind::Info, index: 0 };
     at.all_within(Field::Bounds, &info.bounds_min, -MAX_COORDINATE, MAX_COORDINATE)?;

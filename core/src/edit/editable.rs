@@ -1,0 +1,436 @@
+//! A validated blob in the host's memory that may change between frames.
+
+use super::light_table;
+use crate::light::{self, SceneExtent, luminance};
+use crate::scene::blob::*;
+use crate::scene::{Effects, Records, Scene, SceneError, SectionTable, Sections, check};
+use bytemuck::Pod;
+use core::fmt;
+
+/// Why a record of a scene cannot be replaced.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum EditError {
+    /// The scene has no such record.
+    Missing {
+        /// Section that was meant.
+        of: SectionKind,
+        /// Index that was asked for.
+        index: u32,
+    },
+    /// The new record breaks a rule of the blob.
+    Invalid(SceneError),
+    /// The new record differs in what cannot change without baking: the light's kind, triangle or area, the
+    /// environment's kind or size, the size of the material's tables.
+    Fixed {
+        /// Section that was meant.
+        of: SectionKind,
+        /// Index that was asked for.
+        index: u32,
+    },
+}
+
+impl fmt::Display for EditError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Missing { of, index } => write!(f, "edit: the scene has no record {index} of {}", of.name()),
+            Self::Invalid(e) => write!(f, "edit: {e}"),
+            Self::Fixed { of, index } => {
+                write!(f, "edit: record {index} of {} differs in what only baking can change", of.name())
+            }
+        }
+    }
+}
+
+impl core::error::Error for EditError {}
+
+impl From<SceneError> for EditError {
+    fn from(e: SceneError) -> Self {
+        Self::Invalid(e)
+    }
+}
+
+/// A validated scene that owns its bytes, in whatever holds them (`Vec<u8>`, `&mut [u8]`, a static array), and that may be
+/// changed between frames. [`Self::scene`] shows it, in a fixed short time.
+///
+/// The identity of the scene changes with every edit, so that shards of another state are refused; it depends on what
+/// the scene is and not on how it came about: an edit that is taken back restores it. (Light tables that were built
+/// anew are another state than baked ones.)
+///
+/// The container must give the same bytes at the same place, or moved as a whole, whenever it is asked.
+///
+/// ```
+/// use croupier::{EditableScene, SceneError};
+///
+/// /// The scene seen from another place.
+/// fn look_from(blob: Vec<u8>, origin: [f32; 3]) -> Result<EditableScene<Vec<u8>>, Box<dyn core::error::Error>> {
+///     let mut scene = EditableScene::new(blob)?;
+///     let camera = *scene.scene().camera;
+///     scene.edit().camera(croupier::unstable::scene::blob::Camera { origin, ..camera })?;
+///     Ok(scene)
+/// }
+/// assert!(look_from(Vec::new(), [0.0; 3]).is_err());
+/// ```
+#[derive(Debug)]
+pub struct EditableScene<B> {
+    bytes: B,
+    table: SectionTable,
+    effects: Effects,
+    /// [`Records::hash`], changed by edits.
+    identity: u64,
+    /// Largest values of the environment map.
+    brightest: [f32; 3],
+    /// Power of the environment's light while its scale has a luminance of 1.
+    environment_power: f64,
+    /// The light table is no longer the baked one.
+    relit: bool,
+}
+
+/// What the identity of a scene changes by when its light table is built anew.
+const RELIT: u64 = 0x9d5c_2f4b_7a61_e083;
+
+impl<B: AsRef<[u8]>> EditableScene<B> {
+    /// Validates a blob, see [`Scene::from_bytes`].
+    ///
+    /// # Errors
+    /// The first fault found.
+    pub fn new(bytes: B) -> Result<Self, SceneError> {
+        let (scene, table) = Scene::validated(bytes.as_ref())?;
+        let (effects, identity, brightest) = (scene.effects, scene.hash, check::brightest(&scene));
+        let environment_power = environment_power(&scene);
+        Ok(Self { bytes, table, effects, identity, brightest, environment_power, relit: false })
+    }
+
+    /// The scene as it is now.
+    pub fn scene(&self) -> Scene<'_> {
+        let sections = Sections::assume_sound(self.table, self.bytes.as_ref());
+        let records = Scene::records(&sections).unwrap_or(NOTHING);
+        Scene::assume_valid(Records { effects: self.effects, hash: self.identity, ..records })
+    }
+
+    /// The container with the bytes. Their header still has the hash from before the edits: [`Self::seal`] first to use
+    /// them as a blob.
+    pub fn into_bytes(self) -> B {
+        self.bytes
+    }
+}
+
+impl<B: AsRef<[u8]> + AsMut<[u8]>> EditableScene<B> {
+    /// Begins a round of edits. What they have in common (the table that chooses among lights) is brought up to date when
+    /// the returned value is dropped. An error leaves its record as it was.
+    pub fn edit(&mut self) -> SceneEdit<'_> {
+        SceneEdit {
+            bytes: self.bytes.as_mut(),
+            table: &self.table,
+            effects: &mut self.effects,
+            identity: &mut self.identity,
+            brightest: self.brightest,
+            environment_power: self.environment_power,
+            relit: &mut self.relit,
+            lights_changed: false,
+        }
+    }
+
+    /// Writes the hash of the bytes as they are into their header, so that they are a blob again. Takes a pass over all
+    /// bytes. The identity becomes that hash.
+    pub fn seal(&mut self) {
+        let bytes = self.bytes.as_mut();
+        let Some((head, rest)) = bytes.split_at_mut_checked(size_of::<Header>()) else { return };
+        let mut header: Header = bytemuck::pod_read_unaligned(head);
+        let length = usize::try_from(header.length).unwrap_or(usize::MAX).saturating_sub(size_of::<Header>());
+        let Some(content) = rest.get(..length) else { return };
+        header.hash = content_hash(content);
+        head.copy_from_slice(bytemuck::bytes_of(&header));
+        (self.identity, self.table.hash, self.relit) = (header.hash, header.hash, false);
+    }
+}
+
+/// Power of the environment's light at a scale of luminance 1, from its share of the baked table.
+fn environment_power(scene: &Scene<'_>) -> f64 {
+    let Some(e) = scene.environment else { return 0.0 };
+    let extent = SceneExtent { radius: radius(scene), environment: 0.0 };
+    let others: f64 = scene.lights.iter().map(|l| light::power(l, &extent)).sum();
+    let share = scene.light_alias.get(e.light as usize).map_or(0.0, |a| f64::from(a.probability));
+    let scale = luminance(e.radiance);
+    let power = if others > 0.0 { others * share / (1.0 - share).max(1e-9) } else { share };
+    // a constant one has the same power at every scale; a map that was scaled to black has an unknown one
+    if scale > 0.0 { power / scale } else { 1.0 }
+}
+
+/// Radius of a sphere around the scene as the baker takes it.
+fn radius(scene: &Records<'_>) -> f64 {
+    let extent = |a: usize| {
+        let side = |p: &[f32; 3]| p.get(a).copied().map_or(0.0, f64::from);
+        side(&scene.info.bounds_max) - side(&scene.info.bounds_min)
+    };
+    let [x, y, z] = [extent(0), extent(1), extent(2)];
+    let square = (x * x + y * y + z * z) / 4.0;
+    if square > 0.0 { crate::film::SqrtNewton::sqrt_newton(square) } else { 1.0 }
+}
+
+/// What a container shows that has lost its bytes.
+const NOTHING: Records<'static> = {
+    const INFO: &SceneInfo =
+        &SceneInfo { bounds_min: [0.0; 3], bounds_max: [0.0; 3], max_depth: 1, dropped_triangles: 0 };
+    const CAMERA: &Camera = &Camera {
+        origin: [0.0; 3],
+        forward: [0.0, 0.0, -1.0],
+        right: [1.0, 0.0, 0.0],
+        down: [0.0, -1.0, 0.0],
+        lens_radius: 0.0,
+        focus_distance: 1.0,
+        size: [1, 1],
+    };
+    Records {
+        info: INFO,
+        nodes: &[],
+        leaves: &[],
+        triangles: &[],
+        vertices: &[],
+        materials: &[],
+        textures: &[],
+        texels: &[],
+        tables: &[],
+        lights: &[],
+        light_alias: &[],
+        environment: None,
+        env_texels: &[],
+        env_alias: &[],
+        camera: CAMERA,
+        media: &[],
+        densities: &[],
+        majorants: &[],
+        names: &[],
+        effects: Effects(0),
+        hash: 0,
+    }
+};
+
+/// A round of edits of an [`EditableScene`].
+#[derive(Debug)]
+pub struct SceneEdit<'a> {
+    bytes: &'a mut [u8],
+    table: &'a SectionTable,
+    effects: &'a mut Effects,
+    identity: &'a mut u64,
+    brightest: [f32; 3],
+    environment_power: f64,
+    relit: &'a mut bool,
+    lights_changed: bool,
+}
+
+impl SceneEdit<'_> {
+    fn records(&self) -> Option<Records<'_>> {
+        Scene::records(&Sections::assume_sound(*self.table, self.bytes)).ok()
+    }
+
+    fn read<T: Pod>(&self, of: SectionKind, index: u32) -> Result<T, EditError> {
+        let bytes = self.table.record(of, index).and_then(|range| self.bytes.get(range));
+        let record = bytes.filter(|b| b.len() == size_of::<T>()).map(bytemuck::pod_read_unaligned);
+        record.ok_or(EditError::Missing { of, index })
+    }
+
+    /// Replaces a record that was checked.
+    fn write<T: Pod>(&mut self, of: SectionKind, index: u32, record: &T) {
+        let Some(place) = self.table.record(of, index).and_then(|range| self.bytes.get_mut(range)) else { return };
+        let new = bytemuck::bytes_of(record);
+        if place.len() == new.len() {
+            // each record counts in the identity by its place and content, whatever the order of edits
+            let mark = |bytes: &[u8]| content_hash(bytes) ^ (u64::from(index) << 8 | of as u64).wrapping_mul(RELIT | 1);
+            *self.identity ^= mix(mark(place)) ^ mix(mark(new));
+            place.copy_from_slice(new);
+        }
+    }
+
+    /// Replaces the camera. Its `size` is only the default of settings: sessions keep theirs.
+    ///
+    /// # Errors
+    /// A camera that breaks a rule of the blob.
+    pub fn camera(&mut self, camera: Camera) -> Result<(), EditError> {
+        let effects = check::camera(&camera)?;
+        self.write(SectionKind::Cameras, 0, &camera);
+        *self.effects = self.effects.with(effects);
+        Ok(())
+    }
+
+    /// Replaces a material and the tables that it refers to: as many entries as its kind has, in their order, computed
+    /// by whoever bakes materials; they must fit where the old ones are. Kind, texture and medium may change; triangles
+    /// and lights stay as they are.
+    ///
+    /// The effects of the scene grow by those of the material and never shrink: a session must have a profile with them.
+    ///
+    /// # Errors
+    /// No such material, one that breaks a rule of the blob, or more tables than there is room for.
+    pub fn material(&mut self, index: u32, material: Material, tables: &[f32]) -> Result<(), EditError> {
+        let of = SectionKind::Materials;
+        let old: Material = self.read(of, index)?;
+        let room = |m: &Material| {
+            let compensated = m.flags & MATERIAL_COMPENSATED != 0;
+            let used = |p: &&Parameter| compensated || !p.compensates();
+            let facts = MaterialKind::from_u32(m.kind).map(MaterialKind::facts);
+            facts.map_or(0, |f| f.parameters.iter().filter(used).map(|p| p.entries()).sum::<usize>())
+        };
+        let first = if tables.is_empty() { NONE } else { old.table };
+        let material = Material { table: first, ..material };
+        if tables.len() != room(&material) || tables.len() > room(&old) {
+            return Err(EditError::Fixed { of, index });
+        }
+        let kept = Tables::new(self, first, tables);
+        let checked = match kept.edit.records() {
+            Some(scene) => check::material(&scene, index, &material).map_err(EditError::Invalid),
+            None => Err(EditError::Missing { of, index }),
+        };
+        let effects = match checked {
+            Ok(effects) => effects,
+            Err(e) => {
+                kept.restore();
+                return Err(e);
+            }
+        };
+        self.write(of, index, &material);
+        *self.effects = self.effects.with(effects);
+        Ok(())
+    }
+
+    /// Replaces a light's emission, and the position or direction of one that is no surface. Kind, triangle and area must be
+    /// the old ones. Emission may become black and light up again; the light stays in the scene.
+    ///
+    /// # Errors
+    /// No such light, one that breaks a rule of the blob, or one that differs in what cannot change.
+    pub fn light(&mut self, index: u32, light: Light) -> Result<(), EditError> {
+        let of = SectionKind::Lights;
+        let old: Light = self.read(of, index)?;
+        let moves = old.kind == LightKind::Point as u32 || old.kind == LightKind::Directional as u32;
+        let vector = if moves { light.vector } else { old.vector };
+        let fixed = Light { emission: light.emission, vector, ..old };
+        if bytemuck::bytes_of(&fixed) != bytemuck::bytes_of(&light) {
+            return Err(EditError::Fixed { of, index });
+        }
+        let scene = self.records().ok_or(EditError::Missing { of, index })?;
+        check::light(&scene, index, &light)?;
+        if light.emission != [0.0; 3] && scene.light_alias.is_empty() {
+            // baked without any light that emits: there is no table to choose by
+            return Err(EditError::Fixed { of, index });
+        }
+        self.write(of, index, &light);
+        self.lights_changed = true;
+        Ok(())
+    }
+
+    /// Gives all emitting triangles of a material this radiance; how many there are. Takes a pass over the lights.
+    ///
+    /// # Errors
+    /// Radiance that breaks a rule of the blob.
+    pub fn emission(&mut self, material: u32, radiance: [f32; 3]) -> Result<u32, EditError> {
+        let lights = self.records().map_or(0, |s| s.lights.len() as u32);
+        let mut changed = 0;
+        for index in 0..lights {
+            let of_material = self.records().is_some_and(|s| {
+                let light = s.lights.get(index as usize).filter(|l| l.kind == LightKind::Area as u32);
+                let triangle = light.and_then(|l| s.triangles.get(l.triangle as usize));
+                triangle.is_some_and(|t| t.material == material)
+            });
+            if of_material {
+                let light: Light = self.read(SectionKind::Lights, index)?;
+                self.light(index, Light { emission: radiance, ..light })?;
+                changed += 1;
+            }
+        }
+        Ok(changed)
+    }
+
+    /// Replaces the environment's rotation and scale (of a map) or radiance (of a constant). Kind and size must be the
+    /// old ones.
+    ///
+    /// # Errors
+    /// No environment, one that breaks a rule of the blob, or one that differs in what cannot change.
+    pub fn environment(&mut self, environment: Environment) -> Result<(), EditError> {
+        let (of, index) = (SectionKind::Environment, 0);
+        let old: Environment = self.read(of, index)?;
+        let fixed = Environment { to_local: environment.to_local, radiance: environment.radiance, ..old };
+        if bytemuck::bytes_of(&fixed) != bytemuck::bytes_of(&environment) {
+            return Err(EditError::Fixed { of, index });
+        }
+        check::environment(&environment, self.brightest)?;
+        self.write(of, index, &environment);
+        self.lights_changed |= old.radiance != environment.radiance;
+        Ok(())
+    }
+
+    /// Builds the table that chooses among lights.
+    fn relight(&mut self) {
+        let Some(scene) = self.records() else { return };
+        let entries = scene.light_alias.len() as u32;
+        let environment = scene.environment.map_or(0.0, |e| luminance(e.radiance) * self.environment_power);
+        let extent = SceneExtent { radius: radius(&scene), environment: 0.0 };
+        let whole = |kind| {
+            let (first, last) = (self.table.record(kind, 0), entries.checked_sub(1)?);
+            Some(first?.start..self.table.record(kind, last)?.end)
+        };
+        let (Some(table), Some(lights)) = (whole(SectionKind::LightAlias), whole(SectionKind::Lights)) else { return };
+        // two sections share no bytes
+        let (lights, table) = if table.start >= lights.end {
+            let (head, tail) = self.bytes.split_at_mut(table.start);
+            (head.get(lights), tail.get_mut(..table.end.saturating_sub(table.start)))
+        } else {
+            let (head, tail) = self.bytes.split_at_mut(lights.start);
+            (tail.get(..lights.end.saturating_sub(lights.start)), head.get_mut(table))
+        };
+        let lights = lights.and_then(|b| bytemuck::try_cast_slice::<u8, Light>(b).ok());
+        let table = table.and_then(|b| bytemuck::try_cast_slice_mut::<u8, Alias>(b).ok());
+        let (Some(lights), Some(table)) = (lights, table) else { return };
+        light_table::build(table, |i| {
+            lights.get(i as usize).map_or(0.0, |l| match LightKind::from_u32(l.kind) {
+                Some(LightKind::Environment) => environment,
+                _ => light::power(l, &extent),
+            })
+        });
+        if !core::mem::replace(self.relit, true) {
+            *self.identity ^= RELIT;
+        }
+    }
+}
+
+impl Drop for SceneEdit<'_> {
+    fn drop(&mut self) {
+        if self.lights_changed {
+            self.relight();
+        }
+    }
+}
+
+/// Tables of a material, replaced, and how to take that back.
+struct Tables<'e, 'a> {
+    edit: &'e mut SceneEdit<'a>,
+    first: u32,
+    old: [f32; TABLE_ROOM],
+    count: usize,
+}
+
+/// Most entries that a material's tables have.
+const TABLE_ROOM: usize = TRANSMITTANCE_ENTRIES + 2 * COMPENSATION_ENTRIES;
+
+impl<'e, 'a> Tables<'e, 'a> {
+    fn new(edit: &'e mut SceneEdit<'a>, first: u32, new: &[f32]) -> Self {
+        let mut old = [0.0; TABLE_ROOM];
+        let count = new.len().min(TABLE_ROOM);
+        for (i, (slot, x)) in (first..=u32::MAX).zip(old.iter_mut().zip(new)) {
+            *slot = edit.read(SectionKind::Tables, i).unwrap_or(0.0);
+            edit.write(SectionKind::Tables, i, x);
+        }
+        Self { edit, first, old, count }
+    }
+
+    fn restore(self) {
+        for (i, x) in (self.first..=u32::MAX).zip(self.old.iter().take(self.count)) {
+            self.edit.write(SectionKind::Tables, i, x);
+        }
+    }
+}
+
+/// A well-mixed number (the finaliser of SplitMix64).
+fn mix(x: u64) -> u64 {
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}

@@ -1,0 +1,295 @@
+//! Scenes that change in memory: what an edit makes is what baking would have made, what is wrong is refused and leaves
+//! everything as it was, and a shard can be put away between any two steps.
+
+use croupier::unstable::scene::blob::*;
+use croupier::{Budget, EditError, EditableScene, Plan, Scene, Session, Settings, Shard, ShardError, StepResult};
+use croupier_host::blob::AlignedBytes;
+use croupier_host::description::{self, Emitter, SceneDescription};
+use croupier_tests::runner::{render, settings};
+use croupier_tests::scenes::{blob, cornell, everything};
+
+/// The scene's bytes with the header of what they are now.
+fn sealed(mut scene: EditableScene<AlignedBytes>) -> AlignedBytes {
+    scene.seal();
+    scene.into_bytes()
+}
+
+fn editable(scene: &SceneDescription) -> EditableScene<AlignedBytes> {
+    EditableScene::new(blob(scene)).expect("a valid scene")
+}
+
+/// Cornell box with every kind of light.
+fn lit(size: [u32; 2]) -> SceneDescription {
+    let mut scene = cornell(size);
+    scene.emitters.push(Emitter::Point { position: [0.2, 0.5, 0.1], intensity: [0.5, 0.4, 0.3] });
+    scene.emitters.push(Emitter::Directional { direction: [0.1, -1.0, 0.2], irradiance: [0.2; 3] });
+    scene.environment = Some(description::Environment::Constant { radiance: [0.3, 0.4, 0.5] });
+    scene
+}
+
+/// Killed by: an edit that does not reach the picture, a record written elsewhere, a derived number that stays old, a
+/// header that is not sealed.
+#[test]
+fn edits_make_what_baking_makes() {
+    let scene = lit([24, 16]);
+    let mut moved = scene.clone();
+    moved.camera.origin[0] += 0.25;
+    moved.camera.vfov_deg = 30.0;
+    let target = blob(&moved);
+    let camera = *Scene::from_bytes(&target).unwrap().camera;
+
+    let mut edited = editable(&scene);
+    edited.edit().camera(camera).unwrap();
+    let bytes = sealed(edited);
+    assert_eq!(&bytes[..], &target[..], "the same scene seen from the same place");
+
+    // materials
+    let grey = |scene: &SceneDescription| scene.materials.iter().position(|m| m.name == "white").unwrap_or(0);
+    let mut painted = scene.clone();
+    let i = grey(&scene);
+    painted.materials[i].model = croupier_tests::scenes::grey(0.125);
+    let target = blob(&painted);
+    let material = Scene::from_bytes(&target).unwrap().materials[i];
+    let mut edited = editable(&scene);
+    edited.edit().material(i as u32, material, &[]).unwrap();
+    assert_eq!(&sealed(edited)[..], &target[..]);
+
+    // lights: the table is another one than the baker's, with the same probabilities
+    let mut relit = scene.clone();
+    let Some(Emitter::Point { intensity, position }) =
+        relit.emitters.iter_mut().find(|e| matches!(e, Emitter::Point { .. }))
+    else {
+        panic!("a point light")
+    };
+    (*intensity, *position) = ([4.0, 0.0, 1.0], [-0.1, 0.3, 0.2]);
+    let target = blob(&relit);
+    let baked = Scene::from_bytes(&target).unwrap();
+    let mut edited = editable(&scene);
+    let index = baked.lights.iter().position(|l| l.kind == LightKind::Point as u32).unwrap();
+    edited.edit().light(index as u32, baked.lights[index]).unwrap();
+    let bytes = sealed(edited);
+    let found = Scene::from_bytes(&bytes).expect("the table that was built is valid");
+    for (a, b) in found.light_alias.iter().zip(baked.light_alias) {
+        let share = f64::from(a.probability) / f64::from(b.probability);
+        assert!((share - 1.0).abs() < 1e-4, "{} and {}", a.probability, b.probability);
+    }
+    assert_eq!(bytemuck::cast_slice::<_, u8>(found.lights), bytemuck::cast_slice::<_, u8>(baked.lights));
+
+    // the environment: scaled
+    let mut brighter = scene.clone();
+    brighter.environment = Some(description::Environment::Constant { radiance: [3.0, 4.0, 5.0] });
+    let target = blob(&brighter);
+    let baked = Scene::from_bytes(&target).unwrap();
+    let mut edited = editable(&scene);
+    edited.edit().environment(*baked.environment.unwrap()).unwrap();
+    let bytes = sealed(edited);
+    let found = Scene::from_bytes(&bytes).unwrap();
+    for (a, b) in found.light_alias.iter().zip(baked.light_alias) {
+        assert!((f64::from(a.probability) / f64::from(b.probability) - 1.0).abs() < 1e-4);
+    }
+}
+
+/// The mean radiance of a scene that was edited is that of the scene as it is: emission of a material times 3 makes the
+/// picture three times as bright, in every bit of what the light's table does not touch. Killed by: a triangle of the
+/// material that keeps its emission, a table that misses a light.
+#[test]
+fn emission_scales_the_picture() {
+    let scene = cornell([16, 16]);
+    let bytes = blob(&scene);
+    let material = Scene::from_bytes(&bytes).unwrap().triangles.iter().find(|t| t.light != NONE).unwrap().material;
+    let radiance = Scene::from_bytes(&bytes).unwrap().lights[0].emission;
+    let mut edited = editable(&scene);
+    let n = edited.edit().emission(material, radiance.map(|x| 4.0 * x)).unwrap();
+    assert_eq!(n as usize, Scene::from_bytes(&bytes).unwrap().lights.len());
+    let bright = sealed(edited);
+    let s = settings(&bytes, "none");
+    let (a, b) = (render(&bytes, &s, 64), render(&bright, &s, 64));
+    let (ratio, error) = (b.mean() / a.mean() / 4.0, b.error_of_mean() / b.mean() + a.error_of_mean() / a.mean());
+    assert!((ratio - 1.0).abs() < 4.0 * error, "{ratio} +- {error}");
+    assert!(error < 0.02, "{error}: the test could not tell");
+
+    // off and on again
+    let mut edited = editable(&scene);
+    edited.edit().emission(material, [0.0; 3]).unwrap();
+    assert!(edited.scene().light_alias.iter().all(|a| a.probability == 0.0));
+    edited.edit().emission(material, radiance).unwrap();
+    let again = render(&sealed(edited), &s, 64);
+    assert!((again.mean() / a.mean() - 1.0).abs() < 8.0 * error);
+}
+
+/// Killed by: a check that is left out, a record that changes before it is checked, an identity that forgets an edit.
+#[test]
+fn what_is_wrong_is_refused_and_changes_nothing() {
+    let scene = lit([8, 8]);
+    let mut edited = editable(&scene);
+    let (hash, before) = (edited.scene().hash, blob(&scene));
+    let camera = *edited.scene().camera;
+    let light = edited.scene().lights[0];
+    let material = edited.scene().materials[0];
+    let environment = *edited.scene().environment.unwrap();
+    let nan = f32::NAN;
+    let invalid = |r: Result<(), EditError>| matches!(r, Err(EditError::Invalid(_)));
+    let fixed = |r: Result<(), EditError>| matches!(r, Err(EditError::Fixed { .. }));
+    let missing = |r: Result<(), EditError>| matches!(r, Err(EditError::Missing { .. }));
+    {
+        let mut e = edited.edit();
+        assert!(invalid(e.camera(Camera { origin: [nan; 3], ..camera })));
+        assert!(invalid(e.camera(Camera { right: [0.0; 3], ..camera })));
+        assert!(invalid(e.material(0, Material { reflectance: [2.0; 3], ..material }, &[])));
+        assert!(invalid(e.material(0, Material { kind: 99, ..material }, &[])));
+        assert!(invalid(e.material(0, Material { texture: 7, ..material }, &[])));
+        assert!(fixed(e.material(0, material, &[1.0])));
+        assert!(missing(e.material(1000, material, &[])));
+        assert!(invalid(e.light(0, Light { emission: [-1.0; 3], ..light })));
+        assert!(invalid(e.light(0, Light { emission: [nan; 3], ..light })));
+        assert!(fixed(e.light(0, Light { triangle: 1, ..light })));
+        assert!(fixed(e.light(0, Light { kind: LightKind::Point as u32, ..light })));
+        assert!(missing(e.light(u32::MAX, light)));
+        assert!(invalid(e.environment(Environment { radiance: [f32::INFINITY; 3], ..environment })));
+        assert!(fixed(e.environment(Environment { width: 3, ..environment })));
+    }
+    assert_eq!(edited.scene().hash, hash);
+    assert_eq!(&sealed(edited)[..], &before[..]);
+    let error = EditError::Missing { of: SectionKind::Materials, index: 7 }.to_string();
+    assert!(error.contains("materials") && error.contains('7'), "{error}");
+}
+
+/// The identity says what the scene is: an edit changes it, taking the edit back restores it, the order does not matter.
+/// Killed by: an identity that counts edits, or that leaves out where they were made.
+#[test]
+fn identity_follows_the_state() {
+    let scene = lit([8, 8]);
+    let mut a = editable(&scene);
+    let first = a.scene().hash;
+    let camera = *a.scene().camera;
+    let moved = Camera { origin: [0.1, 0.2, 3.0], ..camera };
+    let [red, blue] = [[0.5, 0.0, 0.0], [0.0, 0.0, 0.5]];
+    let material =
+        |e: &EditableScene<AlignedBytes>, i: usize, reflectance| Material { reflectance, ..e.scene().materials[i] };
+    a.edit().camera(moved).unwrap();
+    let second = a.scene().hash;
+    let m = material(&a, 0, red);
+    a.edit().material(0, m, &[]).unwrap();
+    let third = a.scene().hash;
+    assert!(first != second && second != third && first != third);
+    let mut b = editable(&scene);
+    let m = material(&b, 0, blue);
+    b.edit().material(0, m, &[]).unwrap();
+    let m = material(&b, 0, red);
+    b.edit().material(0, m, &[]).unwrap();
+    b.edit().camera(moved).unwrap();
+    assert_eq!(b.scene().hash, third, "another way to the same scene");
+    let mut c = editable(&scene);
+    let m = material(&c, 1, red);
+    c.edit().material(1, m, &[]).unwrap();
+    c.edit().camera(moved).unwrap();
+    assert_ne!(c.scene().hash, third, "another material");
+    a.edit().camera(camera).unwrap();
+    let original = editable(&scene).scene().materials[0];
+    a.edit().material(0, original, &[]).unwrap();
+    assert_eq!(a.scene().hash, first);
+}
+
+/// A rough material's tables are replaced with it, or not at all. Killed by: tables that stay when a material is
+/// refused, or that are written over the next material's.
+#[test]
+fn tables_go_with_their_material() {
+    let scene = everything([8, 8]);
+    let mut edited = editable(&scene);
+    let found = edited.scene().materials.iter().position(|m| m.kind == MaterialKind::RoughPlastic as u32);
+    let index = found.expect("a rough plastic") as u32;
+    let old = edited.scene().materials[index as usize];
+    let first = old.table as usize;
+    let count = TRANSMITTANCE_ENTRIES + if old.flags & MATERIAL_COMPENSATED != 0 { COMPENSATION_ENTRIES } else { 0 };
+    let tables = edited.scene().tables.to_vec();
+    let new: Vec<f32> = tables[first..first + count].iter().map(|x| 0.5 * x + 0.4).collect();
+    assert!(edited.edit().material(index, Material { alpha: 7.0, ..old }, &new).is_err());
+    assert_eq!(edited.scene().tables, &tables[..], "a material that is refused");
+    let bad: Vec<f32> = new.iter().map(|x| x - 9.0).collect();
+    assert!(edited.edit().material(index, Material { alpha: 0.3, ..old }, &bad).is_err());
+    assert_eq!(edited.scene().tables, &tables[..], "tables that are refused");
+    edited.edit().material(index, Material { alpha: 0.3, ..old }, &new).unwrap();
+    assert_eq!(edited.scene().tables[first..first + count], new[..]);
+    assert_eq!(edited.scene().materials[index as usize].table, old.table);
+    let others = |t: &[f32]| [&t[..first], &t[first + count..]].concat();
+    assert_eq!(others(edited.scene().tables), others(&tables));
+    Scene::from_bytes(&sealed(edited)).expect("a valid scene");
+}
+
+/// A shard that is put away after every step, into memory that moves, gives the same picture and learns the same.
+/// Killed by: any state that is not put away.
+#[test]
+fn shards_may_be_put_away_between_steps() {
+    let bytes = blob(&everything([24, 16]));
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    for strategy in ["classic", "ears", "bolin-meyer"] {
+        let s = Settings { shards: 2, aovs: true, shadow_roulette: true, ..settings(&bytes, strategy) };
+        let plan = Plan::new(&s).unwrap();
+        let run = |budget: u64, put_away: bool| {
+            let mut shared = AlignedBytes::zeroed(plan.session().size);
+            let mut session = Session::new(scene, &plan, shared.as_mut()).unwrap();
+            let mut blocks = [0, 1].map(|_| AlignedBytes::zeroed(plan.shard().size));
+            for (i, block) in (0..).zip(&mut blocks) {
+                Shard::new(&plan, i, block.as_mut()).unwrap().suspend();
+            }
+            for _ in 0..3 {
+                session.begin_iteration(2);
+                for (i, block) in (0..).zip(&mut blocks) {
+                    let mut left = StepResult::More;
+                    while left == StepResult::More {
+                        let mut shard = Shard::resume(&plan, i, block.as_mut()).unwrap();
+                        left = shard.step(&session, Budget { rays: budget });
+                        shard.suspend();
+                        if put_away {
+                            // another place, and the old one overwritten
+                            let moved = block.clone();
+                            block.as_mut().fill(0xA5);
+                            *block = moved;
+                        }
+                    }
+                }
+                let [a, b] = &mut blocks;
+                let shards = [(0, a), (1, b)].map(|(i, block)| Shard::resume(&plan, i, block.as_mut()).unwrap());
+                session.end_iteration(&shards).unwrap();
+                shards.into_iter().for_each(Shard::suspend);
+            }
+            let film: Vec<u8> =
+                [bytemuck::cast_slice(session.film().pixels()), bytemuck::cast_slice(session.film().aovs())].concat();
+            (film, *session.counters())
+        };
+        let (whole, parts) = (run(u64::MAX, false), run(37, true));
+        assert!(whole.0 == parts.0, "{strategy}: pictures differ");
+        assert_eq!(whole.1, parts.1, "{strategy}");
+    }
+}
+
+/// Killed by: a block that is taken for what it is not.
+#[test]
+fn only_suspended_shards_can_be_resumed() {
+    let bytes = blob(&cornell([16, 16]));
+    let s = Settings { shards: 2, ..settings(&bytes, "ears") };
+    let plan = Plan::new(&s).unwrap();
+    let other = Plan::new(&Settings { seed: 1, ..s }).unwrap();
+    let mut block = AlignedBytes::zeroed(plan.shard().size);
+    let refused = |plan: &Plan, index, block: &mut AlignedBytes| {
+        let error = Shard::resume(plan, index, block.as_mut()).err();
+        assert_eq!(error, Some(ShardError::NotSuspended { index }));
+    };
+    refused(&plan, 0, &mut block);
+    drop(Shard::new(&plan, 0, block.as_mut()).unwrap());
+    refused(&plan, 0, &mut block);
+    Shard::new(&plan, 0, block.as_mut()).unwrap().suspend();
+    refused(&plan, 1, &mut block);
+    refused(&other, 0, &mut block);
+    drop(Shard::resume(&plan, 0, block.as_mut()).unwrap());
+    refused(&plan, 0, &mut block);
+    // numbers that no shard has
+    Shard::new(&plan, 0, block.as_mut()).unwrap().suspend();
+    let mut tried = 0;
+    for at in (40..600).step_by(4) {
+        let mut broken = block.clone();
+        broken.as_mut()[at..at + 4].fill(0xFE);
+        tried += usize::from(Shard::resume(&plan, 0, broken.as_mut()).is_err());
+    }
+    assert!(tried > 10, "{tried} faults were seen");
+}
