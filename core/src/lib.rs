@@ -33,6 +33,7 @@
 //! | `settings` | the caller's choices, their ranges | how they are followed |
 //! | `edit` | changes of a scene between frames | sessions, how paths are traced |
 //! | `world` | what paths read | who owns it |
+//! | `record` | scalars of a suspended session | what they stand for |
 //! | `tracer` | packets, the refill ring, stages, books | files, threads, clocks |
 //! | `plan` | how many bytes a render needs | where they come from |
 //! | `session` | iterations: merge, learn, begin again | how paths are traced |
@@ -87,6 +88,7 @@ mod memory;
 mod names;
 mod plan;
 mod profile;
+mod record;
 mod rng;
 mod rrs;
 mod sampler;
@@ -109,7 +111,7 @@ pub use memory::{BLOCK_ALIGN, MemoryError};
 pub use plan::Plan;
 pub use rrs::Strategy;
 pub use scene::{Scene, SceneError};
-pub use session::{Session, SessionError};
+pub use session::{Session, SessionError, SessionState, SessionView};
 pub use setting::SettingError;
 pub use settings::{Settings, SettingsError};
 pub use tracer::{Budget, Shard, ShardError, StepResult};
@@ -121,12 +123,13 @@ pub use tracer::{Budget, Shard, ShardError, StepResult};
 pub mod unstable {
     pub use crate::counters::Utilisation;
     pub use crate::memory::Layout;
+    pub use crate::record::ResumeError;
     pub use crate::scene::Effects;
     pub use crate::session::{Phase, SessionBuilder};
     pub use crate::setting::{SettingInfo, SettingRange, SettingValue};
     pub use crate::settings::{MAX_PATH_LENGTH, MIN_RING};
     pub use crate::tracer::{BYTES_PER_PATH, MAX_PASSED};
-    pub use crate::world::{Iteration, World};
+    pub use crate::world::{Identity, Iteration, World};
     pub use croupier_simd as simd;
 
     /// Rays against triangles.

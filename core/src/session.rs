@@ -5,18 +5,20 @@ use crate::counters::Counters;
 use crate::film::{Film, PixelSums};
 use crate::instructions::{INSTRUCTION_SET, missing_instructions};
 use crate::learn::cache::Cache;
-use crate::learn::{LearnedState, PictureStatistics};
+use crate::learn::{LearnedScalars, LearnedState, PictureStatistics};
 use crate::light::{LightSelector, PowerSelector};
 use crate::memory::{Carver, MemoryError};
 use crate::plan::Plan;
 use crate::profile::{Full, Profile};
+use crate::record::{ResumeError, SessionRecord, SessionScalars};
 use crate::scene::{Effects, Scene};
 use crate::settings::MAX_PATH_LENGTH;
 use crate::tracer::{Shard, media_at};
 use crate::world::sealed::Sealed;
-use crate::world::{Iteration, World};
+use crate::world::{Identity, Iteration, World};
 use core::fmt;
 use core::marker::PhantomData;
+use core::ops::{Deref, DerefMut};
 
 /// Why a session cannot start or an iteration cannot end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +53,8 @@ pub enum SessionError {
     },
     /// No iteration has begun.
     NoIteration,
+    /// The block cannot be resumed.
+    Resume(ResumeError),
     /// An estimate of the pixels that does not fit.
     Estimate {
         /// Number of values given.
@@ -78,6 +82,7 @@ impl fmt::Display for SessionError {
             Self::Estimate { given } => {
                 write!(f, "an estimate of {given} values does not fit the settings, or comes while an iteration runs")
             }
+            Self::Resume(e) => write!(f, "session: {e}"),
             Self::NoIteration => f.write_str("no iteration has begun"),
         }
     }
@@ -96,20 +101,44 @@ pub enum Phase {
     Learned,
 }
 
-/// The shared side of a render: scene, kernels, learned state and film. Frozen while shards step, changed between
-/// iterations.
+/// The shared side of a render: scene, kernels, and its [`SessionState`], whose methods it has. Frozen while shards step,
+/// changed between iterations.
 #[derive(Debug)]
 pub struct Session<'s, 'm, P: Profile = Full, I: Intersector = WideBvh<'s>, L: LightSelector = PowerSelector<'s>> {
     scene: Scene<'s>,
-    plan: Plan,
     intersector: I,
     selector: L,
+    state: SessionState<'m>,
+    profile: PhantomData<P>,
+}
+
+/// What a session has in the caller's memory: learned state and film. A host whose scene may change between frames keeps
+/// this and shows shards a [`SessionView`]; [`Session::into_state`] makes one.
+#[derive(Debug)]
+pub struct SessionState<'m> {
+    plan: Plan,
+    record: &'m mut SessionRecord,
     film: Film<'m>,
     counters: Counters,
     learned: LearnedState<'m>,
+    /// Content hash of the scene.
+    scene: u64,
+    epoch: u64,
     iteration: Iteration,
     running: bool,
     max_depth: u32,
+    /// Bits of the media that the camera is inside of, in that scene.
+    camera_media: u32,
+}
+
+/// The state of a session together with a scene, for as long as shards step: what [`Shard::step`] takes in place of a
+/// [`Session`].
+#[derive(Clone, Copy, Debug)]
+pub struct SessionView<'a, 'm, P: Profile = Full, I: Intersector = WideBvh<'a>, L: LightSelector = PowerSelector<'a>> {
+    scene: Scene<'a>,
+    intersector: I,
+    selector: L,
+    state: &'a SessionState<'m>,
     camera_media: u32,
     profile: PhantomData<P>,
 }
@@ -147,37 +176,97 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector> SessionBuilder<'s, P, I, 
     /// # Errors
     /// A scene that calls for effects outside the profile, or a block that does not fit.
     pub fn build<'m>(self, plan: &Plan, block: &'m mut [u8]) -> Result<Session<'s, 'm, P, I, L>, SessionError> {
+        let mut session = self.carve(plan, block, false)?;
+        session.film.clear();
+        session.learned.forget();
+        Ok(session)
+    }
+
+    /// Goes on with the session that [`Session::suspend`] has left in a block of the same plan, with the bits that it
+    /// would have had without the break. The time does not depend on the size of the picture. The scene may be another
+    /// one (edited, moved); its shards join the iteration anew then.
+    ///
+    /// # Errors
+    /// As of [`Self::build`], and [`SessionError::Resume`] for a block without a suspended session of this plan. The
+    /// block is as before then. Its tables are not checked: other bytes in them make another picture, never a panic.
+    pub fn resume<'m>(self, plan: &Plan, block: &'m mut [u8]) -> Result<Session<'s, 'm, P, I, L>, SessionError> {
+        self.carve(plan, block, true)
+    }
+
+    /// Carves the block without touching the memory of pixels and statistics.
+    fn carve<'m>(
+        self,
+        plan: &Plan,
+        block: &'m mut [u8],
+        resume: bool,
+    ) -> Result<Session<'s, 'm, P, I, L>, SessionError> {
         if let Some(missing) = missing_instructions() {
             return Err(SessionError::Instructions { missing });
         }
         let Self { scene, intersector, selector, profile } = self;
-        if !P::EFFECTS.contains(scene.effects) {
-            return Err(SessionError::Profile { missing: scene.effects.without(P::EFFECTS) });
-        }
-        let with_media = P::EFFECTS.contains(Effects::MEDIA) && !scene.media.is_empty();
-        let camera_media = if with_media { media_at(&scene, &intersector, scene.camera.origin) } else { 0 };
+        check_effects::<P>(&scene)?;
+        let camera_media = || camera_media::<P, I>(&scene, &intersector);
         let mut c = Carver::new(block, plan.session()).map_err(SessionError::Memory)?;
         let s = plan.settings();
+        let needs = s.needs(plan.job.cache);
+        let record: &mut SessionRecord = c.take_one().map_err(SessionError::Memory)?;
+        let mut scalars = match resume {
+            true => record.scalars(plan.fingerprint(), &needs).map_err(SessionError::Resume)?,
+            false => SessionScalars::new(&scene, camera_media()),
+        };
+        if scalars.scene != scene.hash {
+            scalars.camera_media = camera_media();
+        }
         let pixels = s.size[0] as usize * s.size[1] as usize;
-        Ok(Session {
-            scene,
+        record.open();
+        let state = SessionState {
             plan: *plan,
-            intersector,
-            selector,
+            record,
             film: Film::new(
                 s.size,
-                c.take(pixels).map_err(SessionError::Memory)?,
-                c.take(if s.aovs { pixels } else { 0 }).map_err(SessionError::Memory)?,
+                c.take_unset(pixels).map_err(SessionError::Memory)?,
+                c.take_unset(if s.aovs { pixels } else { 0 }).map_err(SessionError::Memory)?,
+                scalars.film,
             ),
-            counters: Counters::default(),
-            learned: LearnedState::carve(&mut c, &s.needs(plan.job.cache), &scene).map_err(SessionError::Memory)?,
-            iteration: Iteration::default(),
-            running: false,
+            counters: scalars.counters,
+            learned: LearnedState::carve(&mut c, &needs, &scalars.learned).map_err(SessionError::Memory)?,
+            epoch: scalars.epoch,
+            iteration: scalars.iteration,
+            running: scalars.running != 0,
             max_depth: s.max_depth.min(MAX_PATH_LENGTH),
-            camera_media,
-            profile,
-        })
+            scene: scene.hash,
+            camera_media: scalars.camera_media,
+        };
+        Ok(Session { scene, intersector, selector, state, profile })
     }
+
+    /// The state of a session with the parts of this builder, for shards to step; in a fixed short time, so that it can
+    /// be made for each step. After the scene has changed: [`SessionState::change_scene`] first, or the shards begin
+    /// anew and the iteration cannot end.
+    ///
+    /// # Errors
+    /// A scene that calls for effects outside the profile.
+    pub fn view<'a, 'm>(self, state: &'a SessionState<'m>) -> Result<SessionView<'a, 'm, P, I, L>, SessionError>
+    where
+        's: 'a,
+    {
+        let Self { scene, intersector, selector, profile } = self;
+        check_effects::<P>(&scene)?;
+        let same = state.scene == scene.hash;
+        let camera_media = if same { state.camera_media } else { camera_media::<P, I>(&scene, &intersector) };
+        Ok(SessionView { scene, intersector, selector, state, camera_media, profile })
+    }
+}
+
+fn check_effects<P: Profile>(scene: &Scene<'_>) -> Result<(), SessionError> {
+    let missing = scene.effects.without(P::EFFECTS);
+    if P::EFFECTS.contains(scene.effects) { Ok(()) } else { Err(SessionError::Profile { missing }) }
+}
+
+/// Bits of the media that the camera is inside of.
+fn camera_media<P: Profile, I: Intersector>(scene: &Scene<'_>, intersector: &I) -> u32 {
+    let with_media = P::EFFECTS.contains(Effects::MEDIA) && !scene.media.is_empty();
+    if with_media { media_at(scene, intersector, scene.camera.origin) } else { 0 }
 }
 
 impl<'s, 'm> Session<'s, 'm> {
@@ -190,6 +279,14 @@ impl<'s, 'm> Session<'s, 'm> {
         Self::builder(scene).build(plan, block)
     }
 
+    /// Goes on with the session that [`Session::suspend`] has left in the block; see [`SessionBuilder::resume`].
+    ///
+    /// # Errors
+    /// A block that does not fit, or holds no suspended session of this plan.
+    pub fn resume(scene: Scene<'s>, plan: &Plan, block: &'m mut [u8]) -> Result<Self, SessionError> {
+        Self::builder(scene).resume(plan, block)
+    }
+
     /// A session whose parts can be replaced before it is built; at first they are those of [`Session::new`].
     pub fn builder(scene: Scene<'s>) -> SessionBuilder<'s> {
         let (intersector, selector) = (WideBvh::new(&scene), PowerSelector(scene));
@@ -197,50 +294,156 @@ impl<'s, 'm> Session<'s, 'm> {
     }
 }
 
-impl<P: Profile, I: Intersector, L: LightSelector> Sealed for Session<'_, '_, P, I, L> {}
+/// Both show shards the same.
+macro_rules! worlds {
+    ($($World:ty, $camera_media:expr;)*) => {$(
+        impl<P: Profile, I: Intersector, L: LightSelector> Sealed for $World {}
 
-impl<P: Profile, I: Intersector, L: LightSelector> World for Session<'_, '_, P, I, L> {
-    const EFFECTS: Effects = P::EFFECTS;
-    type Intersector = I;
-    type Lights = L;
+        impl<P: Profile, I: Intersector, L: LightSelector> World for $World {
+            const EFFECTS: Effects = P::EFFECTS;
+            type Intersector = I;
+            type Lights = L;
+
+            #[inline(always)]
+            fn scene(&self) -> &Scene<'_> {
+                &self.scene
+            }
+
+            #[inline(always)]
+            fn intersector(&self) -> &I {
+                &self.intersector
+            }
+
+            #[inline(always)]
+            fn lights(&self) -> &L {
+                &self.selector
+            }
+
+            #[inline(always)]
+            fn learned(&self) -> &LearnedState<'_> {
+                &self.state.learned
+            }
+
+            #[inline(always)]
+            fn iteration(&self) -> Iteration {
+                self.state.iteration
+            }
+
+            #[inline(always)]
+            fn epoch(&self) -> u64 {
+                self.state.epoch
+            }
+
+            #[inline(always)]
+            fn max_depth(&self) -> u32 {
+                self.state.max_depth
+            }
+
+            #[inline(always)]
+            fn camera_media(&self) -> u32 {
+                $camera_media(self)
+            }
+        }
+    )*};
+}
+
+worlds! {
+    Session<'_, '_, P, I, L>, |s: &Self| s.state.camera_media;
+    SessionView<'_, '_, P, I, L>, |s: &Self| s.camera_media;
+}
+
+impl<'m, P: Profile, I: Intersector, L: LightSelector> Deref for Session<'_, 'm, P, I, L> {
+    type Target = SessionState<'m>;
 
     #[inline(always)]
-    fn scene(&self) -> &Scene<'_> {
-        &self.scene
+    fn deref(&self) -> &SessionState<'m> {
+        &self.state
     }
+}
 
+impl<P: Profile, I: Intersector, L: LightSelector> DerefMut for Session<'_, '_, P, I, L> {
     #[inline(always)]
-    fn intersector(&self) -> &I {
-        &self.intersector
-    }
-
-    #[inline(always)]
-    fn lights(&self) -> &L {
-        &self.selector
-    }
-
-    #[inline(always)]
-    fn learned(&self) -> &LearnedState<'_> {
-        &self.learned
-    }
-
-    #[inline(always)]
-    fn iteration(&self) -> Iteration {
-        self.iteration
-    }
-
-    #[inline(always)]
-    fn max_depth(&self) -> u32 {
-        self.max_depth
-    }
-
-    #[inline(always)]
-    fn camera_media(&self) -> u32 {
-        self.camera_media
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.state
     }
 }
 
 impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I, L> {
+    /// See [`SessionState::suspend`].
+    pub fn suspend(self) {
+        self.state.suspend();
+    }
+
+    /// The session without its scene.
+    pub fn into_state(self) -> SessionState<'m> {
+        self.state
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene<'s> {
+        &self.scene
+    }
+}
+
+impl<'m> SessionState<'m> {
+    /// Leaves the session in its block, to be resumed ([`Self::resume`]) later, in another place, or by another process:
+    /// the block holds no addresses. Whatever state it is in goes along, an iteration that is under way included. A
+    /// session that is dropped instead cannot be resumed.
+    pub fn suspend(self) {
+        let scalars = SessionScalars {
+            scene: self.scene,
+            epoch: self.epoch,
+            iteration: self.iteration,
+            counters: self.counters,
+            film: self.film.scalars(),
+            learned: self.learned.scalars(LearnedScalars::new([[0.0; 3]; 2])),
+            camera_media: self.camera_media,
+            running: u32::from(self.running),
+        };
+        self.record.suspend(self.plan.fingerprint(), &scalars);
+    }
+
+    /// Forgets the picture and begins again with iteration 1 and sample 0; an iteration that is under way is abandoned.
+    /// Shards join the next iteration by themselves. Without the statistics the pictures that follow are bit for bit
+    /// those of a new session. With them the strategy goes on with what it has learned, of the scene and of the picture,
+    /// which changes efficiency only.
+    pub fn restart(&mut self, keep_statistics: bool) {
+        self.epoch = self.epoch.wrapping_add(1);
+        self.iteration = Iteration::default();
+        self.running = false;
+        self.counters = Counters::default();
+        self.film.clear();
+        if !keep_statistics {
+            self.learned.forget();
+        }
+    }
+
+    /// Number of restarts.
+    pub fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    /// Goes over to a scene that was edited, or another one: [`Self::restart`] for it. Sizes and depth stay those of
+    /// the settings.
+    ///
+    /// # Errors
+    /// A scene that calls for effects outside the profile `P`; then nothing has changed.
+    pub fn change_scene<P: Profile, I: Intersector, L: LightSelector>(
+        &mut self,
+        to: &SessionBuilder<'_, P, I, L>,
+        keep_statistics: bool,
+    ) -> Result<(), SessionError> {
+        check_effects::<P>(&to.scene)?;
+        self.restart(keep_statistics);
+        (self.scene, self.camera_media) = (to.scene.hash, camera_media::<P, I>(&to.scene, &to.intersector));
+        Ok(())
+    }
+
+    /// What shards must have joined.
+    fn identity(&self) -> Identity {
+        Identity { scene: self.scene, epoch: self.epoch, iteration: self.iteration }
+    }
+
     /// Begins a round of `samples` camera samples per pixel. Shards notice at their next step.
     pub fn begin_iteration(&mut self, samples: u32) {
         let i = self.iteration;
@@ -277,7 +480,7 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
             if s.settings() != self.plan.settings() {
                 return Err(SessionError::Plan { shard: s.index() });
             }
-            if !s.is_done(World::identity(self)) {
+            if !s.is_done(self.identity()) {
                 return Err(SessionError::Unfinished { shard: s.index() });
             }
             expected += 1;
@@ -356,10 +559,5 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
     /// The current iteration.
     pub fn iteration(&self) -> Iteration {
         self.iteration
-    }
-
-    /// The scene.
-    pub fn scene(&self) -> &Scene<'s> {
-        &self.scene
     }
 }

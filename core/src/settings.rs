@@ -5,7 +5,7 @@ use crate::learn::{ControlVariate, Learning, Needs};
 use crate::rrs::{Space, Strategy};
 use crate::scene::Scene;
 use crate::setting::{SettingInfo, SettingRange, SettingValue, settings};
-use core::fmt::{self, Write};
+use core::fmt;
 
 /// Paths end after this many segments whatever the settings say.
 pub const MAX_PATH_LENGTH: u32 = 200;
@@ -106,18 +106,6 @@ impl Settings {
         if fits { Ok(()) } else { Err(SettingsError::ControlVariate) }
     }
 
-    /// Identifies the settings: a hash of their names and values.
-    pub(crate) fn fingerprint(&self) -> u64 {
-        let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
-        for setting in Self::TABLE {
-            if let Some(value) = self.value(setting.name) {
-                // a hash takes any text
-                let _ = writeln!(hash, "{} {value}", setting.name);
-            }
-        }
-        hash.0
-    }
-
     /// What these settings have the render learn, with room for `cache`.
     pub(crate) fn needs(&self, cache: Option<CacheSize>) -> Needs {
         let pixels = self.strategy.needs_image() || self.shadow_roulette || self.adaptive;
@@ -130,18 +118,6 @@ impl Settings {
             adaptive: self.adaptive,
             learning: self.learning,
         }
-    }
-}
-
-/// 64-bit FNV-1a of what is written.
-struct Fnv(u64);
-
-impl Write for Fnv {
-    fn write_str(&mut self, s: &str) -> fmt::Result {
-        for byte in s.bytes() {
-            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
-        }
-        Ok(())
     }
 }
 

@@ -3,9 +3,9 @@
 extern crate std;
 
 use crate::accel::Intersector;
-use crate::film::Film;
+use crate::film::{Film, FilmScalars};
 use crate::geometry::{Hit8, Ray8};
-use crate::learn::LearnedState;
+use crate::learn::{LearnedScalars, LearnedState};
 use crate::light::PowerSelector;
 use crate::memory::{BLOCK_ALIGN, Carver, Measure};
 use crate::plan::Plan;
@@ -194,6 +194,10 @@ impl<'a> World for TestWorld<'a> {
         self.iteration
     }
 
+    fn epoch(&self) -> u64 {
+        0
+    }
+
     fn max_depth(&self) -> u32 {
         self.max_depth
     }
@@ -220,8 +224,10 @@ pub(crate) fn world<R>(change: impl FnOnce(&mut Settings), f: impl FnOnce(&TestW
         let layout = LearnedState::measure(Measure::new(), &needs).layout().expect("a layout");
         let (mut shared, at) = block(layout.size);
         let mut carver = Carver::new(&mut shared[at..], layout).expect("memory");
-        let mut learned = LearnedState::carve(&mut carver, &needs, scene).expect("memory");
-        learned.begin(4, &Film::new(settings.size, &mut [], &mut []));
+        let scalars = LearnedScalars::new([scene.info.bounds_min, scene.info.bounds_max]);
+        let mut learned = LearnedState::carve(&mut carver, &needs, &scalars).expect("memory");
+        learned.forget();
+        learned.begin(4, &Film::new(settings.size, &mut [], &mut [], FilmScalars::new()));
         let world = TestWorld {
             scene,
             intersector: BruteForce(scene),

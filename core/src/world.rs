@@ -19,6 +19,18 @@ pub struct Iteration {
     pub samples: u32,
 }
 
+/// What tells a shard that its sums belong to a session: they do while both have the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Identity {
+    /// Content hash of the scene.
+    pub scene: u64,
+    /// Number of restarts of the session ([`crate::Session::restart`]).
+    pub epoch: u64,
+    /// Iteration that runs.
+    pub iteration: Iteration,
+}
+
 /// The read-only side of a render, as shards see it. Sealed: [`crate::Session`] is the one that hosts use.
 pub trait World: sealed::Sealed {
     /// Effects that the kernels are compiled with.
@@ -43,9 +55,12 @@ pub trait World: sealed::Sealed {
     /// Bits of the media that the camera is inside of.
     fn camera_media(&self) -> u32;
 
-    /// What tells a shard that its sums belong here: content hash of the scene, and iteration.
-    fn identity(&self) -> (u64, Iteration) {
-        (self.scene().hash, self.iteration())
+    /// Number of restarts.
+    fn epoch(&self) -> u64;
+
+    /// What tells a shard that its sums belong here.
+    fn identity(&self) -> Identity {
+        Identity { scene: self.scene().hash, epoch: self.epoch(), iteration: self.iteration() }
     }
 }
 

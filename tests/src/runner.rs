@@ -6,7 +6,8 @@ use croupier::unstable::learn::PictureStatistics;
 use croupier::unstable::learn::cache::CacheError;
 use croupier::unstable::profile::{AnyProfile, Profile, ProfileVisitor};
 use croupier::{
-    Budget, Counters, ErrorEstimate, Plan, Scene, Session, SessionError, Settings, Shard, StepResult, Strategy,
+    Budget, Counters, ErrorEstimate, Plan, Scene, Session, SessionError, SessionState, Settings, Shard, StepResult,
+    Strategy,
 };
 use croupier_host::blob::AlignedBytes;
 
@@ -168,7 +169,7 @@ impl<P: Profile, I: Intersector> Learned for Session<'_, '_, P, I> {
     }
 
     fn counters(&self) -> Counters {
-        *Session::counters(self)
+        *SessionState::counters(self)
     }
 
     fn pixels(&self) -> &[PixelStats] {
@@ -216,7 +217,7 @@ fn learning_with<P: Profile + Sync, I: Intersector + Sync>(
         size: film.size(),
         pixels: film.pixels().to_vec(),
         aovs: film.aovs().to_vec(),
-        counters: *session.counters(),
+        counters: session.counters(),
         error: film.error_estimate(),
     }
 }

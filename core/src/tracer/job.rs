@@ -11,7 +11,7 @@ pub(crate) struct Job {
     pub tiles: Tiles,
     /// Room for statistics of the scene, if they are wanted.
     pub cache: Option<CacheSize>,
-    /// [`Settings::fingerprint`].
+    /// Hash of the settings, which tells blocks of other plans.
     pub fingerprint: u64,
 }
 

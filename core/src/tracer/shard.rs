@@ -10,7 +10,7 @@ use crate::learn::cache::Training;
 use crate::memory::{Carver, Layout, Measure, MemoryError};
 use crate::settings::Settings;
 use crate::tiles::TILE_PIXELS;
-use crate::world::{Iteration, World};
+use crate::world::{Identity, World};
 use bytemuck::{Pod, Zeroable};
 use core::fmt;
 
@@ -69,8 +69,8 @@ pub struct Shard<'m> {
     pub(super) job: Job,
     record: &'m mut ShardRecord,
     index: u32,
-    /// Scene and iteration that the books belong to; iteration 0 is none.
-    joined: (u64, Iteration),
+    /// What the books belong to; iteration 0 is none.
+    joined: Identity,
     pub(super) state: State<'m>,
 }
 
@@ -80,12 +80,10 @@ pub struct Shard<'m> {
 struct ShardRecord {
     /// [`SUSPENDED`] if the rest counts.
     mark: u64,
-    /// [`Settings::fingerprint`].
+    /// Hash of the settings.
     settings: u64,
     index: u64,
-    /// Content hash of the scene, and iteration.
-    scene: u64,
-    iteration: Iteration,
+    joined: Identity,
     state: StateRecord,
 }
 
@@ -117,7 +115,7 @@ impl<'m> Shard<'m> {
             job: *job,
             record: c.take_one()?,
             index,
-            joined: (0, Iteration::default()),
+            joined: Identity::default(),
             state: State::carve(&mut c, job)?,
         })
     }
@@ -125,13 +123,11 @@ impl<'m> Shard<'m> {
     /// Gives the block back, so that [`Self::resume`] can go on with it: a host that stores shards without their
     /// lifetime keeps the blocks. Takes a fixed, short time.
     pub fn suspend(self) {
-        let (scene, iteration) = self.joined;
         *self.record = ShardRecord {
             mark: SUSPENDED,
             settings: self.job.fingerprint,
             index: self.index.into(),
-            scene,
-            iteration,
+            joined: self.joined,
             state: self.state.suspend(),
         };
     }
@@ -142,10 +138,10 @@ impl<'m> Shard<'m> {
         let r = *shard.record;
         let own = r.mark == SUSPENDED && r.settings == job.fingerprint && r.index == u64::from(index);
         own.then_some(())
-            .and_then(|()| shard.state.resume(job, index, r.iteration, &r.state))
+            .and_then(|()| shard.state.resume(job, index, r.joined.iteration, &r.state))
             .ok_or(ShardError::NotSuspended { index })?;
         shard.record.mark = 0;
-        shard.joined = (r.scene, r.iteration);
+        shard.joined = r.joined;
         Ok(shard)
     }
 
@@ -198,7 +194,7 @@ impl<'m> Shard<'m> {
     }
 
     /// Has the shard finished this iteration of this scene?
-    pub(crate) fn is_done(&self, identity: (u64, Iteration)) -> bool {
+    pub(crate) fn is_done(&self, identity: Identity) -> bool {
         self.joined == identity && self.state.cursor.is_finished() && self.state.ring.waiting() == 0
     }
 
