@@ -111,7 +111,7 @@ pub use memory::{BLOCK_ALIGN, MemoryError};
 pub use plan::Plan;
 pub use rrs::Strategy;
 pub use scene::{Scene, SceneError};
-pub use session::{Session, SessionError, SessionState, SessionView};
+pub use session::{Session, SessionBuilder, SessionError, SessionState, SessionView};
 pub use setting::SettingError;
 pub use settings::{Settings, SettingsError};
 pub use tracer::{Budget, Shard, ShardError, StepResult};
@@ -125,7 +125,7 @@ pub mod unstable {
     pub use crate::memory::Layout;
     pub use crate::record::ResumeError;
     pub use crate::scene::Effects;
-    pub use crate::session::{Phase, SessionBuilder};
+    pub use crate::session::Phase;
     pub use crate::setting::{SettingInfo, SettingRange, SettingValue};
     pub use crate::settings::{MAX_PATH_LENGTH, MIN_RING};
     pub use crate::tracer::{BYTES_PER_PATH, MAX_PASSED};

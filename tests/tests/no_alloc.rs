@@ -3,8 +3,10 @@
 
 use croupier::unstable::accel::WideBvh;
 use croupier::unstable::profile::{Full, Profile};
+use croupier::unstable::scene::blob::{Light, Material};
 use croupier::{Budget, Plan, Scene, Session, Settings, Shard, StepResult, Strategy};
 use croupier_host::blob::AlignedBytes;
+use croupier_host::renderer::{Keep, Renderer};
 use croupier_tests::scenes::{blob, cornell, everything};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -103,5 +105,38 @@ fn render<P: Profile>(bytes: &[u8], strategy: Strategy) {
         session.end_iteration(&shards).unwrap();
         let estimate = session.film().error_estimate();
         assert!(estimate.rel_mse.is_finite() && session.counters().rays() > 0);
+    });
+}
+
+/// Frames of a renderer that owns its memory: edits, steps, iterations. Killed by: a lock, a view or an edit that
+/// allocates.
+#[test]
+fn frames_of_an_owning_renderer_allocate_nothing() {
+    let bytes = blob(&everything([20, 12]));
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    let strategy = Strategy::parse("ears").unwrap();
+    let settings = Settings { strategy, shards: 3, aovs: true, ..Settings::for_scene(&scene) };
+    let (mut camera, material) = (*scene.camera, scene.materials[0]);
+    let light = scene.lights[0];
+    let renderer: Renderer = Renderer::new(bytes, &settings).unwrap();
+    without_allocating(|| {
+        for keep in [Keep::Statistics, Keep::Nothing] {
+            camera.origin[0] += 0.1;
+            renderer
+                .edit(keep, |scene| {
+                    scene.camera(camera)?;
+                    scene.material(0, Material { reflectance: [0.3; 3], ..material }, &[])?;
+                    scene.light(0, Light { emission: [2.0; 3], ..light })
+                })
+                .unwrap();
+            for _ in 0..2 {
+                renderer.begin_iteration(1);
+                for shard in 0..3 {
+                    while renderer.step(shard, Budget { rays: 50 }).unwrap() == StepResult::More {}
+                }
+                renderer.end_iteration().unwrap();
+            }
+            assert!(renderer.with_film(|film| film.error_estimate().rel_mse > 0.0));
+        }
     });
 }

@@ -31,5 +31,6 @@ pub mod image;
 pub mod load;
 pub mod microfacet;
 pub mod render;
+pub mod renderer;
 pub mod statistics;
 pub mod tonemap;

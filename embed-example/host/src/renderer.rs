@@ -1,0 +1,284 @@
+//! A renderer that owns its scene and its memory, for hosts that render between other things: an engine's frames, an
+//! editor's events. It can be stored in a struct, its scene changes between frames without baking, and any number of
+//! persistent threads step it; nothing is allocated after [`Renderer::new`].
+//!
+//! ```no_run
+//! use croupier::Settings;
+//! use croupier::{Budget, Scene, StepResult};
+//! use croupier_host::renderer::{Keep, Renderer};
+//! # fn blob() -> croupier_host::blob::AlignedBytes { unimplemented!() }
+//!
+//! let blob = blob();
+//! let settings = Settings::for_scene(&Scene::from_bytes(&blob)?);
+//! let renderer: Renderer = Renderer::new(blob, &settings)?;
+//! loop {
+//!     // in each frame: what has changed, and as many rays as there is time for
+//!     let mut camera = renderer.with_scene(|scene| *scene.camera);
+//!     camera.origin[0] += 0.01;
+//!     renderer.edit(Keep::Statistics, |scene| scene.camera(camera))?;
+//!     renderer.begin_iteration(1);
+//!     while renderer.step(0, Budget { rays: 10_000 })? == StepResult::More {}
+//!     renderer.end_iteration()?;
+//!     renderer.with_film(|film| println!("relMSE {}", film.error_estimate().rel_mse));
+//! }
+//! # #[expect(unreachable_code, reason = "the type of the example")]
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use crate::blob::AlignedBytes;
+use croupier::unstable::Iteration;
+use croupier::unstable::profile::{Full, Profile};
+use croupier::{
+    Budget, Counters, EditError, EditableScene, Film, Plan, Scene, SceneEdit, SceneError, Session, SessionBuilder,
+    SessionError, SessionState, Settings, SettingsError, Shard, ShardError, StepResult,
+};
+use self_cell::{MutBorrow, self_cell};
+use std::fmt;
+use std::marker::PhantomData;
+use std::sync::{Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+
+self_cell!(
+    /// A session's state with the memory that it is in.
+    struct OwnedState {
+        owner: MutBorrow<AlignedBytes>,
+        #[covariant]
+        dependent: SessionState,
+    }
+);
+
+self_cell!(
+    /// A shard with the memory that it is in.
+    struct OwnedShard {
+        owner: MutBorrow<AlignedBytes>,
+        #[covariant]
+        dependent: Shard,
+    }
+);
+
+/// What stays when a scene changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keep {
+    /// What roulette and splitting have learned; it serves on where the scene looks much as before.
+    Statistics,
+    /// Nothing: the pictures that follow are bit for bit those of a new renderer.
+    Nothing,
+}
+
+/// Why a renderer cannot be made or cannot go on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum RendererError {
+    /// The bytes are no scene.
+    Scene(SceneError),
+    /// Settings that cannot be used.
+    Settings(SettingsError),
+    /// The system has not so much memory.
+    Memory {
+        /// Bytes of all blocks.
+        needed: usize,
+    },
+    /// See [`SessionError`].
+    Session(SessionError),
+    /// See [`ShardError`].
+    Shard(ShardError),
+    /// An edit that was refused.
+    Edit(EditError),
+}
+
+impl fmt::Display for RendererError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Scene(e) => e.fmt(f),
+            Self::Settings(e) => e.fmt(f),
+            Self::Memory { needed } => write!(f, "the render needs {needed} bytes, which the system does not have"),
+            Self::Session(e) => e.fmt(f),
+            Self::Shard(e) => e.fmt(f),
+            Self::Edit(e) => e.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for RendererError {}
+
+macro_rules! from {
+    ($($Error:ident => $Variant:ident),*) => {$(
+        impl From<$Error> for RendererError {
+            fn from(e: $Error) -> Self {
+                Self::$Variant(e)
+            }
+        }
+    )*};
+}
+
+from! { SceneError => Scene, SettingsError => Settings, SessionError => Session, ShardError => Shard, EditError => Edit }
+
+/// The scene and what all shards share.
+struct Shared {
+    scene: EditableScene<AlignedBytes>,
+    state: OwnedState,
+    /// Where the shards are while an iteration ends; room for all of them.
+    shards: Vec<OwnedShard>,
+}
+
+/// Scene, session and shards in one value without lifetimes: `Send`, `Sync`, to be stored anywhere and shared by
+/// reference or `Arc`.
+///
+/// Calls from several threads wait for each other only where they must: steps of different shards run together, a
+/// change of the scene or the end of an iteration waits for the steps that are under way. Small budgets keep those
+/// waits short.
+pub struct Renderer<P: Profile = Full> {
+    plan: Plan,
+    shared: RwLock<Shared>,
+    /// One for each unit of parallel work; `None` while an iteration ends.
+    shards: Vec<Mutex<Option<OwnedShard>>>,
+    profile: PhantomData<fn() -> P>,
+}
+
+impl<P: Profile> fmt::Debug for Renderer<P> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Renderer").field("settings", self.plan.settings()).finish_non_exhaustive()
+    }
+}
+
+/// A lock that another thread has left in panic still guards sound data: the core keeps no invariant across a panic
+/// that a later call relies on.
+fn read<T>(lock: &RwLock<T>) -> RwLockReadGuard<'_, T> {
+    lock.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn write<T>(lock: &RwLock<T>) -> RwLockWriteGuard<'_, T> {
+    lock.write().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn own<T>(lock: &Mutex<T>) -> MutexGuard<'_, T> {
+    lock.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Kernels of `P`, the scene's own tree, lights by power.
+fn builder<P: Profile>(scene: Scene<'_>) -> SessionBuilder<'_, P> {
+    Session::builder(scene).profile::<P>()
+}
+
+impl<P: Profile> Renderer<P> {
+    /// Validates the blob and allocates all memory that rendering with these settings will need.
+    ///
+    /// # Errors
+    /// A blob that is not valid or calls for effects outside the profile, settings that cannot be used, not enough
+    /// memory.
+    pub fn new(blob: AlignedBytes, settings: &Settings) -> Result<Self, RendererError> {
+        let scene = EditableScene::new(blob)?;
+        let plan = Plan::new(&settings.with_scene(&scene.scene()))?;
+        let shards = plan.settings().shards;
+        let needed = plan.shard().size.saturating_mul(shards as usize).saturating_add(plan.session().size);
+        let block = |size| AlignedBytes::try_zeroed(size).ok_or(RendererError::Memory { needed });
+        let state = OwnedState::try_new(MutBorrow::new(block(plan.session().size)?), |owner| {
+            let session = builder::<P>(scene.scene()).build(&plan, owner.borrow_mut().as_mut());
+            session.map(Session::into_state)
+        })?;
+        let shard = |index| {
+            let owner = MutBorrow::new(block(plan.shard().size)?);
+            let shard = OwnedShard::try_new(owner, |owner| Shard::new(&plan, index, owner.borrow_mut().as_mut()))?;
+            Ok(Mutex::new(Some(shard)))
+        };
+        Ok(Self {
+            plan,
+            shared: RwLock::new(Shared { scene, state, shards: Vec::with_capacity(shards as usize) }),
+            shards: (0..shards).map(shard).collect::<Result<_, RendererError>>()?,
+            profile: PhantomData,
+        })
+    }
+
+    /// Sizes and settings.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Changes the scene and begins a new picture of it; an iteration that is under way is abandoned. What the edits of
+    /// `change` take does not depend on the size of the scene, see [`EditableScene::edit`].
+    ///
+    /// # Errors
+    /// The error of `change`; the edits that it made before stay.
+    pub fn edit<T>(
+        &self,
+        keep: Keep,
+        change: impl FnOnce(&mut SceneEdit<'_>) -> Result<T, EditError>,
+    ) -> Result<T, RendererError> {
+        let Shared { scene, state, .. } = &mut *write(&self.shared);
+        let changed = change(&mut scene.edit());
+        let to = builder::<P>(scene.scene());
+        state.with_dependent_mut(|_, state| state.change_scene(&to, keep == Keep::Statistics))?;
+        Ok(changed?)
+    }
+
+    /// Begins a round of `samples` camera samples per pixel.
+    pub fn begin_iteration(&self, samples: u32) {
+        write(&self.shared).state.with_dependent_mut(|_, state| state.begin_iteration(samples));
+    }
+
+    /// Works on a shard until the budget is used or it has finished the iteration; from any thread.
+    ///
+    /// # Errors
+    /// No such shard.
+    pub fn step(&self, shard: u32, budget: Budget) -> Result<StepResult, RendererError> {
+        let shards = self.plan.settings().shards;
+        let slot = self.shards.get(shard as usize).ok_or(ShardError::Index { index: shard, shards })?;
+        let shared = read(&self.shared);
+        let view = builder::<P>(shared.scene.scene()).view(shared.state.borrow_dependent())?;
+        let mut own = own(slot);
+        // it is away only while an iteration ends, which the lock above excludes
+        let step = |owned: &mut OwnedShard| owned.with_dependent_mut(|_, shard| shard.step(&view, budget));
+        Ok(own.as_mut().map_or(StepResult::Done, step))
+    }
+
+    /// Ends the iteration: merges what the shards have gathered, estimates the error, learns.
+    ///
+    /// # Errors
+    /// No iteration, or a shard that has not finished it. The film is as before then.
+    pub fn end_iteration(&self) -> Result<(), RendererError> {
+        let Shared { state, shards, .. } = &mut *write(&self.shared);
+        shards.extend(self.shards.iter().filter_map(|slot| own(slot).take()));
+        let result =
+            state.with_dependent_mut(|_, state| state.end_iteration(shards.iter().map(OwnedShard::borrow_dependent)));
+        for (slot, shard) in self.shards.iter().zip(shards.drain(..)) {
+            *own(slot) = Some(shard);
+        }
+        Ok(result?)
+    }
+
+    /// Starts no further camera samples in this iteration: stepping on finishes those in flight, and the iteration may
+    /// end early.
+    pub fn stop(&self) {
+        for slot in &self.shards {
+            if let Some(owned) = own(slot).as_mut() {
+                owned.with_dependent_mut(|_, shard| shard.stop());
+            }
+        }
+    }
+
+    /// Shows the picture so far.
+    pub fn with_film<T>(&self, show: impl FnOnce(&Film<'_>) -> T) -> T {
+        show(read(&self.shared).state.borrow_dependent().film())
+    }
+
+    /// Shows the scene as it is now.
+    pub fn with_scene<T>(&self, show: impl FnOnce(&Scene<'_>) -> T) -> T {
+        show(&read(&self.shared).scene.scene())
+    }
+
+    /// The current iteration of the picture.
+    pub fn iteration(&self) -> Iteration {
+        read(&self.shared).state.borrow_dependent().iteration()
+    }
+
+    /// Counts of the finished iterations of the picture.
+    pub fn counters(&self) -> Counters {
+        *read(&self.shared).state.borrow_dependent().counters()
+    }
+
+    /// The scene's bytes, valid as a blob again.
+    pub fn into_blob(self) -> AlignedBytes {
+        let mut scene = self.shared.into_inner().unwrap_or_else(PoisonError::into_inner).scene;
+        scene.seal();
+        scene.into_bytes()
+    }
+}
