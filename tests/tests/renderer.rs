@@ -2,7 +2,7 @@
 
 use croupier::unstable::profile::Full;
 use croupier::unstable::scene::blob::{Camera, Material};
-use croupier::{Budget, Plan, Scene, SessionError, Settings, StepResult};
+use croupier::{Budget, Scene, SessionError, Settings, StepResult};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::renderer::{Keep, Renderer, RendererError};
 use croupier_tests::runner::{render, settings};
