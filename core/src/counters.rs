@@ -1,9 +1,11 @@
 //! Counts of work, lane utilisation and every event in which a bound was reached.
 
 use crate::cost::{COST_BOUNCE, COST_CAMERA, COST_SHADOW, COST_STRAIGHT, MEDIUM_STEPS_PER_RAY};
+use bytemuck::{Pod, Zeroable};
 
 /// Lane utilisation of a stage: lanes used of lanes offered.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Utilisation {
     /// Number of packets run.
     pub packets: u64,
@@ -30,7 +32,8 @@ impl Utilisation {
 }
 
 /// Counts of one shard or of a whole render.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Counters {
     /// Closest-hit rays from the camera.
     pub camera_rays: u64,

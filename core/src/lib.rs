@@ -31,6 +31,7 @@
 //! | `learn` | statistics by place and direction | materials, lights, how paths are traced |
 //! | `settings` | the caller's choices, their ranges | how they are followed |
 //! | `world` | what paths read | who owns it |
+//! | `record` | scalars of a suspended session | what they stand for |
 //! | `tracer` | packets, the refill ring, stages, books | files, threads, clocks |
 //! | `plan` | how many bytes a render needs | where they come from |
 //! | `session` | iterations: merge, learn, begin again | how paths are traced |
@@ -83,6 +84,7 @@ mod memory;
 mod names;
 mod plan;
 mod profile;
+mod record;
 mod rng;
 mod rrs;
 mod sampler;
@@ -115,12 +117,13 @@ pub use tracer::{Budget, Shard, ShardError, StepResult};
 pub mod unstable {
     pub use crate::counters::Utilisation;
     pub use crate::memory::Layout;
+    pub use crate::record::ResumeError;
     pub use crate::scene::Effects;
     pub use crate::session::{Phase, SessionBuilder};
     pub use crate::setting::{SettingInfo, SettingRange, SettingValue};
     pub use crate::settings::{MAX_PATH_LENGTH, MIN_RING};
     pub use crate::tracer::{BYTES_PER_PATH, MAX_PASSED};
-    pub use crate::world::{Iteration, World};
+    pub use crate::world::{Identity, Iteration, World};
     pub use croupier_simd as simd;
 
     /// Rays against triangles.

@@ -85,6 +85,12 @@ impl<'m> Carver<'m> {
         Ok(records)
     }
 
+    /// Takes the next record with the bytes that the caller's memory holds.
+    pub(crate) fn take_one<T: Pod>(&mut self) -> Result<&'m mut T, MemoryError> {
+        let given = self.rest.len();
+        self.take_unset(1)?.first_mut().ok_or(MemoryError::TooSmall { needed: size_of::<T>(), given })
+    }
+
     /// Takes the next `n` records with the bytes that the caller's memory holds: for slabs that are written before they
     /// are read. Pages that are never used need not exist. `Debug` shows the bytes that are there.
     pub(crate) fn take_unset<T: Pod>(&mut self, n: usize) -> Result<&'m mut [T], MemoryError> {

@@ -3,6 +3,7 @@
 use crate::film::{PixelAov, PixelStats};
 use crate::learn::LearnedState;
 use crate::memory::{Layout, Measure};
+use crate::record::{SessionRecord, fingerprint};
 use crate::settings::{Settings, SettingsError};
 use crate::tiles::Tiles;
 use crate::tracer::{Job, Shard, ShardError};
@@ -13,6 +14,7 @@ pub struct Plan {
     pub(crate) job: Job,
     session: Layout,
     shard: Layout,
+    fingerprint: u64,
 }
 
 impl Plan {
@@ -24,13 +26,15 @@ impl Plan {
         let s = *settings;
         let cache = s.check()?;
         let pixels = s.size[0] as usize * s.size[1] as usize;
-        let session = Measure::new().add::<PixelStats>(pixels).add::<PixelAov>(if s.aovs { pixels } else { 0 });
+        let session = Measure::new().add::<SessionRecord>(1);
+        let session = session.add::<PixelStats>(pixels).add::<PixelAov>(if s.aovs { pixels } else { 0 });
         let session = LearnedState::measure(session, &s.needs(cache));
         let job = Job { settings: s, tiles: Tiles::new(s.size, s.shards), cache };
         Ok(Self {
             job,
             session: session.layout().ok_or(SettingsError::Memory)?,
             shard: Shard::measure(&job).layout().ok_or(SettingsError::Memory)?,
+            fingerprint: fingerprint(settings),
         })
     }
 
@@ -42,6 +46,11 @@ impl Plan {
     /// Size and alignment of each shard's block.
     pub fn shard(&self) -> Layout {
         self.shard
+    }
+
+    /// Hash of the settings, which tells blocks of other plans.
+    pub(crate) fn fingerprint(&self) -> u64 {
+        self.fingerprint
     }
 
     /// Settings that the plan was made for.

@@ -4,11 +4,12 @@ use crate::accel::{Intersector, WideBvh};
 use crate::counters::Counters;
 use crate::film::{Film, PixelSums};
 use crate::learn::cache::Cache;
-use crate::learn::{LearnedState, PictureStatistics};
+use crate::learn::{LearnedScalars, LearnedState, PictureStatistics};
 use crate::light::{LightSelector, PowerSelector};
 use crate::memory::{Carver, MemoryError};
 use crate::plan::Plan;
 use crate::profile::{Full, Profile};
+use crate::record::{ResumeError, SessionRecord, SessionScalars};
 use crate::scene::{Effects, Scene};
 use crate::settings::MAX_PATH_LENGTH;
 use crate::tracer::{Shard, media_at};
@@ -45,6 +46,8 @@ pub enum SessionError {
     },
     /// No iteration has begun.
     NoIteration,
+    /// The block cannot be resumed.
+    Resume(ResumeError),
     /// An estimate of the pixels that does not fit.
     Estimate {
         /// Number of values given.
@@ -69,6 +72,7 @@ impl fmt::Display for SessionError {
             Self::Estimate { given } => {
                 write!(f, "an estimate of {given} values does not fit the settings, or comes while an iteration runs")
             }
+            Self::Resume(e) => write!(f, "session: {e}"),
             Self::NoIteration => f.write_str("no iteration has begun"),
         }
     }
@@ -93,11 +97,13 @@ pub enum Phase {
 pub struct Session<'s, 'm, P: Profile = Full, I: Intersector = WideBvh<'s>, L: LightSelector = PowerSelector<'s>> {
     scene: Scene<'s>,
     plan: Plan,
+    record: &'m mut SessionRecord,
     intersector: I,
     selector: L,
     film: Film<'m>,
     counters: Counters,
     learned: LearnedState<'m>,
+    epoch: u64,
     iteration: Iteration,
     running: bool,
     max_depth: u32,
@@ -138,31 +144,68 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector> SessionBuilder<'s, P, I, 
     /// # Errors
     /// A scene that calls for effects outside the profile, or a block that does not fit.
     pub fn build<'m>(self, plan: &Plan, block: &'m mut [u8]) -> Result<Session<'s, 'm, P, I, L>, SessionError> {
+        let mut session = self.carve(plan, block, false)?;
+        session.film.clear();
+        session.learned.forget();
+        Ok(session)
+    }
+
+    /// Goes on with the session that [`Session::suspend`] has left in a block of the same plan, with the bits that it
+    /// would have had without the break. The time does not depend on the size of the picture. The scene may be another
+    /// one (edited, moved); its shards join the iteration anew then.
+    ///
+    /// # Errors
+    /// As of [`Self::build`], and [`SessionError::Resume`] for a block without a suspended session of this plan. The
+    /// block is as before then. Its tables are not checked: other bytes in them make another picture, never a panic.
+    pub fn resume<'m>(self, plan: &Plan, block: &'m mut [u8]) -> Result<Session<'s, 'm, P, I, L>, SessionError> {
+        self.carve(plan, block, true)
+    }
+
+    /// Carves the block without touching the memory of pixels and statistics.
+    fn carve<'m>(
+        self,
+        plan: &Plan,
+        block: &'m mut [u8],
+        resume: bool,
+    ) -> Result<Session<'s, 'm, P, I, L>, SessionError> {
         let Self { scene, intersector, selector, profile } = self;
         if !P::EFFECTS.contains(scene.effects) {
             return Err(SessionError::Profile { missing: scene.effects.without(P::EFFECTS) });
         }
         let with_media = P::EFFECTS.contains(Effects::MEDIA) && !scene.media.is_empty();
-        let camera_media = if with_media { media_at(&scene, &intersector, scene.camera.origin) } else { 0 };
+        let camera_media = || if with_media { media_at(&scene, &intersector, scene.camera.origin) } else { 0 };
         let mut c = Carver::new(block, plan.session()).map_err(SessionError::Memory)?;
         let s = plan.settings();
+        let needs = s.needs(plan.job.cache);
+        let record: &mut SessionRecord = c.take_one().map_err(SessionError::Memory)?;
+        let mut scalars = match resume {
+            true => record.scalars(plan.fingerprint(), &needs).map_err(SessionError::Resume)?,
+            false => SessionScalars::new(&scene, camera_media()),
+        };
+        if scalars.scene != scene.hash {
+            scalars.camera_media = camera_media();
+        }
         let pixels = s.size[0] as usize * s.size[1] as usize;
+        record.open();
         Ok(Session {
             scene,
             plan: *plan,
+            record,
             intersector,
             selector,
             film: Film::new(
                 s.size,
-                c.take(pixels).map_err(SessionError::Memory)?,
-                c.take(if s.aovs { pixels } else { 0 }).map_err(SessionError::Memory)?,
+                c.take_unset(pixels).map_err(SessionError::Memory)?,
+                c.take_unset(if s.aovs { pixels } else { 0 }).map_err(SessionError::Memory)?,
+                scalars.film,
             ),
-            counters: Counters::default(),
-            learned: LearnedState::carve(&mut c, &s.needs(plan.job.cache), &scene).map_err(SessionError::Memory)?,
-            iteration: Iteration::default(),
-            running: false,
+            counters: scalars.counters,
+            learned: LearnedState::carve(&mut c, &needs, &scalars.learned).map_err(SessionError::Memory)?,
+            epoch: scalars.epoch,
+            iteration: scalars.iteration,
+            running: scalars.running != 0,
             max_depth: s.max_depth.min(MAX_PATH_LENGTH),
-            camera_media,
+            camera_media: scalars.camera_media,
             profile,
         })
     }
@@ -176,6 +219,14 @@ impl<'s, 'm> Session<'s, 'm> {
     /// A block that does not fit.
     pub fn new(scene: Scene<'s>, plan: &Plan, block: &'m mut [u8]) -> Result<Self, SessionError> {
         Self::builder(scene).build(plan, block)
+    }
+
+    /// Goes on with the session that [`Session::suspend`] has left in the block; see [`SessionBuilder::resume`].
+    ///
+    /// # Errors
+    /// A block that does not fit, or holds no suspended session of this plan.
+    pub fn resume(scene: Scene<'s>, plan: &Plan, block: &'m mut [u8]) -> Result<Self, SessionError> {
+        Self::builder(scene).resume(plan, block)
     }
 
     /// A session whose parts can be replaced before it is built; at first they are those of [`Session::new`].
@@ -218,6 +269,11 @@ impl<P: Profile, I: Intersector, L: LightSelector> World for Session<'_, '_, P, 
     }
 
     #[inline(always)]
+    fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    #[inline(always)]
     fn max_depth(&self) -> u32 {
         self.max_depth
     }
@@ -229,6 +285,43 @@ impl<P: Profile, I: Intersector, L: LightSelector> World for Session<'_, '_, P, 
 }
 
 impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I, L> {
+    /// Leaves the session in its block, to be resumed ([`Self::resume`]) later, in another place, or by another process:
+    /// the block holds no addresses. Whatever state it is in goes along, an iteration that is under way included. A
+    /// session that is dropped instead cannot be resumed.
+    pub fn suspend(self) {
+        let scalars = SessionScalars {
+            scene: self.scene.hash,
+            epoch: self.epoch,
+            iteration: self.iteration,
+            counters: self.counters,
+            film: self.film.scalars(),
+            learned: self.learned.scalars(LearnedScalars::new(&self.scene)),
+            camera_media: self.camera_media,
+            running: u32::from(self.running),
+        };
+        self.record.suspend(self.plan.fingerprint(), &scalars);
+    }
+
+    /// Forgets the picture and begins again with iteration 1 and sample 0; an iteration that is under way is abandoned.
+    /// Shards join the next iteration by themselves. Without the statistics the pictures that follow are bit for bit
+    /// those of a new session. With them the strategy goes on with what it has learned, of the scene and of the picture,
+    /// which changes efficiency only.
+    pub fn restart(&mut self, keep_statistics: bool) {
+        self.epoch = self.epoch.wrapping_add(1);
+        self.iteration = Iteration::default();
+        self.running = false;
+        self.counters = Counters::default();
+        self.film.clear();
+        if !keep_statistics {
+            self.learned.forget();
+        }
+    }
+
+    /// Number of restarts.
+    pub fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
     /// Begins a round of `samples` camera samples per pixel. Shards notice at their next step.
     pub fn begin_iteration(&mut self, samples: u32) {
         let i = self.iteration;

@@ -5,9 +5,11 @@ use crate::accel::Intersector;
 use crate::learn::LearnedState;
 use crate::light::LightSelector;
 use crate::scene::{Effects, Scene};
+use bytemuck::{Pod, Zeroable};
 
 /// One round of camera samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Iteration {
     /// 1 for the first; 0 before it.
     pub number: u64,
@@ -15,6 +17,18 @@ pub struct Iteration {
     pub first_sample: u32,
     /// Camera samples per pixel in it.
     pub samples: u32,
+}
+
+/// What tells a shard that its sums belong to a session: they do while both have the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Identity {
+    /// Content hash of the scene.
+    pub scene: u64,
+    /// Number of restarts of the session ([`crate::Session::restart`]).
+    pub epoch: u64,
+    /// Iteration that runs.
+    pub iteration: Iteration,
 }
 
 /// The read-only side of a render, as shards see it. Sealed: [`crate::Session`] is the one that hosts use.
@@ -41,9 +55,12 @@ pub trait World: sealed::Sealed {
     /// Bits of the media that the camera is inside of.
     fn camera_media(&self) -> u32;
 
-    /// What tells a shard that its sums belong here: content hash of the scene, and iteration.
-    fn identity(&self) -> (u64, Iteration) {
-        (self.scene().hash, self.iteration())
+    /// Number of restarts.
+    fn epoch(&self) -> u64;
+
+    /// What tells a shard that its sums belong here.
+    fn identity(&self) -> Identity {
+        Identity { scene: self.scene().hash, epoch: self.epoch(), iteration: self.iteration() }
     }
 }
 

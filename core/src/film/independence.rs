@@ -5,10 +5,12 @@
 use super::error::relative_denominator;
 use super::pixel::{PixelStats, PixelSums};
 use super::sqrt::SqrtNewton;
+use bytemuck::{Pod, Zeroable};
 
 /// Sums over the pixels of an iteration that is being merged: squared differences from the picture before, and those
 /// expected if all samples were independent. Relative, with the denominator of relMSE.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
 pub(super) struct Differences {
     /// Squared differences of the means: true variance of the picture before plus true variance of the iteration.
     found: f64,
@@ -47,7 +49,8 @@ impl Differences {
 }
 
 /// True variance of the picture over that of independent samples, and the standard error of this ratio.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
 pub(super) struct Independence {
     pub ratio: f64,
     pub noise: f64,

@@ -21,6 +21,7 @@ pub use pixel::{PixelAov, PixelStats};
 pub(crate) use sqrt::SqrtNewton;
 pub(crate) use trimmed::trimmed;
 
+use bytemuck::{Pod, Zeroable};
 use error::relative_error;
 use independence::{Differences, Independence};
 
@@ -30,13 +31,43 @@ pub struct Film<'m> {
     size: [u32; 2],
     pixels: &'m mut [PixelStats],
     aovs: &'m mut [PixelAov],
+    scalars: FilmScalars,
+}
+
+/// All of a film but its pixels.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct FilmScalars {
     differences: Differences,
     independence: Independence,
 }
 
+impl FilmScalars {
+    /// Those of a film without samples.
+    pub(crate) fn new() -> Self {
+        Self { differences: Differences::default(), independence: Independence::UNKNOWN }
+    }
+}
+
 impl<'m> Film<'m> {
-    pub(crate) fn new(size: [u32; 2], pixels: &'m mut [PixelStats], aovs: &'m mut [PixelAov]) -> Self {
-        Self { size, pixels, aovs, differences: Differences::default(), independence: Independence::UNKNOWN }
+    pub(crate) fn new(
+        size: [u32; 2],
+        pixels: &'m mut [PixelStats],
+        aovs: &'m mut [PixelAov],
+        scalars: FilmScalars,
+    ) -> Self {
+        Self { size, pixels, aovs, scalars }
+    }
+
+    pub(crate) fn scalars(&self) -> FilmScalars {
+        self.scalars
+    }
+
+    /// Forgets all samples.
+    pub(crate) fn clear(&mut self) {
+        self.pixels.fill(PixelStats::default());
+        self.aovs.fill(PixelAov::default());
+        self.scalars = FilmScalars::new();
     }
 
     /// Columns and rows of the picture.
@@ -57,7 +88,7 @@ impl<'m> Film<'m> {
     /// Adds the sums of an iteration to a pixel, each sample with weight `w`.
     pub(crate) fn merge(&mut self, pixel: usize, sums: &PixelSums, aov: Option<&PixelAov>, w: f64) {
         if let Some(p) = self.pixels.get_mut(pixel) {
-            self.differences.add(p, sums, w);
+            self.scalars.differences.add(p, sums, w);
             p.merge(sums, w);
         }
         if let (Some(a), Some(b)) = (self.aovs.get_mut(pixel), aov) {
@@ -67,7 +98,8 @@ impl<'m> Film<'m> {
 
     /// Ends the merge of an iteration: all its pixels were added.
     pub(crate) fn end_iteration(&mut self) {
-        self.independence = self.independence.after(&core::mem::take(&mut self.differences));
+        let s = &mut self.scalars;
+        s.independence = s.independence.after(&core::mem::take(&mut s.differences));
     }
 
     /// Estimated error of the picture. The interval is the normal one over the pixels' contributions, which are
@@ -80,7 +112,7 @@ impl<'m> Film<'m> {
         let t = trimmed(n / 10_000, |show| self.pixels.iter().for_each(|p| show(relative_error(p))));
         let m = t.count.max(1) as f64;
         let mean = t.sum / m;
-        let Independence { ratio, noise } = self.independence;
+        let Independence { ratio, noise } = self.scalars.independence;
         let spread = (t.sum_sqr / m - mean * mean).max(0.0) / m;
         let spread = (ratio * ratio * spread + noise * noise * mean * mean).sqrt_newton();
         ErrorEstimate {

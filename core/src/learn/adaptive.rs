@@ -28,8 +28,13 @@ impl<'m> SampleAllocation<'m> {
         m.add::<u32>(if adaptive { BlockGrid::tiles(size).count() } else { 0 })
     }
 
-    pub(super) fn carve(c: &mut Carver<'m>, size: [u32; 2], adaptive: bool) -> Result<Self, MemoryError> {
-        Ok(Self { size, counts: c.take(if adaptive { BlockGrid::tiles(size).count() } else { 0 })?, samples: 1 })
+    pub(super) fn carve(c: &mut Carver<'m>, size: [u32; 2], adaptive: bool, samples: u32) -> Result<Self, MemoryError> {
+        Ok(Self { size, counts: c.take_unset(if adaptive { BlockGrid::tiles(size).count() } else { 0 })?, samples })
+    }
+
+    /// Mean samples per pixel, as the host asked for them.
+    pub(super) fn samples(&self) -> u32 {
+        self.samples
     }
 
     /// Samples of each pixel of a tile.

@@ -6,6 +6,7 @@ use crate::denoise::{self, Planes};
 use crate::film::{Film, REL_MSE_EPSILON};
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::tiles::BlockGrid;
+use bytemuck::{Pod, Zeroable};
 
 /// Storage of the estimates.
 #[derive(Debug)]
@@ -22,10 +23,17 @@ pub(super) struct PixelEstimates<'m> {
     size: [u32; 2],
     relative: bool,
     values: Values<'m>,
-    /// There are estimates.
-    known: bool,
-    /// The estimates are the host's.
-    given: bool,
+    state: EstimateScalars,
+}
+
+/// State of the estimates, apart from their values.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct EstimateScalars {
+    /// Not 0: there are estimates.
+    known: u32,
+    /// Not 0: the estimates are the host's.
+    given: u32,
 }
 
 impl<'m> PixelEstimates<'m> {
@@ -45,32 +53,45 @@ impl<'m> PixelEstimates<'m> {
         features: bool,
         how: Option<PixelEstimator>,
         learning: &Learning,
+        state: EstimateScalars,
     ) -> Result<Self, MemoryError> {
         let values = match how {
             None => Values::None,
             Some(PixelEstimator::Denoised) => {
-                let memory = c.take(Planes::len(size, features))?;
+                let memory = c.take_unset(Planes::len(size, features))?;
                 let given = memory.len();
                 let planes = Planes::carve(size, features, memory)
                     .map_err(|e| MemoryError::TooSmall { needed: e.needed, given })?;
-                Values::Denoised { planes, scratch: c.take(denoise::scratch_len(size))? }
+                Values::Denoised { planes, scratch: c.take_unset(denoise::scratch_len(size))? }
             }
             Some(PixelEstimator::Blocks) => {
                 let tiles = BlockGrid::tiles(size).count();
-                Values::Blocks([c.take(tiles)?, c.take(tiles)?, c.take(tiles)?])
+                Values::Blocks([c.take_unset(tiles)?, c.take_unset(tiles)?, c.take_unset(tiles)?])
             }
         };
-        Ok(Self { size, relative: learning.objective == Objective::Relative, values, known: false, given: false })
+        Ok(Self { size, relative: learning.objective == Objective::Relative, values, state })
     }
 
     /// Are there estimates?
     pub(super) fn known(&self) -> bool {
-        self.known
+        self.state.known != 0
+    }
+
+    pub(super) fn scalars(&self) -> EstimateScalars {
+        self.state
+    }
+
+    /// Forgets all estimates.
+    pub(super) fn clear(&mut self) {
+        self.state = EstimateScalars::default();
     }
 
     /// Estimate of a pixel, 0 while unknown.
     #[inline]
     pub(super) fn value(&self, film: u32) -> [f32; 3] {
+        if !self.known() {
+            return [0.0; 3];
+        }
         let (planes, i) = match &self.values {
             Values::None => return [0.0; 3],
             Values::Denoised { planes, .. } => (planes.out.each_ref(), film as usize),
@@ -82,7 +103,7 @@ impl<'m> PixelEstimates<'m> {
     /// Weight of a squared error of a pixel in the error of the picture, per channel.
     #[inline]
     pub(super) fn error_weight(&self, film: u32) -> [f32; 3] {
-        if !self.known || !self.relative {
+        if !self.known() || !self.relative {
             return [1.0; 3];
         }
         self.value(film).map(|x| 1.0 / (x * x + REL_MSE_EPSILON as f32))
@@ -106,7 +127,7 @@ impl<'m> PixelEstimates<'m> {
     /// Estimates as rgb planes, if there is one per pixel.
     pub(super) fn planes(&self) -> Option<[&[f32]; 3]> {
         match &self.values {
-            Values::Denoised { planes, .. } if self.known => Some(planes.out.each_ref().map(|p| &**p)),
+            Values::Denoised { planes, .. } if self.known() => Some(planes.out.each_ref().map(|p| &**p)),
             _ => None,
         }
     }
@@ -122,13 +143,13 @@ impl<'m> PixelEstimates<'m> {
                 *to = if from[c].is_finite() { from[c] } else { 0.0 };
             }
         }
-        (self.known, self.given) = (true, true);
+        self.state = EstimateScalars { known: 1, given: 1 };
         true
     }
 
     /// Estimates the pixels anew from the film, unless the host has given estimates.
     pub(super) fn refresh(&mut self, film: &Film<'_>) {
-        if self.given {
+        if self.state.given != 0 {
             return;
         }
         match &mut self.values {
@@ -154,6 +175,6 @@ impl<'m> PixelEstimates<'m> {
                 }
             }
         }
-        self.known = true;
+        self.state.known = 1;
     }
 }

@@ -1,8 +1,8 @@
 //! The session's side of learning: all learned statistics, frozen while an iteration runs.
 
 use super::adaptive::SampleAllocation;
-use super::cache::{BINS, Cache, NO_BIN, Training, VertexKind8};
-use super::estimate::PixelEstimates;
+use super::cache::{BINS, Cache, CacheScalars, NO_BIN, Training, VertexKind8};
+use super::estimate::{EstimateScalars, PixelEstimates};
 use super::needs::Needs;
 use super::picture::{Picture, PictureStatistics, Visit};
 use super::settings::{Learning, Objective};
@@ -13,6 +13,7 @@ use crate::memory::{Carver, Measure, MemoryError};
 use crate::rrs::{Learned8, Local8, Space};
 use crate::scene::Scene;
 use crate::tiles::BlockGrid;
+use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Bins of path lengths per block of pixels, for statistics over the picture: a block takes the bins of one leaf.
@@ -33,6 +34,36 @@ pub struct LearnedState<'m> {
     needed: bool,
 }
 
+/// All of the learned state but what has a size.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct LearnedScalars {
+    picture: Picture,
+    cache: CacheScalars,
+    estimate: EstimateScalars,
+    /// Mean samples per pixel of the allocation.
+    samples: u32,
+    reserved: u32,
+}
+
+impl LearnedScalars {
+    /// Those of a render that has learned nothing.
+    pub(crate) fn new(scene: &Scene<'_>) -> Self {
+        Self {
+            picture: Picture::default(),
+            cache: CacheScalars::new([scene.info.bounds_min, scene.info.bounds_max]),
+            estimate: EstimateScalars::default(),
+            samples: 1,
+            reserved: 0,
+        }
+    }
+
+    /// Do these belong to a render with such needs?
+    pub(crate) fn fit(&self, needs: &Needs) -> bool {
+        needs.cache.is_none_or(|size| self.cache.fit(size))
+    }
+}
+
 impl<'m> LearnedState<'m> {
     pub(crate) fn measure(m: Measure, needs: &Needs) -> Measure {
         let m = needs.cache.map_or(m, |size| Cache::measure(m, size));
@@ -40,11 +71,11 @@ impl<'m> LearnedState<'m> {
         SampleAllocation::measure(m, needs.size, needs.adaptive)
     }
 
-    pub(crate) fn carve(c: &mut Carver<'m>, needs: &Needs, scene: &Scene<'_>) -> Result<Self, MemoryError> {
+    /// Carves without touching what memory holds: [`Self::forget`] makes it empty, or it is that of the scalars.
+    pub(crate) fn carve(c: &mut Carver<'m>, needs: &Needs, scalars: &LearnedScalars) -> Result<Self, MemoryError> {
         let n = *needs;
-        let info = scene.info;
-        let bounds = [info.bounds_min, info.bounds_max];
-        let mut cache = n.cache.map(|size| Cache::carve(c, size, bounds, n.learning.objective)).transpose()?;
+        let objective = n.learning.objective;
+        let mut cache = n.cache.map(|size| Cache::carve(c, size, objective, &scalars.cache)).transpose()?;
         let mut block = 1;
         if let Some(cache) = cache.as_mut().filter(|_| n.space == Some(Space::Image)) {
             let blocks = |side: u32| BlockGrid::new(n.size, side).count();
@@ -58,11 +89,31 @@ impl<'m> LearnedState<'m> {
             size: n.size,
             cache,
             block,
-            pixels: PixelEstimates::carve(c, n.size, n.features, n.pixels, &n.learning)?,
-            allocation: SampleAllocation::carve(c, n.size, n.adaptive)?,
-            picture: Picture::default(),
+            pixels: PixelEstimates::carve(c, n.size, n.features, n.pixels, &n.learning, scalars.estimate)?,
+            allocation: SampleAllocation::carve(c, n.size, n.adaptive, scalars.samples)?,
+            picture: scalars.picture,
             needed: n.pixels.is_some(),
         })
+    }
+
+    /// Forgets everything learned.
+    pub(crate) fn forget(&mut self) {
+        if let Some(cache) = &mut self.cache {
+            cache.forget();
+        }
+        self.pixels.clear();
+        self.picture = Picture::default();
+    }
+
+    /// The scalars, `fresh` those of a render that has learned nothing.
+    pub(crate) fn scalars(&self, fresh: LearnedScalars) -> LearnedScalars {
+        LearnedScalars {
+            picture: self.picture,
+            cache: self.cache.as_ref().map_or(fresh.cache, Cache::scalars),
+            estimate: self.pixels.scalars(),
+            samples: self.allocation.samples(),
+            reserved: 0,
+        }
     }
 
     /// Cache of statistics over the scene. Statistics over the picture have no tree and cannot be saved.

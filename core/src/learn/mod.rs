@@ -14,6 +14,7 @@ mod needs;
 mod picture;
 mod settings;
 
+pub(crate) use learned_state::LearnedScalars;
 pub use learned_state::LearnedState;
 pub(crate) use needs::Needs;
 pub use picture::PictureStatistics;

@@ -6,6 +6,7 @@ use super::settings::Learning;
 use crate::counters::Counters;
 use crate::film::{PixelSums, trimmed};
 use crate::rrs::Norm;
+use bytemuck::{Pod, Zeroable};
 
 /// Share of the pixels whose variance is left out of the picture's. A single outlier would decide all factors. The
 /// 0.001 % of EARS (section 5.2) leave out no pixel of a small picture: one bright sample made all vertices look
@@ -13,7 +14,8 @@ use crate::rrs::Norm;
 const OUTLIERS: f64 = 1e-3;
 
 /// Variance and cost of the picture per camera sample.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct PictureStatistics {
     /// Mean weighted squared error over the pixels (eq. 34), without the outliers.
     pub variance: f64,
@@ -31,7 +33,8 @@ pub(crate) trait Visit: Fn(&mut dyn FnMut(usize, &PixelSums)) {}
 impl<F: Fn(&mut dyn FnMut(usize, &PixelSums))> Visit for F {}
 
 /// Statistics of the picture, over the iterations.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
 pub(super) struct Picture {
     /// Statistics of the last iteration.
     pub last: PictureStatistics,
@@ -39,14 +42,14 @@ pub(super) struct Picture {
     pub blended: PictureStatistics,
     /// Weight of `blended`: counted cost.
     weight: f64,
-    /// Statistics of the first iteration.
-    first: Option<PictureStatistics>,
+    /// Number of iterations measured.
+    measured: u64,
 }
 
 impl Picture {
     /// Has an iteration been measured?
     pub(super) fn known(&self) -> bool {
-        self.first.is_some()
+        self.measured > 0
     }
 
     /// Mean cost over mean error; 0 while unknown.
@@ -108,7 +111,7 @@ impl Picture {
             limit: s.limit,
         };
         self.last = s;
-        self.first.get_or_insert(s);
+        self.measured = self.measured.saturating_add(1);
     }
 }
 

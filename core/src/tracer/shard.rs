@@ -10,7 +10,7 @@ use crate::learn::cache::Training;
 use crate::memory::{Carver, Layout, Measure, MemoryError};
 use crate::settings::Settings;
 use crate::tiles::TILE_PIXELS;
-use crate::world::{Iteration, World};
+use crate::world::{Identity, World};
 use core::fmt;
 
 /// How much a step may do.
@@ -61,8 +61,8 @@ impl core::error::Error for ShardError {}
 pub struct Shard<'m> {
     pub(super) job: Job,
     index: u32,
-    /// Scene and iteration that the books belong to; iteration 0 is none.
-    joined: (u64, Iteration),
+    /// What the books belong to; iteration 0 is none.
+    joined: Identity,
     pub(super) state: State<'m>,
 }
 
@@ -80,12 +80,7 @@ impl<'m> Shard<'m> {
         }
         let memory = ShardError::Memory;
         let mut c = Carver::new(block, layout).map_err(memory)?;
-        Ok(Self {
-            job: *job,
-            index,
-            joined: (0, Iteration::default()),
-            state: State::carve(&mut c, job).map_err(memory)?,
-        })
+        Ok(Self { job: *job, index, joined: Identity::default(), state: State::carve(&mut c, job).map_err(memory)? })
     }
 
     /// Number of the shard in the plan.
@@ -137,7 +132,7 @@ impl<'m> Shard<'m> {
     }
 
     /// Has the shard finished this iteration of this scene?
-    pub(crate) fn is_done(&self, identity: (u64, Iteration)) -> bool {
+    pub(crate) fn is_done(&self, identity: Identity) -> bool {
         self.joined == identity && self.state.cursor.is_finished() && self.state.ring.waiting() == 0
     }
 

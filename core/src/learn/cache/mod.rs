@@ -36,5 +36,6 @@ pub use bins::{BIN_LIMIT, MAX_VALUE, NO_BIN};
 pub use kind::{VertexKind, VertexKind8};
 pub use save::CacheError;
 pub use shared::Cache;
+pub(super) use shared::CacheScalars;
 pub use size::CacheSize;
 pub use training::Training;

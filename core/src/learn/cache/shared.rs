@@ -5,10 +5,11 @@ use super::bins::{BINS, BinSums, FrozenBin, NO_BIN, freeze_leaf};
 use super::kind::VertexKind8;
 use super::size::CacheSize;
 use super::training::Training;
-use super::tree::{MAX_DEPTH, OctreeNode, ROOTS, Tree, direction_bin};
+use super::tree::{MAX_DEPTH, OctreeNode, ROOTS, Tree, TreeScalars, direction_bin};
 use crate::learn::settings::Objective;
 use crate::memory::{Carver, Layout, Measure, MemoryError};
 use crate::rrs::Local8;
+use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Samples that the surroundings of a cell count for in it.
@@ -38,6 +39,14 @@ impl CacheSize {
     }
 }
 
+/// All of a cache but its tables.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct CacheScalars {
+    subdivisions_refused: u64,
+    tree: TreeScalars,
+}
+
 /// Shared side of the statistics: frozen while shards work, changed between iterations.
 #[derive(Debug)]
 pub struct Cache<'m> {
@@ -52,6 +61,18 @@ pub struct Cache<'m> {
     subdivisions_refused: u64,
     /// Number of leaves of a cache without a tree.
     flat: Option<u32>,
+}
+
+impl CacheScalars {
+    /// Those of an empty cache over the bounds `lo` to `hi`.
+    pub(crate) fn new([lo, hi]: [[f32; 3]; 2]) -> Self {
+        Self { subdivisions_refused: 0, tree: TreeScalars::roots(lo, hi) }
+    }
+
+    /// Are these the scalars of a cache of this size?
+    pub(crate) fn fit(&self, size: CacheSize) -> bool {
+        Tree::fits(&self.tree, size.subdivisions, size.leaves())
+    }
 }
 
 impl<'m> Cache<'m> {
@@ -70,9 +91,12 @@ impl<'m> Cache<'m> {
     ) -> Result<Self, MemoryError> {
         let given = block.len();
         let layout = Self::layout(size).ok_or(MemoryError::TooSmall { needed: usize::MAX, given })?;
-        Self::carve(&mut Carver::new(block, layout)?, size, [lo, hi], objective)
+        let mut cache = Self::carve(&mut Carver::new(block, layout)?, size, objective, &CacheScalars::new([lo, hi]))?;
+        cache.reset();
+        Ok(cache)
     }
 
+    /// Bytes; [`Self::carve`] leaves the tables as they are until [`Self::reset`].
     pub(crate) fn measure(m: Measure, size: CacheSize) -> Measure {
         Tree::measure(m, Tree::nodes_for(size.subdivisions), size.leaves())
             .add::<BinSums>(size.bins())
@@ -83,15 +107,18 @@ impl<'m> Cache<'m> {
     pub(crate) fn carve(
         c: &mut Carver<'m>,
         size: CacheSize,
-        [lo, hi]: [[f32; 3]; 2],
         objective: Objective,
+        scalars: &CacheScalars,
     ) -> Result<Self, MemoryError> {
-        let tree = Tree::carve(c, Tree::nodes_for(size.subdivisions), size.leaves(), lo, hi)?;
+        let tree = Tree::carve(c, Tree::nodes_for(size.subdivisions), size.leaves(), &scalars.tree)?;
         let (sums, frozen) = (c.take_unset(size.bins())?, c.take_unset(size.bins())?);
         let visibility = c.take_unset(size.bins())?;
-        let mut cache = Self { tree, sums, frozen, visibility, size, objective, subdivisions_refused: 0, flat: None };
-        cache.reset();
-        Ok(cache)
+        let subdivisions_refused = scalars.subdivisions_refused;
+        Ok(Self { tree, sums, frozen, visibility, size, objective, subdivisions_refused, flat: None })
+    }
+
+    pub(crate) fn scalars(&self) -> CacheScalars {
+        CacheScalars { subdivisions_refused: self.subdivisions_refused, tree: self.tree.scalars() }
     }
 
     /// Bins of eight vertices, [`NO_BIN`] in inactive lanes. `p`: positions, world space; those outside the bounds
@@ -260,10 +287,16 @@ impl<'m> Cache<'m> {
         }
     }
 
+    /// As [`Self::reset`], refused subdivisions included.
+    pub(crate) fn forget(&mut self) {
+        self.subdivisions_refused = 0;
+        self.reset();
+    }
+
     /// Forgets all statistics and the tree.
     pub fn reset(&mut self) {
-        self.used_mut().fill(BinSums::ZERO);
         self.tree.reset();
+        self.used_mut().fill(BinSums::ZERO);
         self.refresh();
     }
 
@@ -294,7 +327,6 @@ impl<'m> Cache<'m> {
     /// Gives up the tree for the first `leaves` leaves, at most [`CacheSize::leaves`]: the caller numbers the bins.
     pub(crate) fn flatten(&mut self, leaves: u32) {
         self.flat = Some(leaves.min(self.size.leaves()));
-        self.reset();
     }
 
     /// Does the cache have no tree, so that the caller numbers the bins?

@@ -12,6 +12,7 @@
 use super::bins::{BINS, NO_BIN};
 use super::kind::{VertexKind, VertexKind8};
 use crate::memory::{Carver, Measure, MemoryError};
+use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Depth of the deepest leaf.
@@ -40,6 +41,35 @@ pub(super) enum OctreeNode {
     Leaf { number: u32, depth: u32 },
 }
 
+/// All of the octrees but their nodes.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct TreeScalars {
+    used: u32,
+    leaves: u32,
+    /// Smallest corner and edge of the cube.
+    cube: [f32; 4],
+}
+
+impl TreeScalars {
+    /// Octrees that are leaves, over the bounds `lo` to `hi`.
+    pub(super) fn roots(lo: [f32; 3], hi: [f32; 3]) -> Self {
+        Self { used: FIRST_CHILD, leaves: ROOTS, cube: cube(lo, hi) }
+    }
+
+    /// Are these scalars of a tree with room for `nodes` nodes and `max_leaves` leaves?
+    fn fit(&self, nodes: u32, max_leaves: u32) -> bool {
+        let [x, y, z, edge] = self.cube;
+        let groups = self.used.checked_sub(FIRST_CHILD).filter(|n| n % 8 == 0).map(|n| n / 8);
+        groups.and_then(|g| g.checked_mul(7)?.checked_add(ROOTS)) == Some(self.leaves)
+            && self.used <= nodes
+            && self.leaves <= max_leaves
+            && [x, y, z].iter().all(|x| x.is_finite())
+            && edge.is_finite()
+            && edge > 1e-30
+    }
+}
+
 #[derive(Debug)]
 pub(super) struct Tree<'m> {
     nodes: &'m mut [u32],
@@ -59,6 +89,7 @@ impl<'m> Tree<'m> {
         FIRST_CHILD + 8 * subdivisions
     }
 
+    /// Bytes; [`Self::carve`] leaves nodes and grid as they are until [`Self::reset`].
     pub(super) fn measure(m: Measure, nodes: u32, max_leaves: u32) -> Measure {
         m.add::<u32>(nodes as usize).add::<u32>(grid_len(max_leaves))
     }
@@ -67,23 +98,29 @@ impl<'m> Tree<'m> {
         c: &mut Carver<'m>,
         nodes: u32,
         max_leaves: u32,
-        lo: [f32; 3],
-        hi: [f32; 3],
+        scalars: &TreeScalars,
     ) -> Result<Self, MemoryError> {
-        let cube = cube(lo, hi);
+        let TreeScalars { used, leaves, cube } = *scalars;
         let [.., edge] = cube;
-        let mut tree = Self {
+        Ok(Self {
             nodes: c.take_unset(nodes as usize)?,
-            grid: c.take(grid_len(max_leaves))?,
+            grid: c.take_unset(grid_len(max_leaves))?,
             grid_bits: grid_bits(max_leaves),
-            used: 0,
-            leaves: 0,
+            used,
+            leaves,
             max_leaves,
             cube,
             scale: CELLS / edge,
-        };
-        tree.reset();
-        Ok(tree)
+        })
+    }
+
+    pub(super) fn scalars(&self) -> TreeScalars {
+        TreeScalars { used: self.used, leaves: self.leaves, cube: self.cube }
+    }
+
+    /// Are these the scalars of a tree with this room? Whatever nodes there are then, none leads out of memory.
+    pub(super) fn fits(scalars: &TreeScalars, subdivisions: u32, max_leaves: u32) -> bool {
+        scalars.fit(Self::nodes_for(subdivisions), max_leaves)
     }
 
     /// Makes all roots leaves.

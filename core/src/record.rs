@@ -1,0 +1,146 @@
+//! What is left of a session in its block while it is suspended: all its scalars as one record at the head of the block.
+
+use crate::counters::Counters;
+use crate::film::FilmScalars;
+use crate::learn::{LearnedScalars, Needs};
+use crate::scene::Scene;
+use crate::scene::blob::content_hash;
+use crate::settings::Settings;
+use crate::world::Iteration;
+use bytemuck::{Pod, Zeroable};
+use core::fmt::{self, Write};
+
+/// First bytes of a record.
+const MAGIC: u64 = u64::from_le_bytes(*b"CRPSESSN");
+/// State of a block whose session is in use, or was not suspended.
+const OPEN: u64 = 1;
+/// State of a block whose session is suspended.
+const SUSPENDED: u64 = 2;
+
+/// Scalars of a session.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct SessionScalars {
+    /// Content hash of the scene.
+    pub scene: u64,
+    /// Number of restarts.
+    pub epoch: u64,
+    /// Iteration that runs, or the last one.
+    pub iteration: Iteration,
+    /// Counts of the finished iterations.
+    pub counters: Counters,
+    pub film: FilmScalars,
+    pub learned: LearnedScalars,
+    /// Bits of the media that the camera is inside of, in that scene.
+    pub camera_media: u32,
+    /// Not 0 while an iteration runs.
+    pub running: u32,
+}
+
+impl SessionScalars {
+    /// Those of a session that has rendered nothing.
+    pub(crate) fn new(scene: &Scene<'_>, camera_media: u32) -> Self {
+        Self {
+            scene: scene.hash,
+            epoch: 0,
+            iteration: Iteration::default(),
+            counters: Counters::default(),
+            film: FilmScalars::new(),
+            learned: LearnedScalars::new(scene),
+            camera_media,
+            running: 0,
+        }
+    }
+}
+
+/// Head of a session's block. Scalars are those of the last suspension.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct SessionRecord {
+    magic: u64,
+    state: u64,
+    /// [`fingerprint`] of the plan.
+    fingerprint: u64,
+    /// [`content_hash`] of the scalars.
+    hash: u64,
+    scalars: SessionScalars,
+}
+
+/// Reason why a block cannot be resumed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ResumeError {
+    /// The block holds no suspended session: none at all, or one that was dropped without
+    /// [`Session::suspend`](crate::Session::suspend).
+    NotSuspended,
+    /// The session was suspended under another plan, or by another version of this crate.
+    Plan,
+    /// The record is not as it was written.
+    Damaged,
+}
+
+impl fmt::Display for ResumeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NotSuspended => "the block holds no suspended session",
+            Self::Plan => "the session in the block was suspended under another plan",
+            Self::Damaged => "the record of the suspended session is damaged",
+        })
+    }
+}
+
+impl core::error::Error for ResumeError {}
+
+impl SessionRecord {
+    /// Marks the block as one in use.
+    pub(crate) fn open(&mut self) {
+        (self.magic, self.state) = (MAGIC, OPEN);
+    }
+
+    /// Stores a session.
+    pub(crate) fn suspend(&mut self, fingerprint: u64, scalars: &SessionScalars) {
+        let hash = content_hash(bytemuck::bytes_of(scalars));
+        *self = Self { magic: MAGIC, state: SUSPENDED, fingerprint, hash, scalars: *scalars };
+    }
+
+    /// The scalars of the suspended session of a plan with this fingerprint and these needs.
+    pub(crate) fn scalars(&self, fingerprint: u64, needs: &Needs) -> Result<SessionScalars, ResumeError> {
+        if self.magic != MAGIC || self.state != SUSPENDED {
+            return Err(ResumeError::NotSuspended);
+        }
+        if self.fingerprint != fingerprint {
+            return Err(ResumeError::Plan);
+        }
+        let s = self.scalars;
+        if self.hash != content_hash(bytemuck::bytes_of(&s)) || !s.learned.fit(needs) {
+            return Err(ResumeError::Damaged);
+        }
+        Ok(s)
+    }
+}
+
+/// Hash of what the layout and the meaning of a block depend on: the settings, the version of this crate, the size of
+/// an address.
+pub(crate) fn fingerprint(settings: &Settings) -> u64 {
+    let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
+    // nothing here fails
+    let _ = write!(hash, "{} {}", env!("CARGO_PKG_VERSION"), size_of::<usize>());
+    for setting in Settings::TABLE {
+        if let Some(value) = settings.value(setting.name) {
+            let _ = write!(hash, " {}={value}", setting.name);
+        }
+    }
+    hash.0
+}
+
+/// 64-bit FNV-1a of a text.
+struct Fnv(u64);
+
+impl Write for Fnv {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        for b in text.bytes() {
+            self.0 = (self.0 ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+        Ok(())
+    }
+}

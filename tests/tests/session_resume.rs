@@ -1,0 +1,214 @@
+//! Sessions that are suspended in their block, resumed, and restarted.
+
+use croupier::unstable::learn::Learning;
+use croupier::unstable::scene::blob::content_hash;
+use croupier::unstable::{ResumeError, World};
+use croupier::{Budget, Plan, Scene, Session, SessionError, Settings, Shard};
+use croupier_host::blob::AlignedBytes;
+use croupier_tests::runner::{finish, settings};
+use croupier_tests::scenes::*;
+use croupier_tests::stats::SplitMix;
+
+/// Strategies and settings with all kinds of statistics, on a small picture.
+fn cases(bytes: &[u8]) -> Vec<Settings> {
+    let learning = Learning { cache_bytes: 1 << 20, subdivide_count: 300.0, ..Learning::default() };
+    let of = |strategy: &str, aovs: bool, adaptive: bool| Settings {
+        aovs,
+        adaptive,
+        learning,
+        shards: 2,
+        ..settings(bytes, strategy)
+    };
+    vec![of("classic", false, false), of("ears", true, false), of("ears", true, true), of("bolin-meyer", false, true)]
+}
+
+fn memory(bytes: usize) -> AlignedBytes {
+    let mut block = AlignedBytes::zeroed(bytes);
+    block.as_mut().fill(0xff);
+    block
+}
+
+/// Film, auxiliary sums, counters and saved statistics.
+fn everything(session: &Session<'_, '_>) -> Vec<u8> {
+    let film = session.film();
+    let mut all = format!("{:?} {:?}", session.counters(), film.error_estimate()).into_bytes();
+    all.extend_from_slice(bytemuck::cast_slice(film.pixels()));
+    all.extend_from_slice(bytemuck::cast_slice(film.aovs()));
+    if let Some(cache) = session.cache() {
+        let mut saved = vec![0; cache.saved_len()];
+        cache.save(&mut saved).unwrap();
+        all.extend(saved);
+    }
+    all
+}
+
+const ITERATIONS: [u32; 4] = [4, 8, 3, 8];
+
+/// Renders all iterations.
+fn render(session: &mut Session<'_, '_>, shards: &mut [Shard<'_>]) {
+    for samples in ITERATIONS {
+        session.begin_iteration(samples);
+        shards.iter_mut().for_each(|s| finish(session, s, 1 << 20));
+        session.end_iteration(&*shards).unwrap();
+    }
+}
+
+fn shards<'m>(plan: &Plan, blocks: &'m mut [AlignedBytes]) -> Vec<Shard<'m>> {
+    blocks.iter_mut().enumerate().map(|(i, b)| Shard::new(plan, i as u32, b.as_mut()).unwrap()).collect()
+}
+
+fn blocks(plan: &Plan) -> Vec<AlignedBytes> {
+    (0..plan.settings().shards).map(|_| memory(plan.shard().size)).collect()
+}
+
+/// Killed by: a scalar that is not stored, memory that `resume` clears, a flag that is lost.
+#[test]
+fn a_session_goes_on_where_it_was_suspended() {
+    let bytes = blob(&cornell([20, 12]));
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    for s in cases(&bytes) {
+        let plan = Plan::new(&s).unwrap();
+        let (mut block, mut own) = (memory(plan.session().size), blocks(&plan));
+        let mut session = Session::new(scene, &plan, block.as_mut()).unwrap();
+        render(&mut session, &mut shards(&plan, &mut own));
+        let clean = everything(&session);
+
+        // the block changes places every time
+        let (mut block, mut own) = (memory(plan.session().size), blocks(&plan));
+        let mut shards = shards(&plan, &mut own);
+        Session::new(scene, &plan, block.as_mut()).unwrap().suspend();
+        let mut moved = |work: &mut dyn FnMut(&mut Session<'_, '_>)| {
+            let mut other = memory(plan.session().size);
+            other.as_mut().copy_from_slice(block.as_ref());
+            block = other;
+            let mut session = Session::resume(scene, &plan, block.as_mut()).unwrap();
+            work(&mut session);
+            session.suspend();
+        };
+        for samples in ITERATIONS {
+            moved(&mut |session| session.begin_iteration(samples));
+            moved(&mut |session| {
+                shards.iter_mut().for_each(|s| {
+                    s.step(session, Budget { rays: 500 });
+                });
+            });
+            moved(&mut |session| shards.iter_mut().for_each(|s| finish(session, s, 1 << 20)));
+            moved(&mut |session| session.end_iteration(&shards).unwrap());
+        }
+        let mut found = Vec::new();
+        moved(&mut |session| found = everything(session));
+        assert!(found == clean, "{}", s.strategy);
+    }
+}
+
+/// Killed by: statistics, samples or numbers of before that stay, shards whose sums of before are taken.
+#[test]
+fn a_restarted_session_renders_what_a_new_one_does() {
+    let bytes = blob(&cornell([20, 12]));
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    for s in cases(&bytes) {
+        let plan = Plan::new(&s).unwrap();
+        let (mut block, mut own) = (memory(plan.session().size), blocks(&plan));
+        let mut shards = shards(&plan, &mut own);
+        let mut session = Session::new(scene, &plan, block.as_mut()).unwrap();
+        render(&mut session, &mut shards);
+        let clean = everything(&session);
+        let before = session.identity();
+        // between iterations, and while one runs
+        for part in [0, 1, 2] {
+            if part > 0 {
+                session.begin_iteration(8);
+                shards.iter_mut().take(part).for_each(|s| finish(&session, s, 1 << 20));
+            }
+            session.restart(false);
+            assert_ne!(session.identity().epoch, before.epoch);
+            assert_eq!(session.end_iteration(&shards), Err(SessionError::NoIteration));
+            // the same numbers again: the sums of before are those of another epoch
+            session.begin_iteration(ITERATIONS[3]);
+            assert_eq!(session.end_iteration(&shards), Err(SessionError::Unfinished { shard: 0 }));
+            session.restart(false);
+            render(&mut session, &mut shards);
+            assert!(everything(&session) == clean, "{}, part {part}", s.strategy);
+        }
+        // with its statistics it renders something else, if it has any, with as many samples
+        session.restart(true);
+        let kept = session.cache().map(|c| c.leaves());
+        assert!(kept.is_none_or(|leaves| leaves > 6));
+        render(&mut session, &mut shards);
+        assert_eq!(everything(&session) == clean, s.strategy.name() == "classic", "{}", s.strategy);
+    }
+}
+
+/// Killed by: a block that is resumed twice or was never suspended, settings that are left out of the fingerprint, a
+/// record that is taken although a bit of it has changed.
+#[test]
+fn other_blocks_are_refused() {
+    let bytes = blob(&cornell([20, 12]));
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    let s = cases(&bytes)[1];
+    let plan = Plan::new(&s).unwrap();
+    let mut block = memory(plan.session().size);
+    let resume =
+        |plan: &Plan, block: &mut AlignedBytes| Session::resume(scene, plan, block.as_mut()).map(Session::suspend);
+    let refused = |e| Err(SessionError::Resume(e));
+    assert_eq!(resume(&plan, &mut block), refused(ResumeError::NotSuspended));
+    drop(Session::new(scene, &plan, block.as_mut()).unwrap());
+    assert_eq!(resume(&plan, &mut block), refused(ResumeError::NotSuspended));
+    Session::new(scene, &plan, block.as_mut()).unwrap().suspend();
+    for other in [Settings { seed: 1, ..s }, Settings { split_budget: 7, ..s }, Settings { max_depth: 3, ..s }] {
+        assert_eq!(resume(&Plan::new(&other).unwrap(), &mut block), refused(ResumeError::Plan));
+    }
+    assert_eq!(resume(&plan, &mut block), Ok(()));
+    for byte in [40, 80, 200, 500] {
+        block.as_mut()[byte] ^= 4;
+        assert_eq!(resume(&plan, &mut block), refused(ResumeError::Damaged), "byte {byte}");
+        block.as_mut()[byte] ^= 4;
+    }
+    assert_eq!(resume(&plan, &mut block), Ok(()));
+    drop(Session::resume(scene, &plan, block.as_mut()).unwrap());
+    assert_eq!(resume(&plan, &mut block), refused(ResumeError::NotSuspended));
+}
+
+/// Scalars that nobody wrote, with a hash that fits: refused or harmless. Killed by: a counter from memory that is used
+/// as an index, a sum of counters that overflows before it is checked.
+#[test]
+fn made_up_records_do_no_harm() {
+    let bytes = blob(&cornell([20, 12]));
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    let mut rng = SplitMix(5);
+    let (mut taken, mut refused) = (0, 0);
+    for s in cases(&bytes) {
+        let plan = Plan::new(&s).unwrap();
+        let mut block = memory(plan.session().size);
+        Session::new(scene, &plan, block.as_mut()).unwrap().suspend();
+        // magic, state, fingerprint, hash, scalars
+        let words = (0..200).find(|&n| {
+            let b = block.as_ref();
+            content_hash(&b[32..32 + 8 * n]) == u64::from_le_bytes(b[24..32].try_into().unwrap())
+        });
+        let words = words.expect("the hash is that of the scalars");
+        for round in 0..200 {
+            let mut block = memory(plan.session().size);
+            Session::new(scene, &plan, block.as_mut()).unwrap().suspend();
+            let b = block.as_mut();
+            for _ in 0..=round % 4 {
+                let at = 32 + 4 * (rng.bits() as usize % (2 * words));
+                let value = [rng.bits() as u32, u32::MAX, 0, 1 << 31, 7][rng.bits() as usize % 5];
+                b[at..at + 4].copy_from_slice(&value.to_le_bytes());
+            }
+            let hash = content_hash(&b[32..32 + 8 * words]);
+            b[24..32].copy_from_slice(&hash.to_le_bytes());
+            let Ok(mut session) = Session::resume(scene, &plan, block.as_mut()) else {
+                refused += 1;
+                continue;
+            };
+            taken += 1;
+            let mut own = blocks(&plan);
+            let mut shards = shards(&plan, &mut own);
+            session.begin_iteration(1);
+            shards.iter_mut().for_each(|s| finish(&session, s, 1 << 20));
+            session.end_iteration(&shards).unwrap();
+        }
+    }
+    assert!(taken > 100 && refused > 20, "{taken} taken, {refused} refused");
+}
