@@ -3,7 +3,7 @@
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::description::*;
 use croupier_host::image::Picture;
-use croupier_host::load::{LoadReport, load};
+use croupier_host::load::{LoadOptions, LoadReport, load, load_with};
 use croupier_tests::stats::SplitMix;
 use std::fs;
 use std::path::Path;
@@ -294,7 +294,7 @@ fn scene_json_is_read_whole() {
         {"type": "envmap", "file": "e.exr", "scale": 2.5,
          "to_world": [[0, 0, 1, 9], [0, 1, 0, 9], [-1, 0, 0, 9], [0, 0, 0, 1]]}]"#;
     let folder = folder(&[("scene.json", &scene_json(M, rest)), ("a.obj", TRIANGLE)]);
-    let texel = |x: usize, y: usize| (x as f32, y as f32, if x == 1 { -1.0f32 } else { f32::NAN });
+    let texel = |x: usize, y: usize| (x as f32, y as f32, [f32::NAN, -1.0, f32::INFINITY][x]);
     exr::prelude::write_rgb_file(folder.path().join("e.exr"), 3, 2, texel).unwrap();
     let (scene, report) = load(folder.path()).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(scene.max_depth, 7);
@@ -312,7 +312,10 @@ fn scene_json_is_read_whole() {
     let to_world = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]];
     let map = Environment::Map { width: 3, height: 2, texels, scale: [2.5; 3], to_world };
     assert_eq!(scene.environment, Some(map));
-    assert!(report.notes.iter().any(|n| n.contains("e.exr") && n.contains("6 negative or NaN")), "{report:?}");
+    assert!(
+        report.notes.iter().any(|n| n.contains("e.exr") && n.contains("6 negative, NaN or infinite")),
+        "{report:?}"
+    );
     assert_eq!(report.files.len(), 3);
 }
 
@@ -372,7 +375,7 @@ fn every_wrong_input_is_told_where() {
         (obj_after("f 99999999999999999999 2 3"), "a.obj", &["a.obj:9", "is not a corner"]),
         (obj_after("f /1 2 3"), "a.obj", &["a.obj:9", "`/1` has no vertex"]),
         (obj_after("usemtl paint\nf 1 2 3"), "a.obj", &["a.obj:10", "material `paint`", "no material library"]),
-        (obj("mtllib b.mtl\n"), "a.obj", &["cannot read", "b.mtl", "a.obj:1 names"]),
+        (obj("mtllib b.mtl\nv 0 0 0\nf 1 1 1\n"), "a.obj", &["cannot read", "b.mtl", "a.obj:1 names"]),
         (mtl("newmtl m\nKd 1 1\n"), "a.obj", &["a.mtl:2", "`Kd` needs 1 or 3 numbers"]),
         (mtl("newmtl m\nKd spectral a.rfl\n"), "a.obj", &["a.mtl:2", "`spectral` is not a finite number"]),
         (mtl("newmtl m\nKe nan 0 0\n"), "a.obj", &["a.mtl:2", "`nan` is not a finite number"]),
@@ -448,7 +451,8 @@ fn every_wrong_input_is_told_where() {
     for (files, path, parts) in cases {
         let files: Vec<(&str, &str)> = files.iter().map(|(n, t)| (*n, t.as_str())).collect();
         let folder = folder(&files);
-        let error = load(&folder.path().join(path)).err();
+        let strict = LoadOptions { strict: true, ..LoadOptions::default() };
+        let error = load_with(&folder.path().join(path), &strict).err();
         let text = error.unwrap_or_else(|| panic!("{parts:?} was loaded")).to_string();
         for part in parts {
             assert!(text.contains(part), "`{text}` lacks `{part}`");

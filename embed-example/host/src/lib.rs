@@ -13,6 +13,7 @@
 //! | [`statistics`] | figures of a render as tables | files |
 //! | [`image`], [`tonemap`], [`false_color`] | EXR and PNG | scenes |
 //! | [`compare`], [`flip`] | how far two pictures differ | scenes |
+//! | [`text`] | quoted input, numbers and sizes in messages | scenes |
 
 pub mod alias;
 pub mod bake;
@@ -33,4 +34,5 @@ pub mod microfacet;
 pub mod render;
 pub mod renderer;
 pub mod statistics;
+pub mod text;
 pub mod tonemap;

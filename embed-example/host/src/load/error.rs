@@ -1,5 +1,6 @@
 //! Errors of loading.
 
+use crate::text::{self, excerpt};
 use std::path::{Path, PathBuf};
 use std::{error, fmt, io};
 
@@ -20,6 +21,20 @@ pub enum LoadError {
     Unknown {
         /// File.
         path: PathBuf,
+    },
+    /// A file of another kind than its place calls for.
+    Format {
+        /// File.
+        path: PathBuf,
+        /// Fault, in words.
+        what: String,
+    },
+    /// A scene without triangles.
+    Empty {
+        /// File.
+        path: PathBuf,
+        /// What is there instead, in words.
+        what: String,
     },
     /// A line of a text file.
     Line {
@@ -86,20 +101,22 @@ impl LoadError {
 impl fmt::Display for LoadError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Read { path, referrer: None, source } => write!(f, "cannot read {}: {source}", path.display()),
+            Self::Read { path, referrer: None, source } => write!(f, "cannot read {}: {source}", text::path(path)),
             Self::Read { path, referrer: Some(by), source } => {
-                write!(f, "cannot read {}, which {by} names: {source}", path.display())
+                write!(f, "cannot read {}, which {by} names: {source}", text::path(path))
             }
             Self::Unknown { path } => {
-                write!(f, "{} is neither a folder with a scene.json nor an .obj file", path.display())
+                write!(f, "{} is neither a folder with a scene.json nor an .obj file", text::path(path))
             }
-            Self::Line { path, line, what } => write!(f, "{}:{line}: {what}", path.display()),
-            Self::Json { path, at, what } => write!(f, "{}: {at}: {what}", path.display()),
+            Self::Format { path, what } => write!(f, "cannot use {}: {what}", text::path(path)),
+            Self::Empty { path, what } => write!(f, "{} is no scene, it has no triangles: {what}", text::path(path)),
+            Self::Line { path, line, what } => write!(f, "{}:{line}: {what}", text::path(path)),
+            Self::Json { path, at, what } => write!(f, "{}: {}: {what}", text::path(path), excerpt(at)),
             Self::Image { path, referrer, what } => {
-                write!(f, "cannot use the image {}, which {referrer} names: {what}", path.display())
+                write!(f, "cannot use the image {}, which {referrer} names: {what}", text::path(path))
             }
             Self::Grid { path, referrer, what } => {
-                write!(f, "cannot use the densities {}, which {referrer} names: {what}", path.display())
+                write!(f, "cannot use the densities {}, which {referrer} names: {what}", text::path(path))
             }
         }
     }

@@ -1,7 +1,11 @@
-//! Decoders: PNG and JPEG textures, EXR environment maps. Errors are texts; the caller knows the file.
+//! Decoders: PNG and JPEG textures, EXR environment maps. Errors are texts; the caller knows the file. What decoding
+//! takes is known from a header, and compared with the memory that is `free`, before anything of that size is allocated.
 
 use crate::description::{Environment, Texture};
 use crate::image::{Picture, Rgb};
+use crate::text;
+use exr::meta::MetaData;
+use exr::meta::attribute::SampleType;
 use png::{BitDepth, ColorType, Transformations};
 use std::io::Cursor;
 use zune_jpeg::JpegDecoder;
@@ -9,21 +13,55 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-/// Bytes that a decoded texture may need: the largest that the scene blob can hold.
-const LARGEST: usize = 4 << 30;
+/// A texture, and what of its file was ignored.
+pub(super) struct Decoded {
+    pub texture: Texture,
+    pub ignored: Option<&'static str>,
+}
 
 /// A PNG or JPEG as 8-bit RGBA: its first bytes tell which, names of files are often wrong.
-pub(super) fn texture(bytes: &[u8]) -> Result<Texture, String> {
-    if bytes.starts_with(&[0xff, 0xd8]) { jpeg(bytes) } else { png(bytes) }
+pub(super) fn texture(bytes: &[u8], free: u64) -> Result<Decoded, String> {
+    if bytes.starts_with(&[0xff, 0xd8]) {
+        jpeg(bytes, free)
+    } else {
+        png(bytes, free).map(|texture| Decoded { texture, ignored: None })
+    }
+}
+
+/// Fails unless an image whose decoding takes `bytes_per_pixel` fits.
+fn fits(width: u64, height: u64, bytes_per_pixel: u64, free: u64) -> Result<(), String> {
+    match width.checked_mul(height).and_then(|n| n.checked_mul(bytes_per_pixel)) {
+        Some(n) if n <= free => Ok(()),
+        n => {
+            let needed = n.map_or("more than 16 EiB".into(), text::bytes);
+            let free = text::bytes(free);
+            Err(format!("{width} x {height} pixels take {needed} to decode, {free} of the texture memory are free"))
+        }
+    }
+}
+
+/// Zeros, or an error where there is no memory for them.
+fn zeros(n: usize) -> Result<Vec<u8>, String> {
+    let mut data = Vec::new();
+    data.try_reserve_exact(n).map_err(|_| format!("no memory for {}", text::bytes(n as u64)))?;
+    data.resize(n, 0);
+    Ok(data)
 }
 
 /// Any PNG as 8-bit RGBA: palettes and few-bit greys are expanded, 16-bit values rounded, sRGB is assumed.
-fn png(bytes: &[u8]) -> Result<Texture, String> {
-    let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), png::Limits { bytes: LARGEST });
+fn png(bytes: &[u8], free: u64) -> Result<Texture, String> {
+    // The decoder's own buffers, of rows and text chunks.
+    let limits = png::Limits { bytes: usize::try_from(free).unwrap_or(usize::MAX) };
+    let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), limits);
     decoder.set_transformations(Transformations::EXPAND);
     let mut reader = decoder.read_info().map_err(|e| format!("not a readable PNG or JPEG: {e}"))?;
-    let size = reader.output_buffer_size().filter(|n| *n <= LARGEST).ok_or("too large")?;
-    let mut data = vec![0; size];
+    let (width, height) = reader.info().size();
+    let (color, depth) = reader.output_color_type();
+    // as decoded, reduced to 8 bits, as texels
+    let samples = color.samples() as u64;
+    let reduced = if depth == BitDepth::Sixteen { 3 * samples } else { samples };
+    fits(width.into(), height.into(), reduced + 4, free)?;
+    let mut data = zeros(reader.output_buffer_size().ok_or("too large")?)?;
     let info = reader.next_frame(&mut data).map_err(|e| format!("not a readable PNG: {e}"))?;
     data.truncate(info.buffer_size());
     if info.bit_depth == BitDepth::Sixteen {
@@ -40,29 +78,69 @@ fn png(bytes: &[u8]) -> Result<Texture, String> {
     Ok(Texture { name: String::new(), width: info.width, height: info.height, texels })
 }
 
+/// Bytes a pixel that the JPEG decoder takes: RGBA twice, coefficients of up to four channels of a progressive file,
+/// rounded up to whole blocks.
+const JPEG_BYTES: u64 = 2 * 4 + 4 * 2;
+
 /// Any JPEG of 8 bits a channel, up to 16384 pixels a side; grey, RGB, YCbCr or CMYK, sRGB is assumed. Files that end
 /// early are refused (strict mode), which would fill up with grey; if only their last bytes are missing that may go
-/// unnoticed.
-fn jpeg(bytes: &[u8]) -> Result<Texture, String> {
+/// unnoticed. Bytes behind the end of the picture (cameras' previews, downloads' padding) are ignored.
+fn jpeg(bytes: &[u8], free: u64) -> Result<Decoded, String> {
+    let unreadable = |e: &dyn std::fmt::Display| format!("not a readable JPEG: {e}");
     let options = DecoderOptions::default().jpeg_set_out_colorspace(ColorSpace::RGBA).set_strict_mode(true);
-    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
-    let data = decoder.decode().map_err(|e| format!("not a readable JPEG: {e}"))?;
-    let size = decoder.info().map_or([0; 2], |i| [i.width, i.height]);
+    let end = jpeg_end(bytes).unwrap_or(bytes.len());
+    let picture = bytes.get(..end).unwrap_or(bytes);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(picture), options);
+    decoder.decode_headers().map_err(|e| unreadable(&e))?;
+    let [width, height] = decoder.info().map_or([0; 2], |i| [i.width, i.height]);
+    fits(width.into(), height.into(), JPEG_BYTES, free)?;
+    let mut data = zeros(decoder.output_buffer_size().ok_or("too large")?)?;
+    decoder.decode_into(&mut data).map_err(|e| unreadable(&e))?;
     let texels: Vec<[u8; 4]> = data.as_chunks().0.to_vec();
-    if texels.is_empty() || texels.len() != usize::from(size[0]) * usize::from(size[1]) {
-        return Err(format!("a JPEG of {} texels for {} x {} pixels", texels.len(), size[0], size[1]));
+    if texels.is_empty() || texels.len() != usize::from(width) * usize::from(height) {
+        return Err(format!("a JPEG of {} texels for {width} x {height} pixels", texels.len()));
     }
-    Ok(Texture { name: String::new(), width: size[0].into(), height: size[1].into(), texels })
+    let texture = Texture { name: String::new(), width: width.into(), height: height.into(), texels };
+    let ignored = (end < bytes.len()).then_some("there are bytes behind the end of the JPEG");
+    Ok(Decoded { texture, ignored })
 }
 
-/// The RGB picture of an EXR as an unscaled, unrotated environment map, and how many negative or NaN numbers (filters
-/// leave them behind) became 0.
-pub(super) fn exr(bytes: &[u8]) -> Result<(Environment, usize), String> {
-    let picture = Picture::decode_exr(Cursor::new(bytes)).map_err(|e| format!("not a readable EXR: {e}"))?;
+/// Length of a JPEG up to the end of its picture, if that is there: segments have a length, the coded data behind a
+/// start of scan ends at the first marker that is no restart (ITU T.81, annex B).
+fn jpeg_end(bytes: &[u8]) -> Option<usize> {
+    let mut at = 2;
+    loop {
+        // the next marker: coded data may precede it, where a 0xff is followed by 0
+        while *bytes.get(at)? != 0xff || matches!(*bytes.get(at + 1)?, 0 | 0xff | 0xd0..=0xd7) {
+            at += 1;
+        }
+        match *bytes.get(at + 1)? {
+            0xd9 => return Some(at + 2),
+            // without a length
+            0x01 | 0xd8 => at += 2,
+            _ => at += 2 + usize::from(u16::from_be_bytes([*bytes.get(at + 2)?, *bytes.get(at + 3)?])),
+        }
+    }
+}
+
+/// The RGB picture of an EXR as an unscaled, unrotated environment map, and how many negative, NaN or infinite numbers
+/// (filters and overflows leave them behind) became 0.
+pub(super) fn exr(bytes: &[u8], free: u64) -> Result<(Environment, usize), String> {
+    let unreadable = |e: &dyn std::fmt::Display| format!("not a readable EXR: {e}");
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| unreadable(&e))?;
+    for header in &meta.headers {
+        let channels = &header.channels.list;
+        // as decoded, as 32-bit planes of a picture, three of them as pixels
+        let size = |t: SampleType| if t == SampleType::F16 { 2 } else { 4 };
+        let each: u64 = channels.iter().map(|c| size(c.sample_type) + 4).sum();
+        let share = free / meta.headers.len().max(1) as u64;
+        fits(header.layer_size.x() as u64, header.layer_size.y() as u64, each + 12, share)?;
+    }
+    let picture = Picture::decode_exr(Cursor::new(bytes)).map_err(|e| unreadable(&e))?;
     let Rgb { width, height, pixels: mut texels } = picture.main().ok_or("no layer with channels R, G and B")?;
     let mut clamped = 0;
     for x in texels.iter_mut().flatten() {
-        if x.is_nan() || *x < 0.0 {
+        if !x.is_finite() || *x < 0.0 {
             *x = 0.0;
             clamped += 1;
         }

@@ -1,6 +1,7 @@
 //! JSON values with their paths, so that every message can name them.
 
 use super::LoadError;
+use crate::text::{self, excerpt};
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -18,7 +19,7 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<Value, LoadError> {
     serde_json::from_str(text).map_err(|e| LoadError::Json {
         path: file.into(),
         at: format!("line {} column {}", e.line(), e.column()),
-        what: "not JSON: ".to_string() + e.to_string().split(" at line ").next().unwrap_or_default(),
+        what: "not JSON: ".to_string() + &excerpt(e.to_string().split(" at line ").next().unwrap_or_default()),
     })
 }
 
@@ -34,7 +35,7 @@ impl<'v> Place<'v> {
 
     /// File and value, for messages about what it names.
     pub(crate) fn referrer(&self) -> String {
-        format!("{} ({})", self.file.display(), self.at)
+        format!("{} ({})", text::path(self.file), excerpt(&self.at))
     }
 
     fn child(&self, at: String, value: &'v Value) -> Self {

@@ -1,18 +1,41 @@
 //! What the files of one scene share while it is loaded.
 
 use super::error::LoadError;
-use super::images;
+use super::{files, images};
 use crate::description::{Environment, SceneDescription, Texture};
+use crate::text;
 use std::collections::HashMap;
-use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
+
+/// Options of loading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LoadOptions {
+    /// Refuse what is otherwise replaced with a note: files that are missing or of another case, materials and colours
+    /// that are unknown, faces with some texture coordinates or normals only, bytes behind the end of an image.
+    pub strict: bool,
+    /// Most bytes that decoded textures and environment maps may take in all while they are decoded: 4 a texel of a
+    /// texture, 12 of an environment map, and what the decoder takes for the one under way. Known from their headers.
+    pub texture_memory: u64,
+}
+
+impl LoadOptions {
+    /// Default of [`Self::texture_memory`]: 2 GiB.
+    pub const TEXTURE_MEMORY: u64 = 2 << 30;
+}
+
+impl Default for LoadOptions {
+    fn default() -> Self {
+        Self { strict: false, texture_memory: Self::TEXTURE_MEMORY }
+    }
+}
 
 /// Report of loading, besides the scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LoadReport {
     /// Files read.
     pub files: Vec<PathBuf>,
-    /// Faces of more than three corners, split into fans.
+    /// Faces of more than three corners, split into triangles.
     pub polygons: u32,
     /// Points and lines, left out.
     pub skipped_elements: u32,
@@ -23,58 +46,132 @@ pub struct LoadReport {
 /// State that the files of one scene share.
 #[derive(Default)]
 pub(super) struct Loader {
+    pub(super) options: LoadOptions,
     pub(super) report: LoadReport,
-    /// Textures by path: a file that several materials use is decoded once.
-    textures: HashMap<PathBuf, u32>,
+    /// Textures by path: a file that several materials use is decoded once. `None`: it is missing.
+    textures: HashMap<PathBuf, Option<u32>>,
+    /// Bytes of decoded images so far.
+    decoded: u64,
 }
 
 impl Loader {
-    /// Reads a whole file; `referrer` is the place that names it.
-    pub(super) fn read(&mut self, path: &Path, referrer: Option<&str>) -> Result<Vec<u8>, LoadError> {
-        let bytes = fs::read(path).map_err(|source| LoadError::Read {
-            path: path.into(),
-            referrer: referrer.map(Into::into),
+    pub(super) fn new(options: LoadOptions) -> Self {
+        Self { options, ..Self::default() }
+    }
+
+    /// Reads a whole file; `referrer` is the place that names it. If it is not there, one is taken that differs in case
+    /// only, with a note. Second: the path that was read.
+    pub(super) fn read_near(&mut self, path: &Path, referrer: &str) -> Result<(Vec<u8>, PathBuf), LoadError> {
+        let error = match files::read(path) {
+            Ok(bytes) => return Ok((self.record(path, bytes), path.into())),
+            Err(source) => LoadError::Read { path: path.into(), referrer: Some(referrer.into()), source },
+        };
+        if !error.is_missing() {
+            return Err(error);
+        }
+        // a file is named relative to the one that names it, so that its name alone is searched for there as well
+        let beside = path.parent().unwrap_or(Path::new(""));
+        let Some(found) = files::nearest(path, beside) else { return Err(error) };
+        self.replace(error, &format!("{} was taken", text::path(&found)))?;
+        let bytes = files::read(&found).map_err(|source| LoadError::Read {
+            path: found.clone(),
+            referrer: Some(referrer.into()),
             source,
         })?;
-        self.report.files.push(path.into());
-        Ok(bytes)
+        Ok((self.record(&found, bytes), found))
     }
 
-    /// As [`Loader::read`]; bytes that are not UTF-8 (old exporters' comments) become replacement characters.
+    /// Reads a whole file; `referrer` is the place that names it.
+    pub(super) fn read(&mut self, path: &Path, referrer: Option<&str>) -> Result<Vec<u8>, LoadError> {
+        if let Some(referrer) = referrer {
+            return self.read_near(path, referrer).map(|(bytes, _)| bytes);
+        }
+        let failed = |source| LoadError::Read { path: path.into(), referrer: None, source };
+        files::read(path).map_err(failed).map(|bytes| self.record(path, bytes))
+    }
+
+    fn record(&mut self, path: &Path, bytes: Vec<u8>) -> Vec<u8> {
+        self.report.files.push(path.into());
+        bytes
+    }
+
+    /// As [`Loader::read`], for text: without byte order mark; bytes that are not UTF-8 (old exporters' comments) become
+    /// replacement characters; what is no text is refused.
     pub(super) fn read_text(&mut self, path: &Path, referrer: Option<&str>) -> Result<String, LoadError> {
         let bytes = self.read(path, referrer)?;
-        Ok(String::from_utf8(bytes).unwrap_or_else(|e| String::from_utf8_lossy(e.as_bytes()).into_owned()))
+        files::text(bytes).map_err(|what| LoadError::Format { path: path.into(), what })
     }
 
-    /// Index of the texture in `path`, decoded at its first use.
+    /// Index of the texture in `path`, decoded at its first use. If there is none, not even in another case: `None`, and
+    /// a note that says that grey is taken.
     pub(super) fn texture(
         &mut self,
         scene: &mut SceneDescription,
         path: &Path,
         referrer: &str,
-    ) -> Result<u32, LoadError> {
+    ) -> Result<Option<u32>, LoadError> {
         if let Some(index) = self.textures.get(path) {
             return Ok(*index);
         }
-        let bytes = self.read(path, Some(referrer))?;
-        let image = images::texture(&bytes).map_err(|what| LoadError::image(path, referrer, what))?;
+        let (bytes, found) = match self.read_near(path, referrer) {
+            Err(e) if e.is_missing() => {
+                self.replace(e, "the material is without it")?;
+                self.textures.insert(path.into(), None);
+                return Ok(None);
+            }
+            read => read?,
+        };
+        let wrong = |what| LoadError::image(&found, referrer, what);
+        let image = images::texture(&bytes, self.free()).map_err(wrong)?;
+        if let Some(what) = image.ignored {
+            self.replace(wrong(what.into()), "the picture was taken without that")?;
+        }
+        let image = image.texture;
+        self.decoded += 4 * image.texels.len() as u64;
         let index = scene.textures.len() as u32;
-        scene.textures.push(Texture { name: path.display().to_string(), ..image });
-        self.textures.insert(path.into(), index);
-        Ok(index)
+        scene.textures.push(Texture { name: found.display().to_string(), ..image });
+        self.textures.insert(path.into(), Some(index));
+        Ok(Some(index))
     }
 
     /// The environment map in `path`, unscaled and unrotated.
     pub(super) fn environment(&mut self, path: &Path, referrer: &str) -> Result<Environment, LoadError> {
-        let bytes = self.read(path, Some(referrer))?;
-        let (map, clamped) = images::exr(&bytes).map_err(|what| LoadError::image(path, referrer, what))?;
+        let (bytes, path) = self.read_near(path, referrer)?;
+        let decoded = images::exr(&bytes, self.free());
+        let (map, clamped) = decoded.map_err(|what| LoadError::image(&path, referrer, what))?;
+        if let Environment::Map { texels, .. } = &map {
+            self.decoded += 12 * texels.len() as u64;
+        }
         if clamped > 0 {
-            self.note(format!("{}: {clamped} negative or NaN numbers were taken as 0", path.display()));
+            let path = text::path(&path);
+            self.note(format!("{path}: {clamped} negative, NaN or infinite numbers were taken as 0"));
         }
         Ok(map)
     }
 
+    /// Bytes that further images may take.
+    fn free(&self) -> u64 {
+        self.options.texture_memory.saturating_sub(self.decoded)
+    }
+
     pub(super) fn note(&mut self, text: String) {
         self.report.notes.push(text);
+    }
+
+    /// Goes on in spite of `error`, with a note that says what was done `instead`, unless the options are strict.
+    pub(super) fn replace(&mut self, error: LoadError, instead: &str) -> Result<(), LoadError> {
+        if self.options.strict {
+            return Err(error);
+        }
+        self.note(format!("{error}; {instead}"));
+        Ok(())
+    }
+}
+
+impl LoadError {
+    /// Whether a file is not there.
+    pub(super) fn is_missing(&self) -> bool {
+        let kinds = [io::ErrorKind::NotFound, io::ErrorKind::NotADirectory];
+        matches!(self, Self::Read { source, .. } if kinds.contains(&source.kind()))
     }
 }

@@ -11,6 +11,7 @@ use super::json::Place;
 use super::loader::Loader;
 use super::presets::{PRESETS, Preset};
 use crate::description::{Density, Medium, SceneDescription};
+use crate::text::{excerpt, number};
 use croupier::unstable::bsdf::{Lobes, facts};
 use croupier::unstable::scene::blob::{MAX_ANISOTROPY, MAX_COEFFICIENT, MAX_EMISSION, MAX_MEDIA, MAX_SIDE, MediumKind};
 use std::path::Path;
@@ -59,11 +60,15 @@ pub(super) fn load(
             let taken = drafts.iter().find(|d: &&Draft| d.boundary == draft.boundary);
             let wrong = |other: &Draft| {
                 let material = &scene.materials[draft.boundary as usize].name;
-                place.error(format!("its boundary `{material}` is that of `{}` already", other.medium.name))
+                place.error(format!(
+                    "its boundary `{}` is that of `{}` already",
+                    excerpt(material),
+                    excerpt(&other.medium.name)
+                ))
             };
             taken.map(wrong).map_or(Ok(draft), Err)
         });
-        drafts.push(draft.map_err(|e| e.within(&format!("medium `{name}`")))?);
+        drafts.push(draft.map_err(|e| e.within(&format!("medium `{}`", excerpt(&name))))?);
     }
     finish(scene, clear_interiors(scene, drafts), &list)
 }
@@ -92,7 +97,7 @@ fn preset(place: &Place<'_>) -> Result<&'static Preset, LoadError> {
     let name = place.text()?;
     let names = || PRESETS.iter().map(|p| format!("`{}`", p.name)).collect::<Vec<_>>().join(", ");
     let found = PRESETS.iter().find(|p| p.name == name);
-    found.ok_or_else(|| place.error(format!("unknown preset `{name}`, there are {}", names())))
+    found.ok_or_else(|| place.error(format!("unknown preset `{}`, there are {}", excerpt(name), names())))
 }
 
 /// Length of a unit of the scene.
@@ -101,7 +106,10 @@ fn millimetres(scale: Option<Place<'_>>) -> Result<f64, LoadError> {
     let range = 0.0..=1e12;
     scale.map_or(Ok(1.0), |place| match place.number()? {
         x if range.contains(&x) && x > 0.0 => Ok(x),
-        x => Err(place.error(format!("{x} millimetres to a unit of length, it must be above 0 and up to 1e12"))),
+        x => {
+            Err(place
+                .error(format!("{} millimetres to a unit of length, it must be above 0 and up to 1e12", number(x))))
+        }
     })
 }
 
@@ -124,7 +132,7 @@ fn draft(
     let medium = match MediumKind::from_name(kind.text()?) {
         Some(MediumKind::Homogeneous) => homogeneous(m, medium)?,
         Some(MediumKind::Grid) => grid(loader, folder, m, medium)?,
-        None => return Err(kind.error(format!("unknown medium type `{}`", kind.text()?))),
+        None => return Err(kind.error(format!("unknown medium type `{}`", excerpt(kind.text()?)))),
     };
     Ok(Draft { medium, boundary, exterior_of })
 }
@@ -133,8 +141,12 @@ fn draft(
 fn material(scene: &SceneDescription, used: &[bool], place: &Place<'_>) -> Result<u32, LoadError> {
     let name = place.text()?;
     let index = scene.materials.iter().position(|m| m.name == name);
-    let index = index.ok_or_else(|| place.error(format!("there is no material `{name}`")))?;
-    if used[index] { Ok(index as u32) } else { Err(place.error(format!("no face has the material `{name}`"))) }
+    let index = index.ok_or_else(|| place.error(format!("there is no material `{}`", excerpt(name))))?;
+    if used[index] {
+        Ok(index as u32)
+    } else {
+        Err(place.error(format!("no face has the material `{}`", excerpt(name))))
+    }
 }
 
 /// Mean cosine of the phase function, if there is one.
@@ -142,12 +154,12 @@ fn phase(m: &Place<'_>) -> Result<Option<f32>, LoadError> {
     let Some(phase) = m.find("phase")? else { return Ok(None) };
     let kind = phase.get("type")?;
     if kind.text()? != "hg" {
-        return Err(kind.error(format!("unknown phase function `{}`, there is only `hg`", kind.text()?)));
+        return Err(kind.error(format!("unknown phase function `{}`, there is only `hg`", excerpt(kind.text()?))));
     }
     let place = phase.get("g")?;
     match place.float()? {
         g if g.abs() <= MAX_ANISOTROPY => Ok(Some(g)),
-        g => Err(place.error(format!("{g}, it must be from -{MAX_ANISOTROPY} to {MAX_ANISOTROPY}"))),
+        g => Err(place.error(format!("{}, it must be from -{MAX_ANISOTROPY} to {MAX_ANISOTROPY}", number(g.into())))),
     }
 }
 
@@ -155,7 +167,7 @@ fn phase(m: &Place<'_>) -> Result<Option<f32>, LoadError> {
 fn colour(place: &Place<'_>, most: f32) -> Result<[f32; 3], LoadError> {
     let rgb = if place.is_number() { [place.float()?; 3] } else { place.rgb()? };
     let bad = rgb.into_iter().find(|x| !(0.0..=most).contains(x));
-    bad.map_or(Ok(rgb), |x| Err(place.error(format!("{x}, it must be from 0 to {most:e}"))))
+    bad.map_or(Ok(rgb), |x| Err(place.error(format!("{}, it must be from 0 to {most:e}", number(x.into())))))
 }
 
 fn homogeneous(m: &Place<'_>, medium: Medium) -> Result<Medium, LoadError> {
@@ -181,7 +193,7 @@ fn grid(loader: &mut Loader, folder: &Path, m: &Place<'_>, medium: Medium) -> Re
         if let Some(place) = m.find(key)?
             && place.text()? != only
         {
-            return Err(place.error(format!("`{}` is not supported, only `{only}`", place.text()?)));
+            return Err(place.error(format!("`{}` is not supported, only `{only}`", excerpt(place.text()?))));
         }
     }
     let resolution = m.get("resolution")?;
@@ -217,7 +229,7 @@ fn densities(bytes: &[u8], [nx, ny, nz]: [u32; 3]) -> Result<Vec<f32>, String> {
         Some(i) => {
             let (row, x) = (i / nx as usize, i % nx as usize);
             let (z, y) = (row / ny as usize, row % ny as usize);
-            let found = values[i];
+            let found = number(values[i].into());
             Err(format!("the density of cell ({x}, {y}, {z}) is {found}, it must be from 0 to {MAX_COEFFICIENT:e}"))
         }
     }
@@ -284,6 +296,6 @@ fn circle(drafts: &[Draft], before: &[Vec<usize>], order: &[usize]) -> String {
             break walk.split_off(start);
         }
     };
-    let names: Vec<String> = names.iter().map(|i| format!("`{}`", drafts[*i].medium.name)).collect();
+    let names: Vec<String> = names.iter().map(|i| format!("`{}`", excerpt(&drafts[*i].medium.name))).collect();
     format!("media surround each other by `also_exterior_of`: {}", names.join(" is around "))
 }

@@ -9,28 +9,40 @@
 //! | `presets` | nothing: media by name |
 //! | `images` | PNG and JPEG textures, EXR environment maps |
 //! | `loader` | the files that all of them ask for, each once |
+//! | `files` | nothing but bytes: regular files of a limited size, text, names in another case |
 //! | `json` | values of a JSON document with their paths |
 
 mod error;
+mod files;
 mod images;
 mod json;
 mod loader;
 mod media;
 mod mtl;
 mod obj;
+mod polygon;
 mod presets;
 mod scene_json;
 
 pub use error::LoadError;
-pub use loader::LoadReport;
+pub use files::MAX_FILE_BYTES;
+pub use loader::{LoadOptions, LoadReport};
 
 use crate::description::SceneDescription;
 use loader::Loader;
 use std::path::Path;
 
-/// Loads a folder with a `scene.json`, that `scene.json` itself, or a bare `.obj` file.
+/// Loads a folder with a `scene.json`, that `scene.json` itself, or a bare `.obj` file, with the default options.
 pub fn load(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
-    let mut loader = Loader::default();
+    load_with(path, &LoadOptions::default())
+}
+
+/// As [`load`], with these options.
+///
+/// # Errors
+/// Files that cannot be read or are no scene, also those without a triangle.
+pub fn load_with(path: &Path, options: &LoadOptions) -> Result<(SceneDescription, LoadReport), LoadError> {
+    let mut loader = Loader::new(*options);
     let extension = path.extension().map(|e| e.to_ascii_lowercase());
     let scene = if path.is_dir() {
         scene_json::load(&mut loader, &path.join("scene.json"))?

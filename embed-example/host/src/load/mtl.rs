@@ -17,7 +17,9 @@
 //! 0.5, bump maps and all other parameters are ignored. All materials are compensated for what single scattering loses.
 
 use super::LoadError;
+use super::loader::Loader;
 use crate::description::{Material, Model, Reflectance};
+use crate::text::{excerpt, number};
 use std::path::{Path, PathBuf};
 
 /// Model of faces without a material.
@@ -41,13 +43,24 @@ pub(super) struct Mapped {
 }
 
 /// Parses a library. Each line is checked first: `tobj` does not say which one it refuses, and panics at a colour of
-/// fewer than three numbers.
-pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<Definition>, LoadError> {
+/// fewer than three numbers. A value that cannot be read is ignored with a note, unless the options are strict; for `Kd`
+/// that is grey.
+pub(super) fn parse(loader: &mut Loader, path: &Path, text: &str) -> Result<Vec<Definition>, LoadError> {
     let mut plain = String::with_capacity(text.len() + 16);
     // of each definition: the line of its texture
     let mut texture_lines = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
-        check(line.trim(), &mut plain).map_err(|what| LoadError::line(path, number, what))?;
+        if let Err(what) = check(line.trim(), &mut plain) {
+            let error = LoadError::line(path, number, what);
+            match line.split_whitespace().next() {
+                Some("newmtl") => return Err(error),
+                Some("Kd") => {
+                    loader.replace(error, "grey was taken")?;
+                    plain.push_str("Kd 0.5 0.5 0.5");
+                }
+                _ => loader.replace(error, "the line was ignored")?,
+            }
+        }
         plain.push('\n');
         match line.split_whitespace().next() {
             Some("newmtl") => texture_lines.push(0),
@@ -56,7 +69,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<Definition>, LoadErro
         }
     }
     let (materials, _) = tobj::load_mtl_buf(&mut plain.as_bytes())
-        .map_err(|e| LoadError::line(path, 0, format!("refused by the MTL parser: {e}")))?;
+        .map_err(|e| LoadError::Format { path: path.into(), what: format!("refused by the MTL parser: {e}") })?;
     let define = |(material, line): (tobj::Material, u32)| {
         let texture = material.diffuse_texture.as_deref().map(|t| (without_options(t), line));
         Definition { material, texture }
@@ -69,7 +82,7 @@ fn check(line: &str, out: &mut String) -> Result<(), String> {
     let (keyword, rest) = line.split_once(char::is_whitespace).map_or((line, ""), |(k, r)| (k, r.trim()));
     let number = |word: &str| match word.parse::<f32>() {
         Ok(x) if x.is_finite() => Ok(()),
-        _ => Err(format!("`{word}` is not a finite number")),
+        _ => Err(format!("`{}` is not a finite number", excerpt(word))),
     };
     let mut words: Vec<&str> = rest.split_whitespace().collect();
     match keyword {
@@ -92,7 +105,7 @@ fn check(line: &str, out: &mut String) -> Result<(), String> {
         }
         "illum" => {
             let word = words.first().copied().unwrap_or("");
-            word.parse::<u8>().map_err(|_| format!("`{word}` is not an illumination model"))?;
+            word.parse::<u8>().map_err(|_| format!("`{}` is not an illumination model", excerpt(word)))?;
             words.truncate(1);
         }
         "map_Kd" if rest.is_empty() => return Err("`map_Kd` needs a file".into()),
@@ -133,19 +146,24 @@ pub(super) fn sibling(file: &Path, name: &str) -> PathBuf {
     if plain.exists() || !name.contains('\\') { plain } else { folder.join(name.replace('\\', "/")) }
 }
 
-/// The mapping of the table above.
+/// The mapping of the table above. Where the file of `map_Kd` is missing, that is no `texture`, `Kd` counts, or grey if it
+/// is black.
 pub(super) fn map(definition: &Definition, texture: Option<u32>) -> Mapped {
     let m = &definition.material;
     let mut notes = Vec::new();
     let parameter = |key: &str| m.unknown_param.get(key).and_then(|v| v.parse::<f32>().ok());
     let limited = |rgb: [f32; 3], notes: &mut Vec<String>| {
         if rgb.iter().any(|x| !(0.0..=1.0).contains(x)) {
-            notes.push(format!("material `{}`: reflectance {rgb:?} was limited to 0 .. 1", m.name));
+            let [r, g, b] = rgb.map(|x| number(x.into()));
+            let name = excerpt(&m.name);
+            notes.push(format!("material `{name}`: reflectance [{r}, {g}, {b}] was limited to 0 .. 1"));
         }
         rgb.map(|x| x.clamp(0.0, 1.0))
     };
     let black = |rgb: Option<[f32; 3]>| rgb.is_none_or(|c| c.iter().all(|x| *x <= 1e-3));
-    let diffuse = match (texture, m.diffuse) {
+    let missing = definition.texture.is_some() && texture.is_none();
+    let kd = if missing && black(m.diffuse) { Some([0.5; 3]) } else { m.diffuse };
+    let diffuse = match (texture, kd) {
         (Some(texture), _) => Reflectance::Texture(texture),
         // An emitter that states no reflectance reflects nothing.
         (None, None) if !black(m.emissive) => Reflectance::Constant([0.0; 3]),
@@ -164,7 +182,8 @@ pub(super) fn map(definition: &Definition, texture: Option<u32>) -> Mapped {
     };
     let clear = matches!(illum, Some(4 | 6 | 7 | 9)) || opacity < 0.5;
     if opacity < 1.0 && !clear {
-        notes.push(format!("material `{}`: opacity {opacity} was taken as 1", m.name));
+        let (name, opacity) = (excerpt(&m.name), number(opacity.into()));
+        notes.push(format!("material `{name}`: opacity {opacity} was taken as 1"));
     }
     let model = if clear {
         match from_pr.unwrap_or(0.0) {
@@ -176,7 +195,7 @@ pub(super) fn map(definition: &Definition, texture: Option<u32>) -> Mapped {
         }
     } else if metalness >= 0.5 {
         metal(diffuse)
-    } else if !black(m.specular) && black(m.diffuse) && texture.is_none() {
+    } else if !black(m.specular) && black(kd) && texture.is_none() {
         metal(Reflectance::Constant(limited(m.specular.unwrap_or_default(), &mut notes)))
     } else if (matches!(illum, Some(0 | 1)) && roughness.is_none()) || !coated(m, roughness) {
         Model::Diffuse { reflectance: diffuse }

@@ -8,9 +8,11 @@
 
 use super::json::Place;
 use super::loader::Loader;
-use super::{LoadError, mtl};
+use super::{LoadError, files, mtl, polygon};
 use crate::builtin;
 use crate::description::{Camera, Emitter, Object, SceneDescription, Triangle, Vertex};
+use crate::text::{self, excerpt};
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -27,7 +29,54 @@ struct Prepared {
     libraries: Vec<(String, u32)>,
     polygons: u32,
     skipped_elements: u32,
+    /// Faces of which some corners have texture coordinates or normals, and the line of the first.
+    partial: Option<(u32, u32)>,
+    /// Lines that nothing is made of, the first of them and its keyword.
+    unknown: Option<(u32, u32, String)>,
+    vertices: usize,
+    faces: u32,
 }
+
+impl Prepared {
+    /// What a file without faces has instead.
+    fn instead(&self) -> String {
+        let Self { vertices, skipped_elements, .. } = self;
+        match &self.unknown {
+            Some((_, line, keyword)) if FREE_FORM.contains(&keyword.as_str()) => {
+                format!("free-form curves and surfaces are not supported (`{keyword}` in line {line})")
+            }
+            _ if *vertices > 0 => format!("{vertices} vertices, {skipped_elements} points and lines, no faces"),
+            Some((_, line, word)) => format!("no line of OBJ geometry, line {line} begins with `{}`", excerpt(word)),
+            None => "there is nothing in it".into(),
+        }
+    }
+}
+
+/// Keywords of OBJ that say nothing about triangles.
+const IGNORED: &[&str] = &[
+    "s",
+    "mg",
+    "bevel",
+    "c_interp",
+    "d_interp",
+    "lod",
+    "maplib",
+    "usemap",
+    "shadow_obj",
+    "trace_obj",
+    "call",
+    "csh",
+    "vp",
+];
+
+/// Keywords of curves and surfaces of OBJ.
+const FREE_FORM: &[&str] = &[
+    "cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "parm", "trim", "hole", "scrv", "sp", "end", "con",
+    "ctech", "stech",
+];
+
+/// Corner of a face: numbers of position, texture coordinate and normal as they are written.
+type Corner = [Option<i64>; 3];
 
 /// Data of a face's corners besides positions.
 #[derive(Clone, Copy, PartialEq, Eq, Default)]
@@ -43,6 +92,11 @@ struct Checker<'t> {
     out: Prepared,
     /// Numbers of `v`, `vt`, `vn` so far.
     counts: [usize; 3],
+    positions: Vec<[f32; 3]>,
+    strict: bool,
+    /// Memory of the face under way.
+    corners: Vec<Corner>,
+    points: Vec<[f32; 3]>,
     numbers: HashMap<String, usize>,
     material: String,
     /// Material and form of the text's current group; `None` before its first face.
@@ -80,8 +134,13 @@ impl Checker<'_> {
                 self.out.libraries.push((rest(line, keyword).into(), self.line));
                 Ok(())
             }
-            // Comments, smoothing groups, curves: nothing here is made of them.
-            _ => Ok(()),
+            // Comments, smoothing groups: nothing here is made of them.
+            _ if keyword.starts_with('#') || IGNORED.contains(&keyword) => Ok(()),
+            _ => {
+                let line = self.line;
+                self.out.unknown.get_or_insert_with(|| (0, line, excerpt(keyword).into_owned())).0 += 1;
+                Ok(())
+            }
         }
     }
 
@@ -96,12 +155,14 @@ impl Checker<'_> {
         self.counts[kind] += 1;
         self.out.text.push_str(keyword);
         let mut found = 0;
-        for word in words.take(n) {
-            let x: f32 = word.parse().map_err(|_| self.error(format!("`{word}` is not a number")))?;
+        let mut numbers = [0.0; 3];
+        for (word, number) in words.take(n).zip(&mut numbers) {
+            let x: f32 = word.parse().map_err(|_| self.error(format!("`{}` is not a number", excerpt(word))))?;
             if !x.is_finite() {
-                let (object, index) = (self.object_name(), self.counts[kind]);
+                let (object, index, word) = (self.object_name(), self.counts[kind], excerpt(word));
                 return Err(self.error(format!("object `{object}`: `{keyword}` number {index} is {word}")));
             }
+            *number = x;
             self.out.text.push(' ');
             self.out.text.push_str(word);
             found += 1;
@@ -111,63 +172,107 @@ impl Checker<'_> {
         } else if found < n {
             return Err(self.error(format!("`{keyword}` needs {n} numbers")));
         }
+        if kind == 0 {
+            self.positions.push(numbers);
+        }
         self.out.text.push('\n');
         Ok(())
     }
 
-    fn object_name(&self) -> &str {
-        if self.object.is_empty() { "unnamed object" } else { &self.object }
+    fn object_name(&self) -> Cow<'_, str> {
+        if self.object.is_empty() { "unnamed object".into() } else { excerpt(&self.object) }
     }
 
-    fn face<'w>(&mut self, words: impl Iterator<Item = &'w str> + Clone) -> Result<(), LoadError> {
-        let mut form = None;
-        let mut corners = 0u32;
-        for word in words.clone() {
-            let f = self.corner(word)?;
-            if form.is_some_and(|form| form != f) {
-                return Err(self.error("corners with and without texture coordinates or normals in one face"));
-            }
-            form = Some(f);
-            corners += 1;
-        }
-        let Some(form) = form.filter(|_| corners >= 3) else {
+    fn face<'w>(&mut self, words: impl Iterator<Item = &'w str>) -> Result<(), LoadError> {
+        let mut corners = std::mem::take(&mut self.corners);
+        corners.clear();
+        let read = words.map(|word| self.corner(word)).try_for_each(|c| c.map(|c| corners.push(c)));
+        let done = read.and_then(|()| self.corners_of_face(&corners));
+        self.corners = corners;
+        done
+    }
+
+    fn corners_of_face(&mut self, corners: &[Corner]) -> Result<(), LoadError> {
+        if corners.len() < 3 {
             self.out.skipped_elements += 1;
             return Ok(());
-        };
-        self.out.polygons += u32::from(corners > 3);
-        self.enter(form);
-        self.out.text.push('f');
-        for word in words {
-            self.out.text.push(' ');
-            self.out.text.push_str(word);
         }
-        self.out.text.push('\n');
+        let has = |kind: usize| corners.iter().all(|c| c[kind].is_some());
+        let form = Form { uv: has(1), normal: has(2) };
+        let some = |kind: usize| corners.iter().any(|c| c[kind].is_some());
+        if form != (Form { uv: some(1), normal: some(2) }) {
+            if self.strict {
+                return Err(self.error("corners with and without texture coordinates or normals in one face"));
+            }
+            let line = self.line;
+            self.out.partial.get_or_insert((0, line)).0 += 1;
+        }
+        self.out.faces = self.out.faces.saturating_add(1);
+        self.enter(form);
+        if corners.len() == 3 {
+            self.triangle([&corners[0], &corners[1], &corners[2]], form);
+            return Ok(());
+        }
+        self.out.polygons += 1;
+        let mut points = std::mem::take(&mut self.points);
+        points.clear();
+        points.extend(corners.iter().map(|c| self.position(c)));
+        for t in polygon::triangulate(&points) {
+            self.triangle(t.map(|i| &corners[i as usize]), form);
+        }
+        self.points = points;
         Ok(())
+    }
+
+    fn position(&self, corner: &Corner) -> [f32; 3] {
+        let index = match corner[0] {
+            Some(i @ 1..) => usize::try_from(i - 1).ok(),
+            Some(i) => usize::try_from(i.unsigned_abs()).ok().and_then(|back| self.positions.len().checked_sub(back)),
+            None => None,
+        };
+        index.and_then(|i| self.positions.get(i)).copied().unwrap_or_default()
+    }
+
+    fn triangle(&mut self, corners: [&Corner; 3], form: Form) {
+        let text = &mut self.out.text;
+        text.push('f');
+        for [v, uv, normal] in corners {
+            let (v, uv, normal) = (v.unwrap_or(0), uv.unwrap_or(0), normal.unwrap_or(0));
+            // Writing to a String cannot fail.
+            let _ = match (form.uv, form.normal) {
+                (false, false) => write!(text, " {v}"),
+                (true, false) => write!(text, " {v}/{uv}"),
+                (false, true) => write!(text, " {v}//{normal}"),
+                (true, true) => write!(text, " {v}/{uv}/{normal}"),
+            };
+        }
+        text.push('\n');
     }
 
     /// `v`, `v/vt`, `v//vn` or `v/vt/vn`, from 1, or from the last one backwards with -1.
-    fn corner(&self, word: &str) -> Result<Form, LoadError> {
-        let mut form = [false; 3];
+    fn corner(&self, word: &str) -> Result<Corner, LoadError> {
+        let wrong = || self.error(format!("`{}` is not a corner of a face", excerpt(word)));
+        let mut corner = [None; 3];
         for (kind, part) in word.split('/').enumerate() {
             if kind == 3 {
-                return Err(self.error(format!("`{word}` is not a corner of a face")));
+                return Err(wrong());
             }
             if part.is_empty() {
                 continue;
             }
-            let index: i64 = part.parse().map_err(|_| self.error(format!("`{word}` is not a corner of a face")))?;
+            let index: i64 = part.parse().map_err(|_| wrong())?;
             let count = self.counts[kind];
             if index == 0 || index.unsigned_abs() > count as u64 {
                 let what = ["vertex", "texture coordinate", "normal"][kind];
                 let object = self.object_name();
                 return Err(self.error(format!("object `{object}`: there is no {what} {index}, only {count} so far")));
             }
-            form[kind] = true;
+            corner[kind] = Some(index);
         }
-        if !form[0] {
-            return Err(self.error(format!("`{word}` has no vertex")));
+        if corner[0].is_none() {
+            return Err(self.error(format!("`{}` has no vertex", excerpt(word))));
         }
-        Ok(Form { uv: form[1], normal: form[2] })
+        Ok(corner)
     }
 
     /// Starts a new group in the text if the material or the form changes.
@@ -191,7 +296,7 @@ fn rest<'t>(line: &'t str, keyword: &str) -> &'t str {
     line.trim().get(keyword.len()..).unwrap_or_default().trim()
 }
 
-fn prepare(path: &Path, text: &str) -> Result<Prepared, LoadError> {
+fn prepare(path: &Path, text: &str, strict: bool) -> Result<Prepared, LoadError> {
     let mut prepared = String::with_capacity(text.len() + text.len() / 64 + 64);
     // Makes `tobj` ask for the materials before the first face.
     prepared.push_str("mtllib materials\n");
@@ -204,8 +309,16 @@ fn prepare(path: &Path, text: &str) -> Result<Prepared, LoadError> {
             libraries: Vec::new(),
             polygons: 0,
             skipped_elements: 0,
+            partial: None,
+            unknown: None,
+            vertices: 0,
+            faces: 0,
         },
         counts: [0; 3],
+        positions: Vec::new(),
+        strict,
+        corners: Vec::new(),
+        points: Vec::new(),
         numbers: HashMap::new(),
         material: String::new(),
         current: None,
@@ -227,6 +340,7 @@ fn prepare(path: &Path, text: &str) -> Result<Prepared, LoadError> {
     }
     // a last line that promises another
     checker.check(&joined)?;
+    checker.out.vertices = checker.counts[0];
     Ok(checker.out)
 }
 
@@ -240,7 +354,8 @@ fn append(path: &Path, scene: &mut SceneDescription, prepared: Prepared, materia
         let map = list.iter().enumerate().map(|(i, m)| (m.name.clone(), i)).collect();
         Ok((list, map))
     };
-    let refused = |what: &str| LoadError::line(path, 0, format!("refused by the OBJ parser: {what}"));
+    let refused =
+        |what: &str| LoadError::Format { path: path.into(), what: format!("refused by the OBJ parser: {what}") };
     let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, names).map_err(|e| refused(&e.to_string()))?;
     drop(text);
     for model in models {
@@ -276,7 +391,19 @@ fn append(path: &Path, scene: &mut SceneDescription, prepared: Prepared, materia
 /// Reads and checks; counts go to the report.
 fn read(loader: &mut Loader, path: &Path, referrer: Option<&str>) -> Result<Prepared, LoadError> {
     let text = loader.read_text(path, referrer)?;
-    let prepared = prepare(path, &text)?;
+    let prepared = prepare(path, &text, loader.options.strict)?;
+    drop(text);
+    if prepared.faces == 0 {
+        return Err(LoadError::Empty { path: path.into(), what: prepared.instead() });
+    }
+    let name = text::path(path);
+    if let Some((count, line)) = prepared.partial {
+        let what = "with texture coordinates or normals at some corners only, which were left out";
+        loader.note(format!("{name}:{line}: the first of {count} faces {what}"));
+    }
+    if let Some((count, line, keyword)) = &prepared.unknown {
+        loader.note(format!("{name}:{line}: `{keyword}` is not known; lines of that kind that were ignored: {count}"));
+    }
     loader.report.polygons += prepared.polygons;
     loader.report.skipped_elements += prepared.skipped_elements;
     Ok(prepared)
@@ -295,7 +422,10 @@ pub(super) fn load_geometry(
         index.map(|i| i as u32).ok_or_else(|| {
             let what = match name.as_str() {
                 "" => "a face before any `usemtl`".into(),
-                name => format!("a face of material `{name}`, which {} does not define", referrer.file.display()),
+                name => {
+                    let file = text::path(referrer.file);
+                    format!("a face of material `{}`, which {file} does not define", excerpt(name))
+                }
             };
             LoadError::line(path, *line, what)
         })
@@ -311,11 +441,20 @@ pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescrip
     let prepared = read(loader, path, None)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut defined: HashMap<String, (mtl::Definition, PathBuf)> = HashMap::new();
-    for (file, line) in &prepared.libraries {
-        let file = folder.join(file);
-        let text = loader.read_text(&file, Some(&format!("{}:{line}", path.display())))?;
-        for definition in mtl::parse(&file, &text)? {
-            defined.insert(definition.material.name.clone(), (definition, file.clone()));
+    for (names, line) in &prepared.libraries {
+        let referrer = format!("{}:{line}", text::path(path));
+        for file in libraries(folder, names) {
+            let (bytes, file) = match loader.read_near(&file, &referrer) {
+                Err(e) if e.is_missing() => {
+                    loader.replace(e, "its materials are grey")?;
+                    continue;
+                }
+                read => read?,
+            };
+            let text = files::text(bytes).map_err(|what| LoadError::Format { path: file.clone(), what })?;
+            for definition in mtl::parse(loader, &file, &text)? {
+                defined.insert(definition.material.name.clone(), (definition, file.clone()));
+            }
         }
     }
     let mut materials = Vec::new();
@@ -323,11 +462,14 @@ pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescrip
         let index = scene.materials.len() as u32;
         match defined.get(name) {
             Some((definition, file)) => {
-                let texture = definition.texture.as_ref().map(|(texture, line)| {
-                    let referrer = format!("{}:{line} (material `{name}`)", file.display());
-                    loader.texture(&mut scene, &mtl::sibling(file, texture), &referrer)
-                });
-                let mapped = mtl::map(definition, texture.transpose()?);
+                let texture = match &definition.texture {
+                    Some((texture, line)) => {
+                        let referrer = format!("{}:{line} (material `{}`)", text::path(file), excerpt(name));
+                        loader.texture(&mut scene, &mtl::sibling(file, texture), &referrer)?
+                    }
+                    None => None,
+                };
+                let mapped = mtl::map(definition, texture);
                 loader.report.notes.extend(mapped.notes);
                 scene.materials.push(mapped.material);
                 if let Some(radiance) = mapped.radiance {
@@ -339,8 +481,9 @@ pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescrip
                 scene.add_material(NO_MATERIAL, mtl::GREY);
             }
             None => {
-                let what = format!("a face of material `{name}`, which no material library defines");
-                return Err(LoadError::line(path, *line, what));
+                let what = format!("a face of material `{}`, which no material library defines", excerpt(name));
+                loader.replace(LoadError::line(path, *line, what), "it is grey")?;
+                scene.add_material(name, mtl::GREY);
             }
         }
         materials.push(index);
@@ -353,6 +496,13 @@ pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescrip
         loader.note("the file has no light: an environment was added".into());
     }
     Ok(scene)
+}
+
+/// The files that a `mtllib` names: one whose name may hold blanks, or, if there is none, several.
+fn libraries(folder: &Path, names: &str) -> Vec<PathBuf> {
+    let whole = folder.join(names);
+    let several = || names.split_ascii_whitespace().map(|n| folder.join(n)).collect::<Vec<_>>();
+    if whole.exists() || !several().iter().any(|f| f.exists()) { vec![whole] } else { several() }
 }
 
 /// A camera that sees the bounding sphere whole, from the front, the right and above.

@@ -6,6 +6,7 @@ use super::{LoadError, media, obj};
 use crate::description::{
     Camera, Emitter, Environment, Material, Model, ParameterSource, Reflectance, SceneDescription, ThinLens,
 };
+use crate::text::excerpt;
 use croupier::unstable::scene::blob::{EnvironmentKind, LightKind, MaterialKind};
 use std::path::Path;
 
@@ -29,7 +30,13 @@ pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription,
             emitter(loader, &mut scene, folder, &place)?;
         }
     }
-    let file = document.get("geometry")?.get("file")?;
+    let geometry = document.get("geometry")?;
+    if let Some(kind) = geometry.find("type")?
+        && kind.text()? != "obj"
+    {
+        return Err(kind.error(format!("unknown kind of geometry `{}`, there is only `obj`", excerpt(kind.text()?))));
+    }
+    let file = geometry.get("file")?;
     obj::load_geometry(loader, &mut scene, &folder.join(file.text()?), &file)?;
     media::load(loader, &mut scene, folder, &document)?;
     Ok(scene)
@@ -39,7 +46,7 @@ fn camera(c: &Place<'_>) -> Result<Camera, LoadError> {
     if let Some(kind) = c.find("type")?
         && !matches!(kind.text()?, "perspective" | "thinlens")
     {
-        return Err(kind.error(format!("unknown camera `{}`", kind.text()?)));
+        return Err(kind.error(format!("unknown camera `{}`", excerpt(kind.text()?))));
     }
     let lens = c.find("thin_lens")?.map(|l| -> Result<_, LoadError> {
         Ok(ThinLens { radius: l.get("radius")?.float()?, focus_distance: l.get("focus_distance")?.float()? })
@@ -64,7 +71,7 @@ fn material(
     let kind = m.get("type")?;
     let name_of_kind = kind.text()?;
     let kind = MaterialKind::from_name(name_of_kind)
-        .ok_or_else(|| kind.error(format!("unknown material type `{name_of_kind}`")))?;
+        .ok_or_else(|| kind.error(format!("unknown material type `{}`", excerpt(name_of_kind))))?;
     let model = Model::from_source(kind, &mut Parameters { loader, scene, folder, m })?;
     let two_sided = m.find("twosided")?.map_or(Ok(false), |t| t.flag())?;
     let cutout = matches!(model.parameters().reflectance, Some(Reflectance::Texture(_))) && cutout(m)?;
@@ -83,7 +90,7 @@ fn cutout(m: &Place<'_>) -> Result<bool, LoadError> {
     match place.text()? {
         "cutout" => Ok(true),
         "ignore" => Ok(false),
-        other => Err(place.error(format!("`{other}` is not supported, only `cutout` and `ignore`"))),
+        other => Err(place.error(format!("`{}` is not supported, only `cutout` and `ignore`", excerpt(other)))),
     }
 }
 
@@ -136,11 +143,12 @@ fn reflectance(
         if let Some(place) = r.find(key)?
             && place.text()? != only
         {
-            return Err(place.error(format!("`{}` is not supported, only `{only}`", place.text()?)));
+            return Err(place.error(format!("`{}` is not supported, only `{only}`", excerpt(place.text()?))));
         }
     }
     let file = r.get("file")?;
-    Ok(Reflectance::Texture(loader.texture(scene, &folder.join(file.text()?), &file.referrer())?))
+    let texture = loader.texture(scene, &folder.join(file.text()?), &file.referrer())?;
+    Ok(texture.map_or(Reflectance::Constant([0.5; 3]), Reflectance::Texture))
 }
 
 fn emitter(loader: &mut Loader, scene: &mut SceneDescription, folder: &Path, e: &Place<'_>) -> Result<(), LoadError> {
@@ -161,7 +169,7 @@ fn emitter(loader: &mut Loader, scene: &mut SceneDescription, folder: &Path, e: 
             let environment = match EnvironmentKind::from_name(name) {
                 Some(EnvironmentKind::Constant) => Environment::Constant { radiance: e.get("radiance")?.rgb()? },
                 Some(EnvironmentKind::Map) => envmap(loader, folder, e)?,
-                None => return Err(kind.error(format!("unknown emitter type `{name}`"))),
+                None => return Err(kind.error(format!("unknown emitter type `{}`", excerpt(name)))),
             };
             return match scene.environment.replace(environment) {
                 None => Ok(()),
@@ -178,7 +186,7 @@ fn material_index(scene: &SceneDescription, e: &Place<'_>) -> Result<u32, LoadEr
     let place = e.get("material")?;
     let name = place.text()?;
     let index = scene.materials.iter().position(|m| m.name == name);
-    index.map(|i| i as u32).ok_or_else(|| place.error(format!("there is no material `{name}`")))
+    index.map(|i| i as u32).ok_or_else(|| place.error(format!("there is no material `{}`", excerpt(name))))
 }
 
 fn envmap(loader: &mut Loader, folder: &Path, e: &Place<'_>) -> Result<Environment, LoadError> {
