@@ -180,6 +180,7 @@ const NOTHING: Records<'static> = {
         lens_radius: 0.0,
         focus_distance: 1.0,
         size: [1, 1],
+        kind: CameraKind::Perspective as u32,
     };
     Records {
         info: INFO,
@@ -292,7 +293,7 @@ impl SceneEdit<'_> {
         Ok(())
     }
 
-    /// Replaces a light's emission, and the position or direction of one that is no surface. Kind, triangle and area must be
+    /// Replaces a light's emission, and the position, direction and cone of one that is no surface. Kind, triangle and area must be
     /// the old ones. Emission may become black and light up again; the light stays in the scene.
     ///
     /// # Errors
@@ -300,9 +301,10 @@ impl SceneEdit<'_> {
     pub fn light(&mut self, index: u32, light: Light) -> Result<(), EditError> {
         let of = SectionKind::Lights;
         let old: Light = self.read(of, index)?;
-        let moves = old.kind == LightKind::Point as u32 || old.kind == LightKind::Directional as u32;
-        let vector = if moves { light.vector } else { old.vector };
-        let fixed = Light { emission: light.emission, vector, ..old };
+        let placed = |f: &LightField| matches!(f, LightField::Position | LightField::Direction);
+        let moves = LightKind::from_u32(old.kind).is_some_and(|kind| kind.fields().iter().any(placed));
+        let (vector, params) = if moves { (light.vector, light.params) } else { (old.vector, old.params) };
+        let fixed = Light { emission: light.emission, vector, params, ..old };
         if bytemuck::bytes_of(&fixed) != bytemuck::bytes_of(&light) {
             return Err(EditError::Fixed { of, index });
         }
