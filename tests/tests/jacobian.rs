@@ -38,7 +38,8 @@ fn scattering_models() {
         | MaterialKind::Conductor
         | MaterialKind::Dielectric
         | MaterialKind::ThinDielectric
-        | MaterialKind::Null => false,
+        | MaterialKind::Null
+        | MaterialKind::Principled => false,
     };
     let (mut tried, mut kinds) = (0, vec![]);
     for case in cases().iter().filter(smooth) {

@@ -8,6 +8,7 @@ mod geometry;
 mod lights;
 mod materials;
 mod media;
+mod principled;
 mod record;
 mod tree;
 
@@ -45,7 +46,7 @@ pub(crate) mod single {
 
     pub(crate) fn material(scene: &Records<'_>, index: u32, m: &Material) -> Result<Effects, SceneError> {
         materials::material(scene, Record { of: SectionKind::Materials, index: index as usize }, m)?;
-        Ok(materials::effects(m).with(media::effects(scene, m)))
+        Ok(materials::effects(scene, m).with(media::effects(scene, m)))
     }
 
     pub(crate) fn light(scene: &Records<'_>, index: u32, l: &Light) -> Result<(), SceneError> {

@@ -75,7 +75,7 @@ fn png(bytes: &[u8], free: u64) -> Result<Texture, String> {
         ColorType::Rgba => data.chunks_exact(4).map(|t| [t[0], t[1], t[2], t[3]]).collect(),
         ColorType::Indexed => return Err("its palette was not expanded".into()),
     };
-    Ok(Texture { name: String::new(), width: info.width, height: info.height, texels })
+    Ok(Texture { name: String::new(), width: info.width, height: info.height, texels, ..Texture::default() })
 }
 
 /// Bytes a pixel that the JPEG decoder takes: RGBA twice, coefficients of up to four channels of a progressive file,
@@ -100,7 +100,8 @@ fn jpeg(bytes: &[u8], free: u64) -> Result<Decoded, String> {
     if texels.is_empty() || texels.len() != usize::from(width) * usize::from(height) {
         return Err(format!("a JPEG of {} texels for {width} x {height} pixels", texels.len()));
     }
-    let texture = Texture { name: String::new(), width: width.into(), height: height.into(), texels };
+    let (width, height) = (width.into(), height.into());
+    let texture = Texture { name: String::new(), width, height, texels, ..Texture::default() };
     let ignored = (end < bytes.len()).then_some("there are bytes behind the end of the JPEG");
     Ok(Decoded { texture, ignored })
 }

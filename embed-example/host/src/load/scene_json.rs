@@ -4,7 +4,7 @@ use super::json::{self, Place};
 use super::loader::Loader;
 use super::{LoadError, media, obj};
 use crate::description::{
-    Camera, Emitter, Environment, Material, Model, NamedCamera, ParameterSource, Projection, Reflectance,
+    Camera, Emitter, Environment, Material, Model, NamedCamera, ParameterSource, Principled, Projection, Reflectance,
     SceneDescription, ThinLens,
 };
 use crate::text::excerpt;
@@ -147,6 +147,10 @@ impl ParameterSource for Parameters<'_, '_> {
 
     fn alpha(&mut self) -> Result<f32, LoadError> {
         self.m.get("alpha")?.float()
+    }
+
+    fn principled(&mut self) -> Result<Principled, LoadError> {
+        Ok(Principled::default())
     }
 }
 
