@@ -32,6 +32,7 @@
 //! | `learn` | statistics by place and direction | materials, lights, how paths are traced |
 //! | `settings` | the caller's choices, their ranges | how they are followed |
 //! | `edit` | changes of a scene between frames | sessions, how paths are traced |
+//! | `extension` | what hosts compute in place of the core | where it is used |
 //! | `world` | what paths read | who owns it |
 //! | `record` | scalars of a suspended session | what they stand for |
 //! | `tracer` | packets, the refill ring, stages, books | files, threads, clocks |
@@ -78,6 +79,7 @@ mod cost;
 mod counters;
 mod denoise;
 mod edit;
+mod extension;
 mod film;
 mod geometry;
 mod instructions;
@@ -155,6 +157,10 @@ pub mod unstable {
     /// Sums per pixel and their errors.
     pub mod film {
         pub use crate::film::*;
+    }
+    /// What hosts compute in place of the core.
+    pub mod extension {
+        pub use crate::extension::*;
     }
     /// Rays, hits and points on surfaces.
     pub mod geometry {

@@ -2,6 +2,7 @@
 
 use crate::accel::{Intersector, WideBvh};
 use crate::counters::Counters;
+use crate::extension::Extension;
 use crate::film::{Film, PixelSums};
 use crate::instructions::{INSTRUCTION_SET, missing_instructions};
 use crate::learn::cache::Cache;
@@ -104,10 +105,18 @@ pub enum Phase {
 /// The shared side of a render: scene, kernels, and its [`SessionState`], whose methods it has. Frozen while shards step,
 /// changed between iterations.
 #[derive(Debug)]
-pub struct Session<'s, 'm, P: Profile = Full, I: Intersector = WideBvh<'s>, L: LightSelector = PowerSelector<'s>> {
+pub struct Session<
+    's,
+    'm,
+    P: Profile = Full,
+    I: Intersector = WideBvh<'s>,
+    L: LightSelector = PowerSelector<'s>,
+    X: Extension = (),
+> {
     scene: Scene<'s>,
     intersector: I,
     selector: L,
+    extension: X,
     state: SessionState<'m>,
     profile: PhantomData<P>,
 }
@@ -134,10 +143,18 @@ pub struct SessionState<'m> {
 /// The state of a session together with a scene, for as long as shards step: what [`Shard::step`] takes in place of a
 /// [`Session`].
 #[derive(Clone, Copy, Debug)]
-pub struct SessionView<'a, 'm, P: Profile = Full, I: Intersector = WideBvh<'a>, L: LightSelector = PowerSelector<'a>> {
+pub struct SessionView<
+    'a,
+    'm,
+    P: Profile = Full,
+    I: Intersector = WideBvh<'a>,
+    L: LightSelector = PowerSelector<'a>,
+    X: Extension = (),
+> {
     scene: Scene<'a>,
     intersector: I,
     selector: L,
+    extension: X,
     state: &'a SessionState<'m>,
     camera_media: u32,
     profile: PhantomData<P>,
@@ -145,37 +162,50 @@ pub struct SessionView<'a, 'm, P: Profile = Full, I: Intersector = WideBvh<'a>, 
 
 /// The replaceable parts of a session; see [`Session::builder`].
 #[derive(Clone, Copy, Debug)]
-pub struct SessionBuilder<'s, P: Profile = Full, I: Intersector = WideBvh<'s>, L: LightSelector = PowerSelector<'s>> {
+pub struct SessionBuilder<
+    's,
+    P: Profile = Full,
+    I: Intersector = WideBvh<'s>,
+    L: LightSelector = PowerSelector<'s>,
+    X: Extension = (),
+> {
     scene: Scene<'s>,
     intersector: I,
     selector: L,
+    extension: X,
     profile: PhantomData<P>,
 }
 
-impl<'s, P: Profile, I: Intersector, L: LightSelector> SessionBuilder<'s, P, I, L> {
+impl<'s, P: Profile, I: Intersector, L: LightSelector, X: Extension> SessionBuilder<'s, P, I, L, X> {
     /// Kernels of another profile: those of `Q` and no more are compiled in.
-    pub fn profile<Q: Profile>(self) -> SessionBuilder<'s, Q, I, L> {
-        let Self { scene, intersector, selector, .. } = self;
-        SessionBuilder { scene, intersector, selector, profile: PhantomData }
+    pub fn profile<Q: Profile>(self) -> SessionBuilder<'s, Q, I, L, X> {
+        let Self { scene, intersector, selector, extension, .. } = self;
+        SessionBuilder { scene, intersector, selector, extension, profile: PhantomData }
     }
 
     /// Another intersector than the scene's own tree.
-    pub fn intersector<J: Intersector>(self, intersector: J) -> SessionBuilder<'s, P, J, L> {
-        let Self { scene, selector, profile, .. } = self;
-        SessionBuilder { scene, intersector, selector, profile }
+    pub fn intersector<J: Intersector>(self, intersector: J) -> SessionBuilder<'s, P, J, L, X> {
+        let Self { scene, selector, extension, profile, .. } = self;
+        SessionBuilder { scene, intersector, selector, extension, profile }
     }
 
     /// Another choice of lights than by power.
-    pub fn light_selector<M: LightSelector>(self, selector: M) -> SessionBuilder<'s, P, I, M> {
-        let Self { scene, intersector, profile, .. } = self;
-        SessionBuilder { scene, intersector, selector, profile }
+    pub fn light_selector<M: LightSelector>(self, selector: M) -> SessionBuilder<'s, P, I, M, X> {
+        let Self { scene, intersector, extension, profile, .. } = self;
+        SessionBuilder { scene, intersector, selector, extension, profile }
+    }
+
+    /// Ray sources, textures, a scattering model or factors of roulette of the host's own.
+    pub fn extension<Y: Extension>(self, extension: Y) -> SessionBuilder<'s, P, I, L, Y> {
+        let Self { scene, intersector, selector, profile, .. } = self;
+        SessionBuilder { scene, intersector, selector, extension, profile }
     }
 
     /// Carves the shared block of at least [`Plan::session`] bytes.
     ///
     /// # Errors
     /// A scene that calls for effects outside the profile, or a block that does not fit.
-    pub fn build<'m>(self, plan: &Plan, block: &'m mut [u8]) -> Result<Session<'s, 'm, P, I, L>, SessionError> {
+    pub fn build<'m>(self, plan: &Plan, block: &'m mut [u8]) -> Result<Session<'s, 'm, P, I, L, X>, SessionError> {
         let mut session = self.carve(plan, block, false)?;
         session.film.clear();
         session.learned.forget();
@@ -189,7 +219,7 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector> SessionBuilder<'s, P, I, 
     /// # Errors
     /// As of [`Self::build`], and [`SessionError::Resume`] for a block without a suspended session of this plan. The
     /// block is as before then. Its tables are not checked: other bytes in them make another picture, never a panic.
-    pub fn resume<'m>(self, plan: &Plan, block: &'m mut [u8]) -> Result<Session<'s, 'm, P, I, L>, SessionError> {
+    pub fn resume<'m>(self, plan: &Plan, block: &'m mut [u8]) -> Result<Session<'s, 'm, P, I, L, X>, SessionError> {
         self.carve(plan, block, true)
     }
 
@@ -199,12 +229,12 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector> SessionBuilder<'s, P, I, 
         plan: &Plan,
         block: &'m mut [u8],
         resume: bool,
-    ) -> Result<Session<'s, 'm, P, I, L>, SessionError> {
+    ) -> Result<Session<'s, 'm, P, I, L, X>, SessionError> {
         if let Some(missing) = missing_instructions() {
             return Err(SessionError::Instructions { missing });
         }
-        let Self { scene, intersector, selector, profile } = self;
-        check_effects::<P>(&scene)?;
+        let Self { scene, intersector, selector, extension, profile } = self;
+        check_effects::<P, X>(&scene)?;
         let camera_media = || camera_media::<P, I>(&scene, &intersector);
         let mut c = Carver::new(block, plan.session()).map_err(SessionError::Memory)?;
         let s = plan.settings();
@@ -237,7 +267,7 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector> SessionBuilder<'s, P, I, 
             scene: scene.hash,
             camera_media: scalars.camera_media,
         };
-        Ok(Session { scene, intersector, selector, state, profile })
+        Ok(Session { scene, intersector, selector, extension, state, profile })
     }
 
     /// The state of a session with the parts of this builder, for shards to step; in a fixed short time, so that it can
@@ -246,21 +276,27 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector> SessionBuilder<'s, P, I, 
     ///
     /// # Errors
     /// A scene that calls for effects outside the profile.
-    pub fn view<'a, 'm>(self, state: &'a SessionState<'m>) -> Result<SessionView<'a, 'm, P, I, L>, SessionError>
+    pub fn view<'a, 'm>(self, state: &'a SessionState<'m>) -> Result<SessionView<'a, 'm, P, I, L, X>, SessionError>
     where
         's: 'a,
     {
-        let Self { scene, intersector, selector, profile } = self;
-        check_effects::<P>(&scene)?;
+        let Self { scene, intersector, selector, extension, profile } = self;
+        check_effects::<P, X>(&scene)?;
         let same = state.scene == scene.hash;
         let camera_media = if same { state.camera_media } else { camera_media::<P, I>(&scene, &intersector) };
-        Ok(SessionView { scene, intersector, selector, state, camera_media, profile })
+        Ok(SessionView { scene, intersector, selector, extension, state, camera_media, profile })
     }
 }
 
-fn check_effects<P: Profile>(scene: &Scene<'_>) -> Result<(), SessionError> {
-    let missing = scene.effects.without(P::EFFECTS);
-    if P::EFFECTS.contains(scene.effects) { Ok(()) } else { Err(SessionError::Profile { missing }) }
+/// Effects of the kernels: those of the profile, the host's own scattering model only where there is one.
+const fn effects<P: Profile, X: Extension>() -> Effects {
+    if X::BSDF { P::EFFECTS } else { P::EFFECTS.without(Effects::OWN) }
+}
+
+fn check_effects<P: Profile, X: Extension>(scene: &Scene<'_>) -> Result<(), SessionError> {
+    let kernels = effects::<P, X>();
+    let missing = scene.effects.without(kernels);
+    if kernels.contains(scene.effects) { Ok(()) } else { Err(SessionError::Profile { missing }) }
 }
 
 /// Bits of the media that the camera is inside of.
@@ -290,19 +326,20 @@ impl<'s, 'm> Session<'s, 'm> {
     /// A session whose parts can be replaced before it is built; at first they are those of [`Session::new`].
     pub fn builder(scene: Scene<'s>) -> SessionBuilder<'s> {
         let (intersector, selector) = (WideBvh::new(&scene), PowerSelector(scene));
-        SessionBuilder { scene, intersector, selector, profile: PhantomData }
+        SessionBuilder { scene, intersector, selector, extension: (), profile: PhantomData }
     }
 }
 
 /// Both show shards the same.
 macro_rules! worlds {
     ($($World:ty, $camera_media:expr;)*) => {$(
-        impl<P: Profile, I: Intersector, L: LightSelector> Sealed for $World {}
+        impl<P: Profile, I: Intersector, L: LightSelector, X: Extension> Sealed for $World {}
 
-        impl<P: Profile, I: Intersector, L: LightSelector> World for $World {
-            const EFFECTS: Effects = P::EFFECTS;
+        impl<P: Profile, I: Intersector, L: LightSelector, X: Extension> World for $World {
+            const EFFECTS: Effects = effects::<P, X>();
             type Intersector = I;
             type Lights = L;
+            type Extension = X;
 
             #[inline(always)]
             fn scene(&self) -> &Scene<'_> {
@@ -317,6 +354,11 @@ macro_rules! worlds {
             #[inline(always)]
             fn lights(&self) -> &L {
                 &self.selector
+            }
+
+            #[inline(always)]
+            fn extension(&self) -> &X {
+                &self.extension
             }
 
             #[inline(always)]
@@ -348,11 +390,11 @@ macro_rules! worlds {
 }
 
 worlds! {
-    Session<'_, '_, P, I, L>, |s: &Self| s.state.camera_media;
-    SessionView<'_, '_, P, I, L>, |s: &Self| s.camera_media;
+    Session<'_, '_, P, I, L, X>, |s: &Self| s.state.camera_media;
+    SessionView<'_, '_, P, I, L, X>, |s: &Self| s.camera_media;
 }
 
-impl<'m, P: Profile, I: Intersector, L: LightSelector> Deref for Session<'_, 'm, P, I, L> {
+impl<'m, P: Profile, I: Intersector, L: LightSelector, X: Extension> Deref for Session<'_, 'm, P, I, L, X> {
     type Target = SessionState<'m>;
 
     #[inline(always)]
@@ -361,14 +403,14 @@ impl<'m, P: Profile, I: Intersector, L: LightSelector> Deref for Session<'_, 'm,
     }
 }
 
-impl<P: Profile, I: Intersector, L: LightSelector> DerefMut for Session<'_, '_, P, I, L> {
+impl<P: Profile, I: Intersector, L: LightSelector, X: Extension> DerefMut for Session<'_, '_, P, I, L, X> {
     #[inline(always)]
     fn deref_mut(&mut self) -> &mut Self::Target {
         &mut self.state
     }
 }
 
-impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I, L> {
+impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector, X: Extension> Session<'s, 'm, P, I, L, X> {
     /// See [`SessionState::suspend`].
     pub fn suspend(self) {
         self.state.suspend();
@@ -428,12 +470,12 @@ impl<'m> SessionState<'m> {
     ///
     /// # Errors
     /// A scene that calls for effects outside the profile `P`; then nothing has changed.
-    pub fn change_scene<P: Profile, I: Intersector, L: LightSelector>(
+    pub fn change_scene<P: Profile, I: Intersector, L: LightSelector, X: Extension>(
         &mut self,
-        to: &SessionBuilder<'_, P, I, L>,
+        to: &SessionBuilder<'_, P, I, L, X>,
         keep_statistics: bool,
     ) -> Result<(), SessionError> {
-        check_effects::<P>(&to.scene)?;
+        check_effects::<P, X>(&to.scene)?;
         self.restart(keep_statistics);
         (self.scene, self.camera_media) = (to.scene.hash, camera_media::<P, I>(&to.scene, &to.intersector));
         Ok(())

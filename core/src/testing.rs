@@ -174,6 +174,7 @@ impl<'a> World for TestWorld<'a> {
     const EFFECTS: Effects = Effects(u32::MAX);
     type Intersector = BruteForce<'a>;
     type Lights = PowerSelector<'a>;
+    type Extension = ();
 
     fn scene(&self) -> &Scene<'_> {
         self.scene
@@ -185,6 +186,10 @@ impl<'a> World for TestWorld<'a> {
 
     fn lights(&self) -> &PowerSelector<'a> {
         &self.lights
+    }
+
+    fn extension(&self) -> &() {
+        &()
     }
 
     fn learned(&self) -> &LearnedState<'_> {

@@ -2,6 +2,7 @@
 //! while an iteration runs.
 
 use crate::accel::Intersector;
+use crate::extension::Extension;
 use crate::learn::LearnedState;
 use crate::light::LightSelector;
 use crate::scene::{Effects, Scene};
@@ -39,6 +40,8 @@ pub trait World: sealed::Sealed {
     type Intersector: Intersector;
     /// What chooses lights.
     type Lights: LightSelector;
+    /// What the host computes.
+    type Extension: Extension;
 
     /// The scene.
     fn scene(&self) -> &Scene<'_>;
@@ -46,6 +49,8 @@ pub trait World: sealed::Sealed {
     fn intersector(&self) -> &Self::Intersector;
     /// What chooses lights.
     fn lights(&self) -> &Self::Lights;
+    /// What the host computes.
+    fn extension(&self) -> &Self::Extension;
     /// Statistics of earlier iterations.
     fn learned(&self) -> &LearnedState<'_>;
     /// The iteration that runs.

@@ -171,7 +171,7 @@ impl Case {
     pub fn two_sided(&self) -> bool {
         use MaterialKind::*;
         match self.kind {
-            Dielectric | RoughDielectric | ThinDielectric | Null | Principled => true,
+            Dielectric | RoughDielectric | ThinDielectric | Null | Principled | Own => true,
             Diffuse | Mirror | Conductor | RoughConductor | Plastic | RoughPlastic => false,
         }
     }
@@ -261,7 +261,7 @@ impl Case {
         use MaterialKind::*;
         match self.kind {
             RoughConductor | RoughDielectric | RoughPlastic => {}
-            Diffuse | Mirror | Conductor | Dielectric | ThinDielectric | Plastic | Null | Principled => {
+            Diffuse | Mirror | Conductor | Dielectric | ThinDielectric | Plastic | Null | Principled | Own => {
                 return Value::default();
             }
         }
@@ -316,9 +316,8 @@ impl Case {
                 let scale = self.coat(wo[2]) * self.coat(wi[2]) / self.eta().powi(2) * pdf;
                 Value { f: self.base().map(|r| r * scale), pdf }
             }
-            Mirror | Conductor | RoughConductor | Dielectric | RoughDielectric | ThinDielectric | Null | Principled => {
-                Value::default()
-            }
+            Mirror | Conductor | RoughConductor | Dielectric | RoughDielectric | ThinDielectric | Null | Principled
+            | Own => Value::default(),
         }
     }
 
@@ -364,7 +363,7 @@ impl Case {
                 }
                 lobes
             }
-            Diffuse | RoughConductor | RoughDielectric | RoughPlastic | Principled => vec![],
+            Diffuse | RoughConductor | RoughDielectric | RoughPlastic | Principled | Own => vec![],
         }
     }
 
@@ -492,7 +491,8 @@ fn all_cases() -> Vec<Case> {
 #[track_caller]
 pub fn assert_every_kind(tried: &[MaterialKind], wanted: impl Fn(&MaterialKind) -> bool) {
     let missing: Vec<_> = MaterialKind::ALL.iter().filter(|k| wanted(k) && !tried.contains(k)).collect();
-    let missing: Vec<_> = missing.into_iter().filter(|k| **k != MaterialKind::Principled).collect();
+    let missing: Vec<_> =
+        missing.into_iter().filter(|k| !matches!(**k, MaterialKind::Principled | MaterialKind::Own)).collect();
     assert!(missing.is_empty(), "no case of {missing:?}");
 }
 

@@ -39,7 +39,8 @@ fn scattering_models() {
         | MaterialKind::Dielectric
         | MaterialKind::ThinDielectric
         | MaterialKind::Null
-        | MaterialKind::Principled => false,
+        | MaterialKind::Principled
+        | MaterialKind::Own => false,
     };
     let (mut tried, mut kinds) = (0, vec![]);
     for case in cases().iter().filter(smooth) {

@@ -17,6 +17,7 @@ mod henyey_greenstein;
 mod lobes;
 mod mirror;
 mod null;
+mod own;
 mod plastic;
 pub mod principled;
 mod roughconductor;
@@ -32,6 +33,7 @@ pub use henyey_greenstein::HenyeyGreenstein;
 pub use lobes::{CacheDirection, Lobes, MIRROR_SHININESS, ModelFacts};
 pub use mirror::Mirror;
 pub use null::Null;
+pub use own::NoBsdf;
 pub use plastic::Plastic;
 pub use principled::Principled;
 pub use roughconductor::RoughConductor;
@@ -211,6 +213,7 @@ models! {
     RoughPlastic => RoughPlastic<'s>, RoughPlastic<'s, false>;
     Null => Null;
     Principled => Principled<'s>;
+    Own => NoBsdf;
 }
 
 /// A set of material kinds, a bit each, from a table of one entry per kind.

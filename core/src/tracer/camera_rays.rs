@@ -9,6 +9,7 @@ use super::packets::RayState8;
 use super::path::Path8;
 use super::root::PixelTarget;
 use crate::camera;
+use crate::extension::{Extension, PixelSamples8, SourceRays8};
 use crate::geometry::Ray8;
 use crate::rng::Key8;
 use crate::scene::Effects;
@@ -131,16 +132,25 @@ pub(crate) fn camera_rays<W: World>(
     let [u0, u1, u2, u3] = key.pixel_and_lens();
     let px = F32x8::from_fn(|i| x[i] as f32) + u0;
     let py = F32x8::from_fn(|i| y[i] as f32) + u1;
-    let lens = if W::EFFECTS.contains(Effects::LENS) { [u2, u3] } else { [F32x8::ZERO; 2] };
-    let scene = world.scene();
-    let (o, d) = if W::EFFECTS.contains(Effects::PROJECTIONS) && scene.effects.contains(Effects::PROJECTIONS) {
-        camera::project(scene.camera, settings.size, px, py, lens)
+    let asked = Mask8::first(lanes);
+    let source = if W::Extension::RAYS {
+        let (column, row) = (U32x8::new(x), U32x8::new(y));
+        let (position, u) = ([px, py], [u2, u3]);
+        let samples = PixelSamples8 { size: settings.size, column, row, position, u, active: asked };
+        let source = world.extension().rays(world.scene(), &samples);
+        SourceRays8 { active: source.active & asked, ..source }
     } else {
-        camera::generate(scene.camera, settings.size, px, py, lens)
+        let (origin, direction) = through_lens(world, settings.size, [px, py], [u2, u3]);
+        SourceRays8 { origin, direction, weight: Vec3x8::ONE, active: asked }
     };
-    book.counters.camera_rays += lanes as u64;
+    let (o, d, active) = (source.origin, source.direction, source.active);
+    let path = Path8 { root: U32x8::new(root), record: U32x8::new(record), depth: U32x8::splat(1) };
+    if W::Extension::RAYS {
+        book.close_lanes(asked.and_not(active), &path);
+    }
+    book.counters.camera_rays += if W::Extension::RAYS { active.count().into() } else { lanes as u64 };
     RayState8 {
-        active: Mask8::first(lanes),
+        active,
         ray: Ray8::unbounded(o, d),
         from: o,
         normal: Vec3x8::ZERO,
@@ -150,13 +160,25 @@ pub(crate) fn camera_rays<W: World>(
         } else {
             MediaSet8::NONE
         },
-        beta: Vec3x8::ONE,
-        weight: Vec3x8::ONE,
+        beta: source.weight,
+        weight: source.weight,
         pdf: F32x8::ONE,
         skip_mis: Mask8::all_lanes(),
-        path: Path8 { root: U32x8::new(root), record: U32x8::new(record), depth: U32x8::splat(1) },
+        path,
         key: key.next_vertex(),
         albedo_product: F32x8::ONE,
         error_weight: Vec3x8::from_fn(|i| weight[i]),
+    }
+}
+
+/// Rays of the scene's camera through points of the picture: origins and unit directions.
+#[inline(always)]
+fn through_lens<W: World>(world: &W, size: [u32; 2], [x, y]: [F32x8; 2], u: [F32x8; 2]) -> (Vec3x8, Vec3x8) {
+    let scene = world.scene();
+    let lens = if W::EFFECTS.contains(Effects::LENS) { u } else { [F32x8::ZERO; 2] };
+    if W::EFFECTS.contains(Effects::PROJECTIONS) && scene.effects.contains(Effects::PROJECTIONS) {
+        camera::project(scene.camera, size, x, y, lens)
+    } else {
+        camera::generate(scene.camera, size, x, y, lens)
     }
 }

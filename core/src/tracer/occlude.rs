@@ -81,7 +81,7 @@ fn walk<W: World>(world: &W, book: &mut Bookkeeping<'_>, samples: &Samples8, s: 
         let surface = SurfaceHit8::gather(scene, &hit);
         let point = surface.point();
         if hit.hit.any() {
-            let share = straight_share::<W>(scene, &surface, -ray.d.normalize(), point.ng, media);
+            let share = straight_share(world, &surface, -ray.d.normalize(), point.ng, media);
             transmittance = Vec3x8::select(hit.hit, transmittance * share, transmittance);
         }
         if W::EFFECTS.contains(Effects::MEDIA) {

@@ -8,9 +8,10 @@ use super::packets::Contribution8;
 use super::ring::RESERVE;
 use super::shading::Arrival8;
 use super::vertex::pack_samples;
-use crate::bsdf;
+use crate::bsdf::{self, Bsdf};
+use crate::extension::Extension;
 use crate::learn::cache::NO_BIN;
-use crate::rrs::{self, Learned8, Vertices8};
+use crate::rrs::{self, Learned8, MAX_FACTOR, MIN_FACTOR, Vertices8};
 use crate::scene::Scene;
 use crate::scene::blob::MaterialKind;
 use crate::settings::Settings;
@@ -63,12 +64,23 @@ pub(crate) struct Decision8 {
 }
 
 /// Phong exponents of the materials; 0 where there is none.
-fn shininess(scene: &Scene<'_>, a: &Arrival8) -> F32x8 {
+fn shininess<W: World>(scene: &Scene<'_>, a: &Arrival8) -> F32x8 {
     let material = a.vertex.material.to_array();
     F32x8::from_fn(|i| {
         let kind = MaterialKind::from_u32(a.kind[i]);
-        kind.zip(scene.materials.get(material[i] as usize)).map_or(0.0, |(kind, m)| bsdf::shininess(kind, m))
+        kind.zip(scene.materials.get(material[i] as usize)).map_or(0.0, |(kind, m)| match kind {
+            MaterialKind::Own => <W::Extension as Extension>::Bsdf::shininess(m),
+            _ => bsdf::shininess(kind, m),
+        })
     })
+}
+
+/// The host's factors, clamped as those of strategies, and the lanes in which they were finite.
+#[inline(always)]
+fn own_factor<W: World>(world: &W, v: &Vertices8, built_in: F32x8, finite: Mask8) -> (F32x8, Mask8) {
+    let s = world.extension().factor(v, built_in);
+    let own = s.is_finite();
+    (own.select(s, F32x8::ONE).clamp(MIN_FACTOR, MAX_FACTOR), finite & own)
 }
 
 /// Rounds the factors of the vertices that paths have arrived at, and gives the vertices their samples; `free` are the
@@ -96,15 +108,17 @@ pub(crate) fn roulette<W: World>(
             key = Some(found);
         }
     }
-    let (s, finite) = strategy.checked_factor(&Vertices8 {
+    let vertices = Vertices8 {
         beta: v.beta,
         last_weight: a.weight,
         albedo: a.albedo,
         albedo_product: v.albedo_product,
         depth: v.path.depth,
-        shininess: if strategy.needs_shininess() { shininess(world.scene(), a) } else { F32x8::ZERO },
+        shininess: if strategy.needs_shininess() { shininess::<W>(world.scene(), a) } else { F32x8::ZERO },
         learned,
-    });
+    };
+    let (s, finite) = strategy.checked_factor(&vertices);
+    let (s, finite) = if W::Extension::ROULETTE { own_factor(world, &vertices, s, finite) } else { (s, finite) };
     book.counters.factors_not_finite += u64::from(active.and_not(finite).count());
     let [least, most] = settings.learning.factors;
     let s = if key.is_some() { s.clamp(least, most) } else { s };

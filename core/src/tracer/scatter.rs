@@ -3,7 +3,8 @@
 use super::class::Kernel as ClassKernel;
 use super::crossing::media_towards;
 use super::packets::{RayState8, Samples8};
-use crate::bsdf::{self, Bsdf, Eval8, HenyeyGreenstein, Inputs8, Sample8, Visitor, folded};
+use super::shading::dispatch;
+use crate::bsdf::{Bsdf, Eval8, HenyeyGreenstein, Inputs8, Sample8, Visitor, folded};
 use crate::geometry::{self, Ray8};
 use crate::scene::{Effects, Scene};
 use crate::world::World;
@@ -59,7 +60,7 @@ pub(crate) fn scatter<W: World>(world: &W, samples: &Samples8, nee: Option<Vec3x
     let kernel = Kernel { scene: world.scene(), samples, nee, u: samples.key.scattering() };
     // a class outside the profile cannot be: sessions refuse such scenes
     let scattered = match samples.class.kernel() {
-        ClassKernel::Surface(kind) => bsdf::dispatch_in(W::EFFECTS, kind, kernel),
+        ClassKernel::Surface(kind) => dispatch::<W, _>(kind, kernel),
         ClassKernel::Phase if W::EFFECTS.contains(Effects::MEDIA) => Some(kernel.visit::<HenyeyGreenstein>()),
         _ => None,
     };

@@ -6,6 +6,7 @@ use super::packets::RayState8;
 use super::relief::relief;
 use super::vertex::PathVertex8;
 use crate::bsdf::{self, Bsdf, Inputs8, Lobes, Visitor};
+use crate::extension::{Extension, TextureSamples8};
 use crate::geometry::{SurfaceHit8, SurfacePoint8};
 use crate::learn::cache::NO_BIN;
 use crate::scene::blob::{MATERIAL_CUTOUT, MATERIAL_TWO_SIDED, MaterialKind, NONE};
@@ -44,7 +45,7 @@ impl Arrival8 {
 #[inline(always)]
 pub(crate) fn shade<W: World>(world: &W, rays: &RayState8, hit: &SurfaceHit8, point: &SurfacePoint8) -> Arrival8 {
     let wo = -rays.ray.d;
-    let m = Materials8::gather::<W>(world.scene(), hit, wo, point.ng, rays.media);
+    let m = Materials8::gather(world, hit, wo, point.ng, rays.media);
     Arrival8 {
         vertex: PathVertex8 {
             p: point.p,
@@ -87,7 +88,8 @@ struct Materials8 {
 impl Materials8 {
     /// Materials, shading normals and textures of the hit lanes.
     #[inline(never)]
-    fn gather<W: World>(scene: &Scene<'_>, hit: &SurfaceHit8, wo: Vec3x8, ng: Vec3x8, media: MediaSet8) -> Self {
+    fn gather<W: World>(world: &W, hit: &SurfaceHit8, wo: Vec3x8, ng: Vec3x8, media: MediaSet8) -> Self {
+        let scene = world.scene();
         let (mut kind, mut textures) = ([0u32; 8], [NONE; 8]);
         let (mut two_sided, mut through, mut textured, mut cutout) = (0u32, 0u32, 0u32, 0u32);
         let mut reflectance = [[0.0f32; 3]; 8];
@@ -125,6 +127,9 @@ impl Materials8 {
                 straight = mask.zero_unless(1.0 - alpha);
             }
         }
+        if W::Extension::TEXTURES {
+            reflectance = own_reflectance(world, hit, reflectance);
+        }
         if W::EFFECTS.contains(Effects::PRINCIPLED) && scene.effects.contains(Effects::PRINCIPLED) {
             let layered = hit.mask & bsdf::lanes_of(Effects::PRINCIPLED.0, &kind);
             if layered.any() {
@@ -144,7 +149,7 @@ impl Materials8 {
             let by_model = hit.mask & bsdf::lanes_of(bsdf::straight_kinds(), &kind);
             let material = U32x8::new(hit.material);
             let of = |mask| StraightOf { scene, material, reflectance, ns, wo, mask };
-            let share = each_kind(W::EFFECTS, by_model, &kind, of).x;
+            let share = each_kind::<W, _>(by_model, &kind, of).x;
             // through the holes, and through the rest
             straight = by_model.select(straight + (1.0 - straight) * share, straight);
             if W::EFFECTS.contains(Effects::MEDIA) && media.inside().any() {
@@ -156,6 +161,19 @@ impl Materials8 {
     }
 }
 
+/// Reflectances that the host's extension makes of those of materials and texture files.
+fn own_reflectance<W: World>(world: &W, hit: &SurfaceHit8, reflectance: Vec3x8) -> Vec3x8 {
+    let [wa, wb, wc] = hit.weights();
+    let uv = |k: usize| hit.of_vertex(world.scene(), k, |v| [v.uv[0], v.uv[1], 0.0]);
+    let at = uv(0) * wa + uv(1) * wb + uv(2) * wc;
+    let (material, point) = (U32x8::new(hit.material), hit.point().p);
+    let samples = TextureSamples8 { material, uv: [at.x, at.y], point, active: hit.mask };
+    let own = world.extension().reflectance(&samples, reflectance);
+    // a NaN becomes 0
+    let clamp = |x: F32x8| F32x8::ZERO.max(x).min(F32x8::ONE);
+    Vec3x8::new(clamp(own.x), clamp(own.y), clamp(own.z))
+}
+
 /// Does the scene hold anything that light may pass straight on?
 #[inline(always)]
 pub(crate) fn may_pass<W: World>(scene: &Scene<'_>) -> bool {
@@ -165,13 +183,13 @@ pub(crate) fn may_pass<W: World>(scene: &Scene<'_>) -> bool {
 /// Share of the light from the directions `wo` that passes the surfaces of `hit` straight on, within `media`; `ng` are
 /// their normals by winding.
 pub(crate) fn straight_share<W: World>(
-    scene: &Scene<'_>,
+    world: &W,
     hit: &SurfaceHit8,
     wo: Vec3x8,
     ng: Vec3x8,
     media: MediaSet8,
 ) -> F32x8 {
-    hit.mask.zero_unless(Materials8::gather::<W>(scene, hit, wo, ng, media).straight)
+    hit.mask.zero_unless(Materials8::gather(world, hit, wo, ng, media).straight)
 }
 
 /// The kernel of one material kind that says what passes straight on.
@@ -223,15 +241,24 @@ pub(crate) fn albedo<W: World>(world: &W, a: &Arrival8, active: Mask8) -> Vec3x8
     let (scene, vertex) = (world.scene(), &a.vertex);
     let phase = if W::EFFECTS.contains(Effects::MEDIA) { active & a.in_medium() } else { Mask8::NONE };
     let surface = active.and_not(phase);
-    let of = each_kind(W::EFFECTS, surface, &a.kind, |mask| AlbedoOf { scene, vertex, mask });
+    let of = each_kind::<W, _>(surface, &a.kind, |mask| AlbedoOf { scene, vertex, mask });
     Vec3x8::select(phase, vertex.reflectance, of)
 }
 
-/// What `kernel`, called with the lanes of one kind, says for its model in the lanes of `active`; 1 for kinds outside the
-/// constant `profile`, 0 in other lanes.
+/// Calls `v` with the model of a kind, or the host's own; `None` for kinds outside the profile.
 #[inline(always)]
-fn each_kind<'s, V: Visitor<'s, Out = Vec3x8>>(
-    profile: Effects,
+pub(super) fn dispatch<'s, W: World, V: Visitor<'s>>(kind: MaterialKind, v: V) -> Option<V::Out> {
+    match kind {
+        MaterialKind::Own if W::Extension::BSDF => Some(v.visit::<<W::Extension as Extension>::Bsdf>()),
+        MaterialKind::Own => None,
+        _ => bsdf::dispatch_in(W::EFFECTS, kind, v),
+    }
+}
+
+/// What `kernel`, called with the lanes of one kind, says for its model in the lanes of `active`; 1 for kinds outside the
+/// profile, 0 in other lanes.
+#[inline(always)]
+fn each_kind<'s, W: World, V: Visitor<'s, Out = Vec3x8>>(
     active: Mask8,
     kinds: &[u32; 8],
     kernel: impl Fn(Mask8) -> V,
@@ -243,7 +270,7 @@ fn each_kind<'s, V: Visitor<'s, Out = Vec3x8>>(
         let bits = active.lanes().filter(|&i| kinds[i] == kind).fold(0, |m, i| m | 1 << i);
         left &= !bits;
         let mask = Mask8::from_bits(bits);
-        let of = MaterialKind::from_u32(kind).and_then(|k| bsdf::dispatch_in(profile, k, kernel(mask)));
+        let of = MaterialKind::from_u32(kind).and_then(|k| dispatch::<W, _>(k, kernel(mask)));
         out = Vec3x8::select(mask, of.unwrap_or(Vec3x8::ONE), out);
     }
     out

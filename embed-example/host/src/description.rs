@@ -251,6 +251,8 @@ models! {
     RoughPlastic { reflectance: Reflectance, int_ior: f32, ext_ior: f32, alpha: f32 };
     /// Index-matched boundary: light passes unchanged.
     Null;
+    /// A host's own model: black unless the session has an extension with one.
+    Own { reflectance: Reflectance, alpha: f32 };
     /// Layers of sheen, coat, metal, dielectric, transmission and a diffuse base.
     Principled(principled: Principled);
 }

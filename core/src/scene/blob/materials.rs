@@ -60,6 +60,8 @@ macro_rules! material_table {
             Null = 9, "null", NULL, transmissive: true, delta: true, [];
             /// Layers of sheen, coat, metal, dielectric, transmission and a diffuse base.
             Principled = 10, "principled", PRINCIPLED, transmissive: true, delta: false, [Principled];
+            /// A host's own model.
+            Own = 11, "own", OWN, transmissive: true, delta: false, [Reflectance, Alpha];
         }
     };
 }

@@ -1,0 +1,242 @@
+//! Parts of the tracer that a host replaces: ray sources, textures, factors of roulette, a scattering model.
+
+use croupier::unstable::accel::WideBvh;
+use croupier::unstable::bsdf::{self, Bsdf, CacheDirection, Eval8, Inputs8, Lobes, NoBsdf, Sample8};
+use croupier::unstable::extension::{Extension, PixelSamples8, SourceRays8, TextureSamples8};
+use croupier::unstable::profile::Full;
+use croupier::unstable::rrs::Vertices8;
+use croupier::unstable::scene::blob::Material;
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::unstable::{camera, film::PixelStats, light::PowerSelector};
+use croupier::{Budget, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
+use croupier_host::blob::AlignedBytes;
+use croupier_host::description::{self, Model, Reflectance, SceneDescription};
+use croupier_tests::runner::settings;
+use croupier_tests::scenes::{add_quad, blob, camera as look, cornell, facing_y, grey, in_white_environment};
+
+/// Renders iterations of `spp` samples with an extension.
+fn render<X: Extension>(bytes: &[u8], s: &Settings, iterations: &[u32], extension: X) -> Vec<PixelStats> {
+    let scene = Scene::from_bytes(bytes).unwrap();
+    let plan = Plan::new(s).unwrap();
+    let [mut shared, mut block] = [plan.session(), plan.shard()].map(|l| AlignedBytes::zeroed(l.size));
+    type Own<'s, 'm, X> = Session<'s, 'm, Full, WideBvh<'s>, PowerSelector<'s>, X>;
+    let mut session: Own<'_, '_, X> =
+        Session::builder(scene).profile().extension(extension).build(&plan, shared.as_mut()).unwrap();
+    let mut shard = Shard::new(&plan, 0, block.as_mut()).unwrap();
+    for &spp in iterations {
+        session.begin_iteration(spp);
+        while shard.step(&session, Budget { rays: 1 << 20 }) == StepResult::More {}
+        session.end_iteration([&shard]).unwrap();
+    }
+    assert_eq!(session.counters().non_finite, 0);
+    session.film().pixels().to_vec()
+}
+
+fn bits(pixels: &[PixelStats]) -> &[u8] {
+    bytemuck::cast_slice(pixels)
+}
+
+/// Mean over pixels and channels, and its standard error.
+fn mean(pixels: &[PixelStats]) -> [f64; 2] {
+    let n = (3 * pixels.len()) as f64;
+    let variance = pixels.iter().map(|p| p.variance_of_mean().map(f64::sqrt).iter().sum::<f64>().powi(2)).sum::<f64>();
+    [pixels.iter().flat_map(|p| p.mean()).sum::<f64>() / n, variance.sqrt() / n]
+}
+
+#[track_caller]
+fn assert_same_mean(a: &[PixelStats], b: &[PixelStats], power: f64) {
+    let ([a, ea], [b, eb]) = (mean(a), mean(b));
+    let noise = ea.hypot(eb);
+    assert!(noise < power * a, "{noise} of {a}: the test could not tell");
+    assert!((a - b).abs() < 4.0 * noise, "{a} and {b} +- {noise}");
+}
+
+/// The scene's camera, computed by the host.
+struct OwnCamera;
+
+impl Extension for OwnCamera {
+    type Bsdf = NoBsdf;
+    const RAYS: bool = true;
+
+    fn rays(&self, scene: &Scene<'_>, s: &PixelSamples8) -> SourceRays8 {
+        let [x, y] = s.position;
+        let (origin, direction) = camera::generate(scene.camera, s.size, x, y, s.u);
+        SourceRays8 { origin, direction, weight: Vec3x8::ONE, active: s.active }
+    }
+}
+
+/// Killed by: samples that are handed over in other lanes, a weight that is not 1, a sample that is counted twice.
+#[test]
+fn rays_of_the_host_are_rays_of_the_camera() {
+    let bytes = blob(&cornell([20, 12]));
+    for strategy in ["classic", "ears"] {
+        let s = settings(&bytes, strategy);
+        let [own, built_in] = [render(&bytes, &s, &[4, 4], OwnCamera), render(&bytes, &s, &[4, 4], ())];
+        assert!(bits(&own) == bits(&built_in), "{strategy}");
+    }
+}
+
+/// Texels of a lightmap of the floor: irradiance over pi. The left half has no surface.
+struct Lightmap;
+
+impl Extension for Lightmap {
+    type Bsdf = NoBsdf;
+    const RAYS: bool = true;
+
+    fn rays(&self, _: &Scene<'_>, s: &PixelSamples8) -> SourceRays8 {
+        let [w, h] = s.size.map(|n| n as f32);
+        let (x, z) = (s.position[0] * (2.0 / w) - 1.0, s.position[1] * (2.0 / h) - 1.0);
+        let [dx, dz] = camera::concentric_disk(s.u);
+        let dy = (F32x8::ONE - dx * dx - dz * dz).max(F32x8::ZERO).sqrt();
+        SourceRays8 {
+            origin: Vec3x8::new(x, F32x8::splat(1e-3), z),
+            direction: Vec3x8::new(dx, dy, dz),
+            weight: Vec3x8::ONE,
+            active: s.active & U32x8::splat(s.size[0] / 2 - 1).lt(s.column),
+        }
+    }
+}
+
+/// A floor under a constant sky of radiance 1 with a ceiling above: texels far from it see the whole sky. Killed by:
+/// a sample without a ray that is not counted (its pixel would be brighter), or leaves a root open (the render would
+/// not end), a weight that is left out.
+#[test]
+fn lightmaps_are_pictures_of_texels() {
+    let mut scene = in_white_environment(look([0.0, 3.0, 4.0], [0.0; 3], 40.0, [16, 8]));
+    let floor = scene.add_material("floor", grey(0.0));
+    add_quad(&mut scene, "floor", floor, facing_y(2.0, 0.0, 1.0));
+    let bytes = blob(&scene);
+    for strategy in ["classic", "fixed:2.5", "ears"] {
+        let pixels = render(&bytes, &settings(&bytes, strategy), &[2, 30], Lightmap);
+        for (i, p) in pixels.iter().enumerate() {
+            let expected = if i % 16 >= 8 { 1.0 } else { 0.0 };
+            assert_eq!(p.samples, 32);
+            for x in p.mean() {
+                assert!((x - expected).abs() < 1e-6, "{strategy}: pixel {i} has {x}");
+            }
+        }
+    }
+}
+
+/// Stripes by coordinate; what is 2 is clamped to 1.
+struct Stripes([f32; 3]);
+
+impl Extension for Stripes {
+    type Bsdf = NoBsdf;
+    const TEXTURES: bool = true;
+
+    fn reflectance(&self, at: &TextureSamples8, reflectance: Vec3x8) -> Vec3x8 {
+        let of_first = at.active & at.material.eq(U32x8::splat(0));
+        Vec3x8::select(of_first, Vec3x8::splat(self.0[0], self.0[1], self.0[2]), reflectance)
+    }
+}
+
+/// Killed by: reflectance that is not handed on, that of other materials changed, no clamp.
+#[test]
+fn textures_of_the_host_are_reflectances() {
+    let mut scene = cornell([20, 12]);
+    let bytes = blob(&scene);
+    let s = settings(&bytes, "ears");
+    let own = render(&bytes, &s, &[4, 4], Stripes([0.25, 0.5, 2.0]));
+    scene.materials[0].model = Model::Diffuse { reflectance: Reflectance::Constant([0.25, 0.5, 1.0]) };
+    let painted = blob(&scene);
+    assert!(bits(&own) == bits(&render(&painted, &s, &[4, 4], ())));
+    assert!(bits(&own) != bits(&render(&bytes, &s, &[4, 4], ())), "the material is not seen");
+}
+
+/// A factor that follows no rule, now and then not finite.
+struct Wild;
+
+impl Extension for Wild {
+    type Bsdf = NoBsdf;
+    const ROULETTE: bool = true;
+
+    fn factor(&self, v: &Vertices8, built_in: F32x8) -> F32x8 {
+        let red = v.beta.x * 7.0;
+        let wild = red - F32x8::from_fn(|i| red.lane(i).floor());
+        v.depth.eq(U32x8::splat(3)).select(built_in, 0.3 + 2.0 * wild)
+    }
+}
+
+/// Whatever the factor, the mean stays. Killed by: a factor that weighs samples and is not the one that rounds them.
+#[test]
+fn factors_of_the_host_leave_the_mean() {
+    let bytes = blob(&cornell([16, 16]));
+    let s = Settings { max_depth: 8, ..settings(&bytes, "classic") };
+    let wild = render(&bytes, &s, &[300], Wild);
+    let plain = render(&bytes, &Settings { seed: 9, ..s }, &[300], ());
+    assert_same_mean(&plain, &wild, 0.012);
+    assert!(bits(&wild) != bits(&render(&bytes, &s, &[300], ())), "the factors are not asked for");
+}
+
+/// A Lambertian model written by a host.
+#[derive(Clone, Copy)]
+struct Chalk {
+    rho: Vec3x8,
+}
+
+impl<'s> Bsdf<'s> for Chalk {
+    const LOBES: Lobes = Lobes::DIFFUSE;
+    const CACHE_DIRECTION: CacheDirection = CacheDirection::Normal;
+
+    fn gather(_: &Scene<'s>, inputs: &Inputs8, _: Mask8) -> Self {
+        Self { rho: inputs.reflectance }
+    }
+
+    fn eval(&self, wo: Vec3x8, wi: Vec3x8) -> Eval8 {
+        let both = wo.z.gt(F32x8::ZERO) & wi.z.gt(F32x8::ZERO);
+        let pdf = both.zero_unless(wi.z * std::f32::consts::FRAC_1_PI);
+        Eval8 { f: self.rho * pdf, pdf }
+    }
+
+    fn sample(&self, wo: Vec3x8, u: [F32x8; 3]) -> Sample8 {
+        let wi = bsdf::warp::cosine_hemisphere(u[0], u[1]);
+        let pdf = wi.z * std::f32::consts::FRAC_1_PI;
+        let valid = wo.z.gt(F32x8::ZERO) & pdf.gt(F32x8::ZERO);
+        Sample8 { wi, weight: self.rho.zero_unless(valid), pdf, delta: Mask8::NONE, valid }
+    }
+
+    fn albedo(&self, _: Vec3x8) -> Vec3x8 {
+        self.rho
+    }
+
+    fn shininess(_: &Material) -> f32 {
+        0.0
+    }
+}
+
+struct WithChalk;
+
+impl Extension for WithChalk {
+    type Bsdf = Chalk;
+    const BSDF: bool = true;
+}
+
+/// Every diffuse surface made of chalk looks as before; without the model the scene is refused. Killed by: another model
+/// that is called, a missing light sample or MIS weight, a scene that is rendered black without a word.
+#[test]
+fn scattering_models_of_the_host_scatter() {
+    let mut scene: SceneDescription = cornell([16, 16]);
+    // its own model sees both sides
+    scene.materials.iter_mut().for_each(|m| m.two_sided = false);
+    let plain = blob(&scene);
+    for m in &mut scene.materials {
+        if let Model::Diffuse { reflectance } = m.model {
+            m.model = Model::Own { reflectance, alpha: 0.5 };
+        }
+    }
+    let chalk = blob(&scene);
+    for strategy in ["classic", "ears", "fixed:1.5"] {
+        let s = Settings { max_depth: 8, ..settings(&plain, strategy) };
+        let a = render(&plain, &s, &[100, 200], ());
+        let b = render(&chalk, &Settings { seed: 3, ..s }, &[100, 200], WithChalk);
+        assert_same_mean(&a, &b, 0.004);
+    }
+    let opened = Scene::from_bytes(&chalk).unwrap();
+    let plan = Plan::new(&settings(&chalk, "classic")).unwrap();
+    let mut block = AlignedBytes::zeroed(plan.session().size);
+    let error = Session::new(opened, &plan, block.as_mut()).err().expect("no kernel");
+    assert!(matches!(error, SessionError::Profile { .. }));
+    assert!(error.to_string().ends_with(" own"), "{error}");
+    let _ = description::Material::new("own", Model::Own { reflectance: Reflectance::Constant([0.5; 3]), alpha: 0.1 });
+}
