@@ -194,6 +194,7 @@ fn models_have_the_parameters_of_their_rows() {
                     Parameter::RelativeEta => m.eta[0] == 1.5,
                     Parameter::ComplexEta => (m.eta, m.k) == ([0.2; 3], [3.0; 3]),
                     Parameter::InternalReflectance => m.fdr > 0.4 && m.fdr < 0.7,
+                    Parameter::Principled => m.table != NONE,
                     Parameter::TransmittanceTable | Parameter::CompensationTable | Parameter::EnergyTable => {
                         m.table == 0 && scene.tables.len() >= entries + parameter.entries()
                     }
