@@ -108,6 +108,7 @@ each_effect!(
     PLASTIC,
     ROUGH_PLASTIC,
     NULL,
+    PRINCIPLED,
     TEXTURES,
     AREA_LIGHTS,
     ENVIRONMENT,
@@ -118,7 +119,8 @@ each_effect!(
     MEDIA,
     GRID_MEDIA,
     ALPHA,
-    MULTIPLE_SCATTERING
+    MULTIPLE_SCATTERING,
+    NORMAL_MAPS
 );
 
 /// Killed by: an effect that a session does not look for, a message without its name.
