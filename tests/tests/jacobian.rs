@@ -39,6 +39,7 @@ fn scattering_models() {
         | MaterialKind::Dielectric
         | MaterialKind::ThinDielectric
         | MaterialKind::Null
+        // `bsdf_principled.rs`, `extensions.rs`
         | MaterialKind::Principled
         | MaterialKind::Own => false,
     };

@@ -2,7 +2,7 @@
 
 use super::error::LoadError;
 use super::{files, images};
-use crate::description::{Environment, SceneDescription, Texture};
+use crate::description::{Encoding, Environment, SceneDescription, Texture, Wrap};
 use crate::text;
 use std::collections::HashMap;
 use std::io;
@@ -48,10 +48,17 @@ pub struct LoadReport {
 pub(super) struct Loader {
     pub(super) options: LoadOptions,
     pub(super) report: LoadReport,
-    /// Textures by path: a file that several materials use is decoded once. `None`: it is missing.
-    textures: HashMap<PathBuf, Option<u32>>,
+    /// Textures by path and decoding: a file that several materials use is decoded once. `None`: it is missing.
+    textures: HashMap<(PathBuf, Decoding), Option<u32>>,
     /// Bytes of decoded images so far.
     decoded: u64,
+}
+
+/// What the texels of a file are taken for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct Decoding {
+    pub encoding: Encoding,
+    pub wrap: [Wrap; 2],
 }
 
 impl Loader {
@@ -102,21 +109,32 @@ impl Loader {
         files::text(bytes).map_err(|what| LoadError::Format { path: path.into(), what })
     }
 
-    /// Index of the texture in `path`, decoded at its first use. If there is none, not even in another case: `None`, and
-    /// a note that says that grey is taken.
+    /// Index of the texture in `path`: a colour, repeated; see [`Self::texture_as`].
     pub(super) fn texture(
         &mut self,
         scene: &mut SceneDescription,
         path: &Path,
         referrer: &str,
     ) -> Result<Option<u32>, LoadError> {
-        if let Some(index) = self.textures.get(path) {
+        self.texture_as(scene, path, referrer, Decoding::default())
+    }
+
+    /// Index of the texture in `path`, decoded at its first use. If there is none, not even in another case: `None`, and
+    /// a note that the material is without it.
+    pub(super) fn texture_as(
+        &mut self,
+        scene: &mut SceneDescription,
+        path: &Path,
+        referrer: &str,
+        decoding: Decoding,
+    ) -> Result<Option<u32>, LoadError> {
+        if let Some(index) = self.textures.get(&(path.into(), decoding)) {
             return Ok(*index);
         }
         let (bytes, found) = match self.read_near(path, referrer) {
             Err(e) if e.is_missing() => {
                 self.replace(e, "the material is without it")?;
-                self.textures.insert(path.into(), None);
+                self.textures.insert((path.into(), decoding), None);
                 return Ok(None);
             }
             read => read?,
@@ -129,8 +147,9 @@ impl Loader {
         let image = image.texture;
         self.decoded += 4 * image.texels.len() as u64;
         let index = scene.textures.len() as u32;
-        scene.textures.push(Texture { name: found.display().to_string(), ..image });
-        self.textures.insert(path.into(), Some(index));
+        let Decoding { encoding, wrap } = decoding;
+        scene.textures.push(Texture { name: found.display().to_string(), encoding, wrap, ..image });
+        self.textures.insert((path.into(), decoding), Some(index));
         Ok(Some(index))
     }
 

@@ -6,6 +6,7 @@
 //! | `obj` | geometry: Wavefront OBJ |
 //! | `mtl` | materials of a bare OBJ |
 //! | `media` | participating media of a `scene.json`, density grids |
+//! | `principled` | principled materials of a `scene.json` |
 //! | `presets` | nothing: media by name |
 //! | `images` | PNG and JPEG textures, EXR environment maps |
 //! | `loader` | the files that all of them ask for, each once |
@@ -22,6 +23,7 @@ mod mtl;
 mod obj;
 mod polygon;
 mod presets;
+mod principled;
 mod scene_json;
 
 pub use error::LoadError;
