@@ -64,5 +64,5 @@ pub fn shadow_ray(p: Vec3x8, ng: Vec3x8, error: F32x8, q: Vec3x8, q_ng: Vec3x8, 
     let o = offset(p, ng, error, d);
     let reach = d.abs().dot(q_ng.abs()) * OFFSET_BOUND;
     let d = offset(q, q_ng, q_error + reach, -d) - o;
-    Ray8 { o, d, tmin: F32x8::ZERO, tmax: F32x8::ONE }
+    Ray8 { tmax: F32x8::ONE, ..Ray8::unbounded(o, d) }
 }

@@ -22,7 +22,7 @@ mod mis;
 mod point;
 mod power;
 
-pub use area::{area_pdf, area_radiance};
+pub use area::{area_of, area_pdf, area_radiance};
 pub use environment::{environment_pdf, environment_radiance};
 pub use mis::power_heuristic;
 pub use power::{PowerSelector, SceneExtent, luminance};
@@ -138,7 +138,7 @@ const IDLE: &Light = &Light {
     kind: NONE,
     triangle: NONE,
     area: 0.0,
-    reserved: 0,
+    instance: 0,
     vector: [0.0; 3],
     emission: [0.0; 3],
     params: [0.0; 6],
@@ -146,14 +146,17 @@ const IDLE: &Light = &Light {
 
 /// The chosen lights of eight lanes; lanes outside the mask they were gathered with hold [`IDLE`].
 struct Chosen<'s> {
+    index: U32x8,
     record: [&'s Light; 8],
+    /// Times at which they are seen.
+    time: F32x8,
     emission: Vec3x8,
     vector: Vec3x8,
 }
 
 impl<'s> Chosen<'s> {
     #[inline(always)]
-    fn gather(scene: &Scene<'s>, light: U32x8, mask: Mask8) -> Self {
+    fn gather(scene: &Scene<'s>, light: U32x8, time: F32x8, mask: Mask8) -> Self {
         let index = light.to_array();
         let mut record = [IDLE; 8];
         for i in mask.lanes() {
@@ -162,7 +165,9 @@ impl<'s> Chosen<'s> {
         Self {
             emission: Vec3x8::from_fn(|i| record[i].emission),
             vector: Vec3x8::from_fn(|i| record[i].vector),
+            index: light,
             record,
+            time,
         }
     }
 
@@ -248,7 +253,8 @@ const _: () = {
 /// light, the others the position on it. Lanes that come out not `valid` scatter no direct light in this sample: black,
 /// edge-on, behind the light, touching it, or at a distance whose square overflows.
 ///
-/// Lights that need an effect outside the constant `profile` are not compiled in, and give no sample.
+/// Lights that need an effect outside the constant `profile` are not compiled in, and give no sample. Lights that move are
+/// seen where they are when the shutter opens; [`sample_at`] is for other times.
 #[inline(always)]
 pub fn sample_of<S: LightSelector>(
     profile: Effects,
@@ -259,10 +265,34 @@ pub fn sample_of<S: LightSelector>(
     words: [U32x8; 4],
     active: Mask8,
 ) -> LightSample8 {
-    let (light, probability) = selector.select(p, n, words[0]);
-    let chosen = Chosen::gather(scene, light, active);
+    sample_at(profile, scene, selector, &Reference8 { p, n, time: F32x8::ZERO }, words, active)
+}
+
+/// Where and when lights are seen.
+#[derive(Clone, Copy, Debug)]
+pub struct Reference8 {
+    /// Positions, world space.
+    pub p: Vec3x8,
+    /// Unit normals, 0 in media.
+    pub n: Vec3x8,
+    /// Times, see [`Ray8::time`](crate::geometry::Ray8::time).
+    pub time: F32x8,
+}
+
+/// [`sample_of`] at given times.
+#[inline(always)]
+pub fn sample_at<S: LightSelector>(
+    profile: Effects,
+    scene: &Scene<'_>,
+    selector: &S,
+    at: &Reference8,
+    words: [U32x8; 4],
+    active: Mask8,
+) -> LightSample8 {
+    let (light, probability) = selector.select(at.p, at.n, words[0]);
+    let chosen = Chosen::gather(scene, light, at.time, active);
     let possible = active & probability.gt(F32x8::ZERO);
-    let mut out = sample_chosen(profile, scene, &chosen, p, [words[1], words[2], words[3]], possible);
+    let mut out = sample_chosen(profile, scene, &chosen, at.p, [words[1], words[2], words[3]], possible);
     out.pdf *= probability;
     out.valid &= usable(out.pdf) & out.wi.is_finite() & out.radiance.is_finite() & out.radiance.any_positive();
     out.pdf = out.valid.zero_unless(out.pdf);

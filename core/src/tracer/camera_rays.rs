@@ -8,6 +8,7 @@ use super::media_set::MediaSet8;
 use super::packets::RayState8;
 use super::path::Path8;
 use super::root::PixelTarget;
+use super::shading::moves;
 use crate::camera;
 use crate::geometry::Ray8;
 use crate::rng::Key8;
@@ -106,10 +107,17 @@ pub(crate) fn camera_rays<W: World>(
     let py = F32x8::from_fn(|i| y[i] as f32) + u1;
     let lens = if W::EFFECTS.contains(Effects::LENS) { [u2, u3] } else { [F32x8::ZERO; 2] };
     let (o, d) = camera::generate(world.scene().camera, settings.size, px, py, lens);
+    let mut time = F32x8::ZERO;
+    if moves::<W>(world.scene()) {
+        time = key.time();
+        for (root, time) in root.iter().zip(time.to_array()).take(lanes) {
+            book.roots.get(*root).time = time;
+        }
+    }
     book.counters.camera_rays += lanes as u64;
     RayState8 {
         active: Mask8::first(lanes),
-        ray: Ray8::unbounded(o, d),
+        ray: Ray8::unbounded(o, d).at(time),
         from: o,
         normal: Vec3x8::ZERO,
         travelled: F32x8::ZERO,

@@ -145,11 +145,20 @@ pub enum BakeError {
         /// Object with the first triangle.
         object: String,
     },
-    /// Instances and prototypes, which cannot be baked.
+    /// An instance that cannot be.
     Instance {
-        /// Name of the instance or prototype.
+        /// Name of the instance.
         name: String,
-        /// Fault.
+        /// Name of what it places.
+        prototype: String,
+        /// Fault of the instance.
+        what: String,
+    },
+    /// A prototype that cannot be.
+    Prototype {
+        /// Name of the prototype.
+        name: String,
+        /// Fault of the prototype.
         what: String,
     },
     /// More of something than indices of 31 bits can tell apart.
@@ -207,7 +216,8 @@ impl fmt::Display for BakeError {
             Self::InsideOut { medium, object } => {
                 write!(f, "medium `{medium}`: the front sides of its boundary (object `{object}`) face inwards")
             }
-            Self::Instance { name, what } => write!(f, "instance `{name}`: {what}"),
+            Self::Instance { name, prototype, what } => write!(f, "instance `{name}` of `{prototype}`: {what}"),
+            Self::Prototype { name, what } => write!(f, "prototype `{name}`: {what}"),
             Self::TooMany { what, count } => write!(f, "{count} {what} are too many"),
         }
     }
