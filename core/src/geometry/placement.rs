@@ -4,10 +4,12 @@
 //! ([`Instance::condition`]), r the largest |coordinate| of the corners from T: a corner `A a + T` is rounded by at most
 //! `4 u (K r + |T|)`. A ray that leaves the triangle is taken back by the rounded inverse, which moves its origin by
 //! at most `5.1 u K r`, and its direction d by `4.1 u K |d|`, across the triangle (an extent of up to 2 r) by `8.2 u K r`.
-//! The normal is that of rounded corners, by up to another `12 u (K r + |T|)` within the triangle. All are below
+//! Normals are those of mapped edges, not of rounded corners: far from the world's origin a triangle may be smaller than the
+//! steps of its coordinates, and has a normal all the same. They are tilted by some `8 u K` of the extent. All are below
 //! `30 u (K r + |T|)`; [`OFFSET_BOUND`] has 32. An inner instance's bound goes through the outer map.
 
 use super::OFFSET_BOUND;
+use super::spawn::edge_normal;
 use crate::scene::Scene;
 use crate::scene::blob::{INSTANCE_HIDDEN, INSTANCE_MIRRORED, INSTANCE_MOVING, Instance, Light, NONE};
 use crate::scene::inverse;
@@ -88,6 +90,8 @@ impl Map8 {
 pub struct Placed8 {
     /// Vertices a, b and c, world space; b and c have changed places in mirrored lanes.
     pub corners: [Vec3x8; 3],
+    /// Geometric normals, as long as twice the area; 0 outside instances.
+    pub normal: Vec3x8,
     /// What instances add to the error bound of points and of rays that leave them, by axis, world units.
     pub rounding: Vec3x8,
     /// Products of the conditions; 0 outside instances.
@@ -107,6 +111,8 @@ fn instance_of<'s>(scene: &Scene<'s>, index: U32x8, mask: Mask8) -> [Option<&'s 
 /// at `time`.
 pub fn place(scene: &Scene<'_>, instances: [U32x8; 2], time: F32x8, corners: [Vec3x8; 3], mask: Mask8) -> Placed8 {
     let none = U32x8::splat(NONE);
+    let [a, b, c] = corners;
+    let mut edges = [b - a, c - b, a - c];
     let (mut corners, mut rounding, mut condition) = (corners, Vec3x8::ZERO, F32x8::ZERO);
     let (mut mirrored, mut hidden) = (0, 0);
     for index in [instances[1], instances[0]] {
@@ -123,6 +129,7 @@ pub fn place(scene: &Scene<'_>, instances: [U32x8; 2], time: F32x8, corners: [Ve
         rounding = Vec3x8::select(lanes, map.abs_vector(rounding) + own, rounding);
         condition = lanes.select(k * condition.max(F32x8::ONE), condition);
         corners = [0, 1, 2].map(|c| Vec3x8::select(lanes, from_t[c] + map.t, corners[c]));
+        edges = edges.map(|e| Vec3x8::select(lanes, map.vector(e), e));
         for (i, k) in instance.iter().enumerate() {
             let flags = k.map_or(0, |k| k.flags);
             mirrored ^= u32::from(flags & INSTANCE_MIRRORED != 0) << i;
@@ -132,7 +139,10 @@ pub fn place(scene: &Scene<'_>, instances: [U32x8; 2], time: F32x8, corners: [Ve
     let (mirrored, hidden) = (Mask8::from_bits(mirrored), Mask8::from_bits(hidden));
     let [a, b, c] = corners;
     let corners = [a, Vec3x8::select(mirrored, c, b), Vec3x8::select(mirrored, b, c)];
-    Placed8 { corners, rounding, condition, mirrored, hidden }
+    let [ab, bc, ca] = edges;
+    let normal = edge_normal(ab, bc, ca);
+    let normal = Vec3x8::select(mirrored, -normal, normal).zero_unless(condition.gt(F32x8::ZERO));
+    Placed8 { corners, normal, rounding, condition, mirrored, hidden }
 }
 
 /// Normals in the world, of any length, from those in objects: the inverse transpose keeps them upright on what they stand

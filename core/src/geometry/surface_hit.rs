@@ -1,7 +1,8 @@
 //! The triangles of eight hits. Whatever wants to know something of a hit surface asks here: each triangle record is
 //! read once per hit.
 
-use super::{Hit8, SurfacePoint8, place, surface_point};
+use super::spawn::point_with_normal;
+use super::{Hit8, SurfacePoint8, place, surface_point, triangle_normal};
 use crate::scene::Scene;
 use crate::scene::blob::{NONE, TRIANGLE_SMOOTH, Triangle, Vertex};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -30,6 +31,8 @@ pub struct SurfaceHit8 {
     pub smooth: Mask8,
     /// Instances around the triangle, see [`Hit8::instance`].
     pub instance: [U32x8; 2],
+    /// Geometric normals of triangles in instances, as long as twice the area; 0 for others.
+    pub normal: Vec3x8,
     /// Time of the rays, once [`Self::place`] was told.
     pub time: F32x8,
 }
@@ -60,6 +63,7 @@ impl SurfaceHit8 {
             light: triangle.map(|t| t.light),
             smooth: Mask8::from_bits(smooth),
             instance: hit.instance,
+            normal: Vec3x8::ZERO,
             time: F32x8::ZERO,
         }
     }
@@ -81,7 +85,7 @@ impl SurfaceHit8 {
             return self.point();
         }
         let placed = place(scene, self.instance, time, self.corners, lanes);
-        self.corners = placed.corners;
+        (self.corners, self.normal) = (placed.corners, placed.normal);
         (self.u, self.v) = (placed.mirrored.select(self.v, self.u), placed.mirrored.select(self.u, self.v));
         for i in placed.mirrored.lanes() {
             self.vertices[i].swap(1, 2);
@@ -92,7 +96,9 @@ impl SurfaceHit8 {
                 self.light[i] = self.light[i].wrapping_add(first);
             }
         }
-        let point = self.point();
+        let [a, b, c] = self.corners;
+        let normal = Vec3x8::select(lanes, placed.normal, triangle_normal(a, b, c));
+        let point = point_with_normal(self.corners, normal, self.u, self.v);
         SurfacePoint8 { error: point.error + placed.rounding.dot(point.ng.abs()), ..point }
     }
 

@@ -52,11 +52,6 @@ impl Corners {
         geometry::triangle_normal(self.a, self.b, self.c).normalize()
     }
 
-    /// Area, computed from the corners.
-    fn area(&self) -> F32x8 {
-        geometry::triangle_normal(self.a, self.b, self.c).length() * 0.5
-    }
-
     /// Brings those that are in instances to the world.
     #[inline(never)]
     fn place(&mut self, scene: &Scene<'_>, light: &Chosen<'_>, mask: Mask8) -> Placed8 {
@@ -99,13 +94,13 @@ impl LightModel for Area {
         let mut corners = Corners::gather(scene, light.record.map(|l| l.triangle), mask);
         let mut area = F32x8::from_fn(|i| light.record[i].area);
         let placed = if scene.instances.is_empty() { None } else { Some(corners.place(scene, light, mask)) };
-        if let Some(placed) = &placed {
-            area = placed.condition.gt(F32x8::ZERO).select(corners.area(), area);
-        }
         let [b, c] = barycentric([words[0], words[1]].map(U32x8::to_unit));
         let a = F32x8::ONE - b - c;
         let point = corners.a * a + corners.b * b + corners.c * c;
-        let normal = corners.normal();
+        let mut normal = corners.normal();
+        if let Some(placed) = &placed {
+            (normal, area) = in_instances(placed.condition.gt(F32x8::ZERO), placed.normal, normal, area);
+        }
         let d = point - p;
         let r = d.length();
         let wi = d / r;
@@ -131,6 +126,12 @@ impl LightModel for Area {
     fn power(light: &Light, _: &SceneExtent) -> f64 {
         PI * f64::from(light.area) * luminance(light.emission)
     }
+}
+
+/// Unit normals and areas, those in the lanes of `placed` by `normal`, which is as long as twice the area.
+#[inline(always)]
+fn in_instances(placed: Mask8, normal: Vec3x8, others: Vec3x8, areas: F32x8) -> (Vec3x8, F32x8) {
+    (Vec3x8::select(placed, normal.normalize(), others), placed.select(normal.length() * 0.5, areas))
 }
 
 /// The sample with the rounding that instances add at its end of a shadow ray along `d`: that of a ray that leaves the
@@ -163,10 +164,10 @@ pub fn area_pdf<S: LightSelector>(
     let area = |i: usize| scene.lights.get(hit.light[i] as usize).map_or(0.0, |l: &Light| l.area);
     let [a, b, c] = hit.corners;
     let corners = Corners { a, b, c };
-    let normal = corners.normal();
+    let mut normal = corners.normal();
     let mut area = F32x8::from_fn(area);
     if !scene.instances.is_empty() {
-        area = hit.placed().select(corners.area(), area);
+        (normal, area) = in_instances(hit.placed(), hit.normal, normal, area);
     }
     let pdf = density(hit.t, -normal.dot(dir), area);
     let pdf = pdf * selector.probability(p, n, U32x8::new(hit.light), emits);
@@ -190,6 +191,8 @@ pub fn area_of(scene: &Scene<'_>, index: u32, light: &Light) -> f32 {
     };
     let instance = geometry::instances_of_light(scene, index, light).map(U32x8::splat);
     let corners = [corner(0), corner(1), corner(2)];
-    let [a, b, c] = geometry::place(scene, instance, F32x8::ZERO, corners, Mask8::all_lanes()).corners;
-    0.5 * geometry::triangle_normal(a, b, c).length().lane(0)
+    let [a, b, c] = corners;
+    let placed = geometry::place(scene, instance, F32x8::ZERO, corners, Mask8::all_lanes());
+    let normal = if light.instance == 0 { geometry::triangle_normal(a, b, c) } else { placed.normal };
+    0.5 * normal.length().lane(0)
 }
