@@ -8,6 +8,7 @@ use croupier_simd::{F32x8, U32x8};
 
 /// Dimension blocks of a camera sample's key.
 const PIXEL_BLOCK: u32 = 0;
+const TIME_BLOCK: u32 = 1;
 /// Dimension blocks of the key of a vertex's sample.
 const SCATTER_BLOCK: u32 = 0;
 const LIGHT_BLOCK: u32 = 1;
@@ -32,6 +33,13 @@ impl Key8 {
     #[inline(always)]
     pub(crate) fn pixel_and_lens(self) -> [F32x8; 4] {
         self.uniforms(PIXEL_BLOCK)
+    }
+
+    /// Time of a camera sample; drawn only in scenes where something moves.
+    #[inline(always)]
+    pub(crate) fn time(self) -> F32x8 {
+        let [u, ..] = self.uniforms(TIME_BLOCK);
+        u
     }
 
     /// Numbers of a camera sample's or vertex sample's first (next) vertex.

@@ -104,6 +104,8 @@ pub(crate) fn scene<R>(f: impl FnOnce(&Scene<'_>) -> R) -> R {
         media: &[],
         densities: &[],
         majorants: &[],
+        objects: &[],
+        instances: &[],
         names: &[],
         // nothing that light may pass
         effects: Effects(!Effects::STRAIGHT.0),
@@ -150,6 +152,7 @@ impl Intersector for BruteForce<'_> {
             triangle: U32x8::from_fn(|i| hits[i].map_or(NONE, |h| h.1)),
             u: F32x8::from_fn(|i| hits[i].map_or(0.0, |h| h.2)),
             v: F32x8::from_fn(|i| hits[i].map_or(0.0, |h| h.3)),
+            instance: crate::geometry::NO_INSTANCE,
         }
     }
 

@@ -74,6 +74,8 @@ pub struct Parts {
     pub media: Vec<Medium>,
     pub densities: Vec<f32>,
     pub majorants: Vec<f32>,
+    pub objects: Vec<Object>,
+    pub instances: Vec<Instance>,
     pub names: Vec<u8>,
 }
 
@@ -138,7 +140,7 @@ impl Parts {
             tables Tables f32, lights Lights Light, light_alias LightAlias Alias,
             environment Environment Environment, env_texels EnvTexels [f32; 3], env_alias EnvAlias Alias,
             cameras Cameras Camera, media Media Medium, densities Densities f32, majorants Majorants f32,
-            names Names u8);
+            objects Objects Object, instances Instances Instance, names Names u8);
         let header = Header {
             magic: MAGIC,
             version: VERSION,
@@ -211,7 +213,7 @@ impl Parts {
             area,
             vector,
             emission,
-            reserved: 0,
+            instance: 0,
             params: [0.0; 6],
         };
         let (zero, glow) = ([0.0; 3], [4.0, 3.0, 2.0]);
@@ -257,6 +259,8 @@ impl Parts {
             media: Vec::new(),
             densities: Vec::new(),
             majorants: Vec::new(),
+            objects: Vec::new(),
+            instances: Vec::new(),
             names: MaterialKind::ALL.iter().flat_map(|k| format!("{}\n", k.name()).into_bytes()).collect(),
         };
         parts.bounds();

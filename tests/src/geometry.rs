@@ -76,6 +76,7 @@ pub fn packet(rays: &[Ray]) -> Ray8 {
         d: Vec3x8::from_fn(|i| at(i).d),
         tmin: F32x8::from_fn(|i| at(i).tmin),
         tmax: F32x8::from_fn(|i| at(i).tmax),
+        time: F32x8::ZERO,
     }
 }
 

@@ -2,13 +2,13 @@
 
 use croupier::Scene;
 use croupier::unstable::Effects;
-use croupier::unstable::geometry::{self, Hit8, SurfaceHit8, SurfacePoint8};
+use croupier::unstable::geometry::{self, Hit8, NO_INSTANCE, SurfaceHit8, SurfacePoint8};
 use croupier::unstable::light::{self, LightSample8, LightSelector};
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Hits of the triangles at parameter `t` and weights `u`, `v`, in the lanes of `mask`.
 pub fn hit(scene: &Scene<'_>, triangle: U32x8, t: F32x8, u: F32x8, v: F32x8, mask: Mask8) -> SurfaceHit8 {
-    SurfaceHit8::gather(scene, &Hit8 { hit: mask, t, triangle, u, v })
+    SurfaceHit8::gather(scene, &Hit8 { hit: mask, t, triangle, u, v, instance: NO_INSTANCE })
 }
 
 /// Points with weights `u`, `v` on the triangles.

@@ -24,6 +24,8 @@ pub(crate) fn none<'s>(info: &'s SceneInfo, camera: &'s Camera) -> Records<'s> {
         media: &[],
         densities: &[],
         majorants: &[],
+        objects: &[],
+        instances: &[],
         names: &[],
         effects: Effects::default(),
         hash: 0,

@@ -111,7 +111,7 @@ impl Replay<'_, '_> {
             lens,
         );
         self.trace(&RayState {
-            ray: Ray8 { o, d, tmin: F32x8::ZERO, tmax: F32x8::INFINITY },
+            ray: Ray8::unbounded(o, d),
             from: o,
             normal: Vec3x8::ZERO,
             pdf: F32x8::ONE,
@@ -227,7 +227,7 @@ impl Replay<'_, '_> {
         let nee = x;
         if s.valid.lane(0) && s.weight.any_positive().lane(0) {
             let (radiance, rays) = self.trace(&RayState {
-                ray: Ray8 { o: offset(v.p, v.ng, v.error, s.wi), d: s.wi, tmin: F32x8::ZERO, tmax: F32x8::INFINITY },
+                ray: Ray8::unbounded(offset(v.p, v.ng, v.error, s.wi), s.wi),
                 from: v.p,
                 normal: v.ng,
                 pdf: s.pdf,

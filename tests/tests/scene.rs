@@ -233,7 +233,7 @@ fn every_fault_of_the_records_has_its_error() {
     ];
     let lights: &[Corruption] = &[
         (|p| p.lights[3].kind = LIGHTS, SceneError::Kind { of: S::Lights, index: 3, found: LIGHTS }),
-        (|p| p.lights[3].reserved = 1, SceneError::Reserved { of: S::Lights, index: 3 }),
+        (|p| p.lights[3].instance = 1, SceneError::Reserved { of: S::Lights, index: 3 }),
         (|p| p.lights[3].params[5] = 1.0, SceneError::Reserved { of: S::Lights, index: 3 }),
         (|p| p.lights[4].params[0] = -0.0, SceneError::Reserved { of: S::Lights, index: 4 }),
         (|p| p.light_alias[3].probability = 1.5, number(S::LightAlias, 3, Field::Probability, 1.5)),

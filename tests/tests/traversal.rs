@@ -241,6 +241,7 @@ fn lanes_do_not_see_each_other() {
                 d: fill(whole.d, &mut r),
                 tmin: active.select(whole.tmin, junk(&mut r)),
                 tmax: active.select(whole.tmax, junk(&mut r)),
+                time: junk(&mut r),
             };
             // inactive lanes hold garbage; then garbage lanes are active as well
             for active in [active, Mask8::all_lanes()] {

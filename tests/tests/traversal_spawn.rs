@@ -30,7 +30,7 @@ fn self_hits(triangle: Tri, rounds: usize, r: &mut Rng) -> u32 {
         let s = surface_point(&scene, U32x8::splat(0), u, v, all);
         let d = directions(r);
         let o = offset(s.p, s.ng, s.error, d);
-        hits += bvh.closest(&Ray8 { o, d, tmin: F32x8::ZERO, tmax: F32x8::INFINITY }, all).hit.count();
+        hits += bvh.closest(&Ray8::unbounded(o, d), all).hit.count();
     }
     hits
 }
@@ -98,7 +98,7 @@ fn offsets_do_not_jump_narrow_gaps() {
             d[axis] = if i % 2 == 0 { 1.0 } else { -1.0 };
             d
         });
-        let ray = Ray8 { o: offset(s.p, s.ng, s.error, d), d, tmin: F32x8::ZERO, tmax: F32x8::INFINITY };
+        let ray = Ray8::unbounded(offset(s.p, s.ng, s.error, d), d);
         let h = WideBvh::new(&scene).closest(&ray, all);
         // near the edge a ray may leave the gap sideways: the planes are far larger than it is wide
         for i in 0..8 {

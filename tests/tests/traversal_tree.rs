@@ -149,7 +149,7 @@ fn rays(octants: usize, tmax: f32) -> Ray8 {
         let sign = |k: usize| if (i & octants) >> k & 1 == 1 { -1.0 } else { 1.0 };
         [0.1 * sign(0), 0.1 * sign(1), sign(2)]
     });
-    Ray8 { o: Vec3x8::ZERO, d, tmin: F32x8::ZERO, tmax: F32x8::splat(tmax) }
+    Ray8 { tmax: F32x8::splat(tmax), ..Ray8::unbounded(Vec3x8::ZERO, d) }
 }
 
 /// Ways to send rays: octants, and how many. All directions go alone; of one octant up to eight go together.

@@ -3,19 +3,30 @@
 //! | file | holds |
 //! |---|---|
 //! | `wide` | [`WideBvh`]: the built-in [`Intersector`], grouping of rays |
+//! | `instances` | rays through top-level trees, into objects |
 //! | `blocking` | which triangles end a search for any hit |
 //! | `setup` | per-ray constants, eight rays at once |
 //! | `triangle` | the watertight triangle test, the same lanes for 8 triangles or 8 rays |
 //! | `single` | one ray against 8-wide nodes and 8-triangle leaves |
 //! | `packet` | up to eight rays of one octant together |
+//! | `build` | trees in the caller's memory |
+//! | `refit` | boxes after vertices moved |
+//! | `top` | instances moved, top-level trees rebuilt |
 
 mod blocking;
+mod build;
+mod instances;
 mod packet;
+mod refit;
 mod setup;
 mod single;
+mod top;
 mod triangle;
 mod wide;
 
+pub use build::{BuildError, Built, Corners, Primitive, build_references, build_triangles};
+pub use refit::TriangleTree;
+pub use top::{TopLevel, set_hidden, set_transform};
 pub use wide::WideBvh;
 
 use crate::geometry::{Hit8, Ray8};

@@ -73,11 +73,11 @@ fn one(i: usize) -> Mask8 {
     U32x8::splat(i as u32).eq(U32x8::new([0, 1, 2, 3, 4, 5, 6, 7]))
 }
 
-/// Walks the rays `group` of `s` (one octant, one major axis) from the root. Closest: improves `hits`. Any: returns the
+/// Walks the rays `group` of `s` (one octant, one major axis) from node `root`. Closest: improves `hits`. Any: returns the
 /// lanes with a hit. `stack` is for single rays.
 #[inline(never)]
 pub(super) fn walk_packet<const ANY: bool, B: Blocking>(
-    tree: (&[Node], &[Leaf]),
+    (tree, root): ((&[Node], &[Leaf]), u32),
     s: &Setup,
     group: u32,
     hits: &mut Hits,
@@ -113,7 +113,7 @@ pub(super) fn walk_packet<const ANY: bool, B: Blocking>(
     let before = Best::load(hits);
     let mut b = Best { t: members.select(before.t, never), ..before };
     let mut latest = b.t.max_lane();
-    let (mut sp, mut child, mut entry, mut inside) = (0usize, 0u32, line.tmin, members);
+    let (mut sp, mut child, mut entry, mut inside) = (0usize, root, line.tmin, members);
     let mut occluded = 0u32;
     'walk: loop {
         let rays = inside.bits();

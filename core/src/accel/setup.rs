@@ -49,9 +49,9 @@ pub(super) struct Setup {
 }
 
 impl Setup {
-    /// Constants of eight rays; `extent` is the largest |coordinate| of the tree.
+    /// Constants of eight rays; `extent` is the largest |coordinate| of the tree, or more.
     #[inline(always)]
-    pub(super) fn new(rays: &Ray8, active: Mask8, extent: f32) -> Self {
+    pub(super) fn new(rays: &Ray8, active: Mask8, extent: F32x8) -> Self {
         let a = rays.d.abs();
         let m = a.max_component();
         let tmin = F32x8::ZERO.max(rays.tmin);

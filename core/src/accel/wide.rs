@@ -4,32 +4,39 @@
 //! doubles the throughput of coherent rays; the others go one by one, which is best for incoherent ones.
 
 use super::blocking::{Asked, Blocking, Everything};
+use super::instances::{Forest, Found};
 use super::packet::{FEW, walk_packet};
 use super::setup::Setup;
 use super::single::{Hits, Keys, STACK, walk};
 use super::{Intersector, Occlusion8};
-use crate::geometry::{Hit8, Ray8};
+use crate::geometry::{Hit8, NO_INSTANCE, Ray8};
 use crate::scene::Scene;
-use crate::scene::blob::{Leaf, NONE, Node};
+use crate::scene::blob::{Instance, Leaf, NONE, Node, Object};
 use croupier_simd::{F32x8, Mask8, U32x8};
 
 /// Built-in intersector: the scene's own tree of 8-wide nodes and 8-triangle leaves.
 ///
 /// Watertight: no ray passes between triangles that share an edge or a vertex. A hit is the closest by computed t,
 /// among equal ones the triangle with the lowest index; which rays share a packet never changes a bit of the result.
-/// `tmin` below 0 counts as 0. Calls need about 9 KiB of stack.
+/// `tmin` below 0 counts as 0. Calls need about 9 KiB of stack, with instances 16.
+///
+/// Instances: each object is watertight, whatever the transforms; among hits at equal t that of the lower instance (the
+/// world's, then the one within it) counts, those of no instance last.
 #[derive(Clone, Copy, Debug)]
 pub struct WideBvh<'s> {
     nodes: &'s [Node],
     leaves: &'s [Leaf],
-    /// Largest |coordinate|.
+    /// Largest |coordinate| of a scene without instances.
     extent: f32,
+    /// Empty without instances.
+    objects: &'s [Object],
+    instances: &'s [Instance],
 }
 
 impl<'s> WideBvh<'s> {
     /// Intersector for the tree of a validated scene.
     pub fn new(scene: &Scene<'s>) -> Self {
-        Self::from_parts(scene.nodes, scene.leaves)
+        Self { objects: scene.objects, instances: scene.instances, ..Self::from_parts(scene.nodes, scene.leaves) }
     }
 
     /// Intersector for a tree outside a scene; the root is node 0, the rules of [`crate::scene::blob`] hold. Wrong
@@ -44,52 +51,97 @@ impl<'s> WideBvh<'s> {
                 }
             }
         }
-        Self { nodes, leaves, extent }
+        Self { nodes, leaves, extent, objects: &[], instances: &[] }
     }
 
-    /// Traces the valid rays of `s`. Closest: improves `hits`. Any: returns the lanes with a hit
-    /// that blocks.
+    /// Traces the valid rays of `s` through a scene without instances.
     #[inline(always)]
     fn trace<const ANY: bool, B: Blocking>(&self, s: &Setup, hits: &mut Hits, blocking: &mut B) -> u32 {
-        let tree = (self.nodes, self.leaves);
-        let mut stack: Keys = [0; STACK];
-        let (mut left, mut single, mut occluded) = (s.valid, 0, 0);
-        while left != 0 {
-            let group = s.alike(left.trailing_zeros() as usize & 7, left);
-            left &= !group;
-            if group.count_ones() <= FEW {
-                single |= group;
-            } else {
-                occluded |= walk_packet::<ANY, B>(tree, s, group, hits, &mut stack, blocking);
-            }
-        }
-        if single != 0 {
-            occluded |= walk::<ANY, B>(tree, (0, &s.tmin), (s, single), hits, &mut stack, blocking);
-        }
-        occluded
+        trace::<ANY, B>((self.nodes, self.leaves), 0, (s, s.valid), hits, &mut [0; STACK], blocking)
     }
+
+    /// Searches everything in the world of a scene with instances.
+    #[inline(never)]
+    fn search<const ANY: bool, B: Blocking>(&self, rays: &Ray8, active: Mask8, blocking: &mut B) -> (Found, u32) {
+        let Some(world) = self.objects.first() else { return (Found::none([0.0; 8]), 0) };
+        let Self { nodes, leaves, objects, instances, .. } = *self;
+        let forest = Forest { nodes, leaves, objects, instances };
+        let s = Forest::setup(world, rays, active);
+        let (mut found, mut stack) = (Found::none(s.limit), [0; STACK]);
+        let occluded = match s.valid {
+            0 => 0,
+            lanes => forest.walk::<ANY, B>((0, world), (&s, rays, lanes), &mut found, &mut stack, blocking),
+        };
+        (found, occluded)
+    }
+
+    #[inline(never)]
+    fn closest_placed(&self, rays: &Ray8, active: Mask8) -> Hit8 {
+        let (found, _) = self.search::<false, _>(rays, active, &mut Everything);
+        hit8(&found.hits, found.instance.map(U32x8::new), rays)
+    }
+}
+
+/// Hits as packets have them.
+#[inline(always)]
+fn hit8(hits: &Hits, instance: [U32x8; 2], rays: &Ray8) -> Hit8 {
+    let triangle = U32x8::new(hits.triangle);
+    let hit = !triangle.eq(U32x8::splat(NONE));
+    Hit8 {
+        hit,
+        t: hit.select(F32x8::new(hits.t), rays.tmax),
+        triangle,
+        u: hit.zero_unless(F32x8::new(hits.u)),
+        v: hit.zero_unless(F32x8::new(hits.v)),
+        instance,
+    }
+}
+
+/// Traces the rays `lanes` of `s` through the tree of triangles at node `root`. Closest: improves `hits`. Any: returns the
+/// lanes with a hit that blocks.
+#[inline(always)]
+pub(super) fn trace<const ANY: bool, B: Blocking>(
+    tree: (&[Node], &[Leaf]),
+    root: u32,
+    (s, lanes): (&Setup, u32),
+    hits: &mut Hits,
+    stack: &mut Keys,
+    blocking: &mut B,
+) -> u32 {
+    let (mut left, mut single, mut occluded) = (lanes, 0, 0);
+    while left != 0 {
+        let group = s.alike(left.trailing_zeros() as usize & 7, left);
+        left &= !group;
+        if group.count_ones() <= FEW {
+            single |= group;
+        } else {
+            occluded |= walk_packet::<ANY, B>((tree, root), s, group, hits, stack, blocking);
+        }
+    }
+    if single != 0 {
+        occluded |= walk::<ANY, B>(tree, (root, &s.tmin), (s, single), hits, stack, blocking);
+    }
+    occluded
 }
 
 impl Intersector for WideBvh<'_> {
     fn closest(&self, rays: &Ray8, active: Mask8) -> Hit8 {
-        let s = Setup::new(rays, active, self.extent);
+        if !self.objects.is_empty() {
+            return self.closest_placed(rays, active);
+        }
+        let s = Setup::new(rays, active, F32x8::splat(self.extent));
         let mut hits = Hits::none(s.limit);
         if !self.nodes.is_empty() && s.valid != 0 {
             self.trace::<false, _>(&s, &mut hits, &mut Everything);
         }
-        let triangle = U32x8::new(hits.triangle);
-        let hit = !triangle.eq(U32x8::splat(NONE));
-        Hit8 {
-            hit,
-            t: hit.select(F32x8::new(hits.t), rays.tmax),
-            triangle,
-            u: hit.zero_unless(F32x8::new(hits.u)),
-            v: hit.zero_unless(F32x8::new(hits.v)),
-        }
+        hit8(&hits, NO_INSTANCE, rays)
     }
 
     fn occluded(&self, rays: &Ray8, active: Mask8) -> Mask8 {
-        let s = Setup::new(rays, active, self.extent);
+        if !self.objects.is_empty() {
+            return Mask8::from_bits(self.search::<true, _>(rays, active, &mut Everything).1);
+        }
+        let s = Setup::new(rays, active, F32x8::splat(self.extent));
         if self.nodes.is_empty() || s.valid == 0 {
             return Mask8::NONE;
         }
@@ -97,8 +149,12 @@ impl Intersector for WideBvh<'_> {
     }
 
     fn occluded_by(&self, rays: &Ray8, active: Mask8, blocks: &dyn Fn(u32) -> bool) -> Occlusion8 {
-        let s = Setup::new(rays, active, self.extent);
         let mut asked = Asked { blocks, passed: [0; 8] };
+        if !self.objects.is_empty() {
+            let (_, blocked) = self.search::<true, _>(rays, active, &mut asked);
+            return Occlusion8 { blocked: Mask8::from_bits(blocked), passed: U32x8::new(asked.passed) };
+        }
+        let s = Setup::new(rays, active, F32x8::splat(self.extent));
         let mut blocked = 0;
         if !self.nodes.is_empty() && s.valid != 0 {
             blocked = self.trace::<true, _>(&s, &mut Hits::none(s.limit), &mut asked);

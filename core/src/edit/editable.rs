@@ -201,6 +201,8 @@ const NOTHING: Records<'static> = {
         media: &[],
         densities: &[],
         majorants: &[],
+        objects: &[],
+        instances: &[],
         names: &[],
         effects: Effects(0),
         hash: 0,

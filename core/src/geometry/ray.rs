@@ -13,13 +13,21 @@ pub struct Ray8 {
     pub tmin: F32x8,
     /// Largest parameter, exclusive; infinity is allowed.
     pub tmax: F32x8,
+    /// Time, from 0 where the shutter opens to 1 where it closes; only moving instances read it.
+    pub time: F32x8,
 }
 
 impl Ray8 {
-    /// Rays without an end.
+    /// Rays without an end, when the shutter opens.
     #[inline(always)]
     pub fn unbounded(o: Vec3x8, d: Vec3x8) -> Self {
-        Self { o, d, tmin: F32x8::ZERO, tmax: F32x8::INFINITY }
+        Self { o, d, tmin: F32x8::ZERO, tmax: F32x8::INFINITY, time: F32x8::ZERO }
+    }
+
+    /// The same rays at other times.
+    #[inline(always)]
+    pub fn at(self, time: F32x8) -> Self {
+        Self { time, ..self }
     }
 }
 
@@ -36,4 +44,9 @@ pub struct Hit8 {
     pub u: F32x8,
     /// Barycentric weight of the triangle's vertex c; vertex a has `1 - u - v`.
     pub v: F32x8,
+    /// Instances around the triangle: the world's, and the one within it; [`crate::scene::blob::NONE`] where there is none.
+    pub instance: [U32x8; 2],
 }
+
+/// No instance around any triangle.
+pub const NO_INSTANCE: [U32x8; 2] = [U32x8::splat(crate::scene::blob::NONE); 2];

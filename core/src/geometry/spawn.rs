@@ -24,9 +24,14 @@ pub const OFFSET_BOUND: f32 = 32.0 / 16_777_216.0;
 /// `error` is [`OFFSET_BOUND`]` sum |b_i p_i| . |ng|`.
 #[inline]
 pub fn surface_point([a, b, c]: [Vec3x8; 3], u: F32x8, v: F32x8) -> SurfacePoint8 {
+    point_with_normal([a, b, c], triangle_normal(a, b, c), u, v)
+}
+
+/// [`surface_point`] with a normal of any length.
+#[inline(always)]
+pub(super) fn point_with_normal([a, b, c]: [Vec3x8; 3], n: Vec3x8, u: F32x8, v: F32x8) -> SurfacePoint8 {
     let w = F32x8::ONE - u - v;
     let (pa, pb, pc) = (a * w, b * u, c * v);
-    let n = triangle_normal(a, b, c);
     let size = n.abs().max_component();
     // scaled before the length: edges of 1e-12 square to nothing; `max` also turns a NaN into the tiny value
     let tiny = F32x8::splat(1e-37);
@@ -41,7 +46,12 @@ pub fn surface_point([a, b, c]: [Vec3x8; 3], u: F32x8, v: F32x8) -> SurfacePoint
 /// are nearly parallel, and the roundings of their cross product would tilt it. If all three are nearly parallel (an
 /// obtuse needle) it may be tilted by some 2^-24 of length over width.
 pub fn triangle_normal(a: Vec3x8, b: Vec3x8, c: Vec3x8) -> Vec3x8 {
-    let (ab, bc, ca) = (b - a, c - b, a - c);
+    edge_normal(b - a, c - b, a - c)
+}
+
+/// [`triangle_normal`] from the three edges.
+#[inline(always)]
+pub(super) fn edge_normal(ab: Vec3x8, bc: Vec3x8, ca: Vec3x8) -> Vec3x8 {
     let (x, y, z) = (ab.length_sqr(), bc.length_sqr(), ca.length_sqr());
     let skip_ab = x.ge(y) & x.ge(z);
     let skip_bc = y.ge(z);
@@ -64,5 +74,5 @@ pub fn shadow_ray(p: Vec3x8, ng: Vec3x8, error: F32x8, q: Vec3x8, q_ng: Vec3x8, 
     let o = offset(p, ng, error, d);
     let reach = d.abs().dot(q_ng.abs()) * OFFSET_BOUND;
     let d = offset(q, q_ng, q_error + reach, -d) - o;
-    Ray8 { o, d, tmin: F32x8::ZERO, tmax: F32x8::ONE }
+    Ray8 { tmax: F32x8::ONE, ..Ray8::unbounded(o, d) }
 }

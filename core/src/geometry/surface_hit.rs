@@ -1,7 +1,8 @@
 //! The triangles of eight hits. Whatever wants to know something of a hit surface asks here: each triangle record is
 //! read once per hit.
 
-use super::{Hit8, SurfacePoint8, surface_point};
+use super::spawn::point_with_normal;
+use super::{Hit8, SurfacePoint8, place, surface_point, triangle_normal};
 use crate::scene::Scene;
 use crate::scene::blob::{NONE, TRIANGLE_SMOOTH, Triangle, Vertex};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -28,6 +29,12 @@ pub struct SurfaceHit8 {
     pub light: [u32; 8],
     /// Lanes that interpolate vertex normals.
     pub smooth: Mask8,
+    /// Instances around the triangle, see [`Hit8::instance`].
+    pub instance: [U32x8; 2],
+    /// Geometric normals of triangles in instances, as long as twice the area; 0 for others.
+    pub normal: Vec3x8,
+    /// Time of the rays, once [`Self::place`] was told.
+    pub time: F32x8,
 }
 
 /// What lanes without a triangle read.
@@ -55,7 +62,44 @@ impl SurfaceHit8 {
             material: triangle.map(|t| t.material),
             light: triangle.map(|t| t.light),
             smooth: Mask8::from_bits(smooth),
+            instance: hit.instance,
+            normal: Vec3x8::ZERO,
+            time: F32x8::ZERO,
         }
+    }
+
+    /// Lanes whose triangle is in an instance.
+    #[inline(always)]
+    pub fn placed(&self) -> Mask8 {
+        self.mask.and_not(self.instance[0].eq(U32x8::splat(NONE)))
+    }
+
+    /// The hit points of triangles that may be in instances, `time` being that of the rays: corners come to the world, lights
+    /// become those of the instances, and where an instance mirrors, vertices b and c change places, so that the front stays
+    /// the front. Once for each hit, in place of [`Self::point`].
+    #[inline(never)]
+    pub fn place(&mut self, scene: &Scene<'_>, time: F32x8) -> SurfacePoint8 {
+        let lanes = self.placed();
+        self.time = time;
+        if lanes.none() {
+            return self.point();
+        }
+        let placed = place(scene, self.instance, time, self.corners, lanes);
+        (self.corners, self.normal) = (placed.corners, placed.normal);
+        (self.u, self.v) = (placed.mirrored.select(self.v, self.u), placed.mirrored.select(self.u, self.v));
+        for i in placed.mirrored.lanes() {
+            self.vertices[i].swap(1, 2);
+        }
+        for i in (lanes & self.emitters()).lanes() {
+            for level in self.instance {
+                let first = scene.instances.get(level.lane(i) as usize).map_or(0, |k| k.first_light);
+                self.light[i] = self.light[i].wrapping_add(first);
+            }
+        }
+        let [a, b, c] = self.corners;
+        let normal = Vec3x8::select(lanes, placed.normal, triangle_normal(a, b, c));
+        let point = point_with_normal(self.corners, normal, self.u, self.v);
+        SurfacePoint8 { error: point.error + placed.rounding.dot(point.ng.abs()), ..point }
     }
 
     /// Lanes whose triangle emits.
@@ -94,7 +138,8 @@ mod tests {
         scene(|scene| {
             let triangle = U32x8::new([0, 1, 2, 3, NONE, 1000, 0, 1]);
             let (u, v) = (F32x8::splat(0.25), F32x8::splat(0.5));
-            let hit = Hit8 { hit: Mask8::from_bits(0b0111_1111), t: F32x8::ONE, triangle, u, v };
+            let instance = crate::geometry::NO_INSTANCE;
+            let hit = Hit8 { hit: Mask8::from_bits(0b0111_1111), t: F32x8::ONE, triangle, u, v, instance };
             let s = SurfaceHit8::gather(scene, &hit);
             for i in 0..8 {
                 let t = if i < 7 { scene.triangles.get(triangle.lane(i) as usize) } else { None };

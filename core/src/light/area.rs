@@ -5,12 +5,16 @@
 //! | `triangle` | index | |
 //! | `area` | world units squared | > 0 |
 //! | `emission` | radiance | >= 0 |
+//! | `instance` | 1 + index of the instance around it, or 0 | |
+//!
+//! Of a triangle in an instance, corners and area are those in the world at the time of the ray; `area` is that when the
+//! shutter opens, and serves the choice of lights.
 //!
 //! Points are uniform on the triangle; seen from distance r under the angle cos at the light their solid-angle density
 //! is r^2 / (A cos).
 
 use super::{Chosen, LightModel, LightSample8, LightSelector, SceneExtent, luminance, usable};
-use crate::geometry::{self, OFFSET_BOUND, SurfaceHit8};
+use crate::geometry::{self, OFFSET_BOUND, Placed8, SurfaceHit8};
 use crate::scene::Scene;
 use crate::scene::blob::{Light, NONE, PrincipledTexture};
 use crate::texture;
@@ -48,6 +52,18 @@ impl Corners {
     fn normal(&self) -> Vec3x8 {
         geometry::triangle_normal(self.a, self.b, self.c).normalize()
     }
+
+    /// Brings those that are in instances to the world.
+    #[inline(never)]
+    fn place(&mut self, scene: &Scene<'_>, light: &Chosen<'_>, mask: Mask8) -> Placed8 {
+        let index = light.index.to_array();
+        let path: [[u32; 2]; 8] =
+            core::array::from_fn(|i| geometry::instances_of_light(scene, index[i], light.record[i]));
+        let instance = [0, 1].map(|level| U32x8::from_fn(|i| path[i][level]));
+        let placed = geometry::place(scene, instance, light.time, [self.a, self.b, self.c], mask);
+        [self.a, self.b, self.c] = placed.corners;
+        placed
+    }
 }
 
 /// Solid-angle density of a uniform point on a triangle of `area` at distance `r`, its front seen under `cos`; 0 where
@@ -76,17 +92,22 @@ impl LightModel for Area {
 
     #[inline(always)]
     fn sample(scene: &Scene<'_>, light: &Chosen<'_>, p: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8 {
-        let corners = Corners::gather(scene, light.record.map(|l| l.triangle), mask);
+        let mut corners = Corners::gather(scene, light.record.map(|l| l.triangle), mask);
+        let mut area = F32x8::from_fn(|i| light.record[i].area);
+        let placed = if scene.instances.is_empty() { None } else { Some(corners.place(scene, light, mask)) };
         let [b, c] = barycentric([words[0], words[1]].map(U32x8::to_unit));
         let a = F32x8::ONE - b - c;
         let point = corners.a * a + corners.b * b + corners.c * c;
-        let normal = corners.normal();
+        let mut normal = corners.normal();
+        if let Some(placed) = &placed {
+            (normal, area) = in_instances(placed.condition.gt(F32x8::ZERO), placed.normal, normal, area);
+        }
         let d = point - p;
         let r = d.length();
         let wi = d / r;
-        let pdf = density(r, -normal.dot(wi), F32x8::from_fn(|i| light.record[i].area));
+        let pdf = density(r, -normal.dot(wi), area);
         let bound = |v: Vec3x8| v.abs().dot(normal.abs());
-        LightSample8 {
+        let sample = LightSample8 {
             wi,
             point,
             normal,
@@ -95,6 +116,10 @@ impl LightModel for Area {
             pdf,
             valid: pdf.gt(F32x8::ZERO),
             ..LightSample8::NONE
+        };
+        match placed {
+            Some(placed) => widen(sample, &placed, d),
+            None => sample,
         }
     }
 
@@ -123,7 +148,14 @@ fn factor(scene: &Scene<'_>, vertices: [[u32; 3]; 8], material: [u32; 8], [b, c]
 /// Emission textures at the points that [`Area`] samples with `words`.
 pub(super) fn sampled_factor(scene: &Scene<'_>, light: &Chosen<'_>, words: [U32x8; 2], mask: Mask8) -> Vec3x8 {
     let of = |i: usize| scene.triangles.get(light.record[i].triangle as usize);
-    let vertices = core::array::from_fn(|i| of(i).map_or([NONE; 3], |t| t.vertex));
+    let mut vertices: [[u32; 3]; 8] = core::array::from_fn(|i| of(i).map_or([NONE; 3], |t| t.vertex));
+    if !scene.instances.is_empty() {
+        let mut corners = Corners::gather(scene, light.record.map(|l| l.triangle), mask);
+        // `Area` samples b and c in exchanged places there
+        for i in corners.place(scene, light, mask).mirrored.lanes() {
+            vertices[i].swap(1, 2);
+        }
+    }
     let material = core::array::from_fn(|i| of(i).map_or(NONE, |t| t.material));
     factor(scene, vertices, material, barycentric(words.map(U32x8::to_unit)), mask)
 }
@@ -132,6 +164,22 @@ pub(super) fn sampled_factor(scene: &Scene<'_>, light: &Chosen<'_>, words: [U32x
 #[inline(never)]
 pub fn area_texture(scene: &Scene<'_>, hit: &SurfaceHit8, mask: Mask8) -> Vec3x8 {
     factor(scene, hit.vertices, hit.material, [hit.u, hit.v], mask)
+}
+
+/// Unit normals and areas, those in the lanes of `placed` by `normal`, which is as long as twice the area.
+#[inline(always)]
+fn in_instances(placed: Mask8, normal: Vec3x8, others: Vec3x8, areas: F32x8) -> (Vec3x8, F32x8) {
+    (Vec3x8::select(placed, normal.normalize(), others), placed.select(normal.length() * 0.5, areas))
+}
+
+/// The sample with the rounding that instances add at its end of a shadow ray along `d`: that of a ray that leaves the
+/// triangle, and for the distance that the ray is brought along.
+#[inline(never)]
+fn widen(sample: LightSample8, placed: &Placed8, d: Vec3x8) -> LightSample8 {
+    let normal = sample.normal.abs();
+    let far = placed.condition * d.abs().max_component() * OFFSET_BOUND;
+    let more = placed.rounding.dot(normal) + far * (normal.x + normal.y + normal.z);
+    LightSample8 { point_error: sample.point_error + more, valid: sample.valid.and_not(placed.hidden), ..sample }
 }
 
 /// Density with which [`super::sample_of`] at `p`, `n` chooses the unit directions `dir` that have met the triangles of
@@ -153,8 +201,13 @@ pub fn area_pdf<S: LightSelector>(
     }
     let area = |i: usize| scene.lights.get(hit.light[i] as usize).map_or(0.0, |l: &Light| l.area);
     let [a, b, c] = hit.corners;
-    let normal = Corners { a, b, c }.normal();
-    let pdf = density(hit.t, -normal.dot(dir), F32x8::from_fn(area));
+    let corners = Corners { a, b, c };
+    let mut normal = corners.normal();
+    let mut area = F32x8::from_fn(area);
+    if !scene.instances.is_empty() {
+        (normal, area) = in_instances(hit.placed(), hit.normal, normal, area);
+    }
+    let pdf = density(hit.t, -normal.dot(dir), area);
     let pdf = pdf * selector.probability(p, n, U32x8::new(hit.light), emits);
     (emits & usable(pdf)).zero_unless(pdf)
 }
@@ -165,4 +218,19 @@ pub fn area_pdf<S: LightSelector>(
 pub fn area_radiance(scene: &Scene<'_>, hit: &SurfaceHit8, dir: Vec3x8, ng: Vec3x8, mask: Mask8) -> Vec3x8 {
     let mask = mask & dir.dot(ng).lt(F32x8::ZERO);
     Vec3x8::from_fn(|i| scene.lights.get(hit.light[i] as usize).map_or([0.0; 3], |l| l.emission)).zero_unless(mask)
+}
+
+/// Area of the emitting triangle of light `index` in the world when the shutter opens, for [`Light::area`].
+pub fn area_of(scene: &Scene<'_>, index: u32, light: &Light) -> f32 {
+    let corner = |k: usize| {
+        let t = scene.triangles.get(light.triangle as usize);
+        let p = t.and_then(|t| scene.vertices.get(t.vertex[k] as usize)).map_or([0.0; 3], |v| v.p);
+        Vec3x8::splat(p[0], p[1], p[2])
+    };
+    let instance = geometry::instances_of_light(scene, index, light).map(U32x8::splat);
+    let corners = [corner(0), corner(1), corner(2)];
+    let [a, b, c] = corners;
+    let placed = geometry::place(scene, instance, F32x8::ZERO, corners, Mask8::all_lanes());
+    let normal = if light.instance == 0 { geometry::triangle_normal(a, b, c) } else { placed.normal };
+    0.5 * normal.length().lane(0)
 }

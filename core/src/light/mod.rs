@@ -26,7 +26,7 @@ mod power;
 mod spot;
 mod sun;
 
-pub use area::{area_pdf, area_radiance, area_texture};
+pub use area::{area_of, area_pdf, area_radiance, area_texture};
 pub use environment::{environment_pdf, environment_radiance};
 pub use mis::power_heuristic;
 pub use power::{PowerSelector, SceneExtent, luminance};
@@ -142,7 +142,7 @@ const IDLE: &Light = &Light {
     kind: NONE,
     triangle: NONE,
     area: 0.0,
-    reserved: 0,
+    instance: 0,
     vector: [0.0; 3],
     emission: [0.0; 3],
     params: [0.0; 6],
@@ -150,14 +150,17 @@ const IDLE: &Light = &Light {
 
 /// The chosen lights of eight lanes; lanes outside the mask they were gathered with hold [`IDLE`].
 struct Chosen<'s> {
+    index: U32x8,
     record: [&'s Light; 8],
+    /// Times at which they are seen.
+    time: F32x8,
     emission: Vec3x8,
     vector: Vec3x8,
 }
 
 impl<'s> Chosen<'s> {
     #[inline(always)]
-    fn gather(scene: &Scene<'s>, light: U32x8, mask: Mask8) -> Self {
+    fn gather(scene: &Scene<'s>, light: U32x8, time: F32x8, mask: Mask8) -> Self {
         let index = light.to_array();
         let mut record = [IDLE; 8];
         for i in mask.lanes() {
@@ -166,7 +169,9 @@ impl<'s> Chosen<'s> {
         Self {
             emission: Vec3x8::from_fn(|i| record[i].emission),
             vector: Vec3x8::from_fn(|i| record[i].vector),
+            index: light,
             record,
+            time,
         }
     }
 
@@ -257,7 +262,8 @@ pub const TEXTURED_EMISSION: Effects = Effects::AREA_LIGHTS.with(Effects::PRINCI
 /// light, the others the position on it. Lanes that come out not `valid` scatter no direct light in this sample: black,
 /// edge-on, behind the light, touching it, or at a distance whose square overflows.
 ///
-/// Lights that need an effect outside the constant `profile` are not compiled in, and give no sample.
+/// Lights that need an effect outside the constant `profile` are not compiled in, and give no sample. Lights that move are
+/// seen where they are when the shutter opens; [`sample_at`] is for other times.
 #[inline(always)]
 pub fn sample_of<S: LightSelector>(
     profile: Effects,
@@ -268,10 +274,34 @@ pub fn sample_of<S: LightSelector>(
     words: [U32x8; 4],
     active: Mask8,
 ) -> LightSample8 {
-    let (light, probability) = selector.select(p, n, words[0]);
-    let chosen = Chosen::gather(scene, light, active);
+    sample_at(profile, scene, selector, &Reference8 { p, n, time: F32x8::ZERO }, words, active)
+}
+
+/// Where and when lights are seen.
+#[derive(Clone, Copy, Debug)]
+pub struct Reference8 {
+    /// Positions, world space.
+    pub p: Vec3x8,
+    /// Unit normals, 0 in media.
+    pub n: Vec3x8,
+    /// Times, see [`Ray8::time`](crate::geometry::Ray8::time).
+    pub time: F32x8,
+}
+
+/// [`sample_of`] at given times.
+#[inline(always)]
+pub fn sample_at<S: LightSelector>(
+    profile: Effects,
+    scene: &Scene<'_>,
+    selector: &S,
+    at: &Reference8,
+    words: [U32x8; 4],
+    active: Mask8,
+) -> LightSample8 {
+    let (light, probability) = selector.select(at.p, at.n, words[0]);
+    let chosen = Chosen::gather(scene, light, at.time, active);
     let possible = active & probability.gt(F32x8::ZERO);
-    let mut out = sample_chosen(profile, scene, &chosen, p, [words[1], words[2], words[3]], possible);
+    let mut out = sample_chosen(profile, scene, &chosen, at.p, [words[1], words[2], words[3]], possible);
     if profile.contains(TEXTURED_EMISSION) && scene.effects.contains(TEXTURED_EMISSION) {
         let area = chosen.of_kind(LightKind::Area, possible);
         let factor = area::sampled_factor(scene, &chosen, [words[1], words[2]], area);

@@ -1,6 +1,6 @@
-//! The layout of a scene blob, version 3. Little-endian, position-independent, every record Pod.
+//! The layout of a scene blob, version 4. Little-endian, position-independent, every record Pod.
 //!
-//! Materials, lights and media, with the tables of their kinds, are in `blob/`.
+//! Materials, lights and media, with the tables of their kinds, objects and instances are in `blob/`.
 //!
 //! A blob is a [`Header`], a table of [`Section`]s, then the sections, each at an offset that is a multiple of
 //! [`ALIGN`]. Indices are `u32`; [`NONE`] is absence. Bytes become a [`super::Scene`] through
@@ -11,12 +11,13 @@ use bytemuck::{Pod, Zeroable};
 /// First bytes of every blob.
 pub const MAGIC: [u8; 8] = *b"CROUPIER";
 /// Version of this layout.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 /// Sections start at multiples of this many bytes; a blob aligned to it traverses fastest (4 is enough).
 pub const ALIGN: usize = 64;
 /// "No such index".
 pub const NONE: u32 = u32::MAX;
-/// Set in a child reference that is a leaf: bits 0..27 index [`Leaf`]s, bits 27..31 count its triangles (1..=8).
+/// Set in a child reference that is a leaf: bits 0..27 index [`Leaf`]s, bits 27..31 count its triangles (1..=8); in
+/// top-level trees the count is 0, and bits 0..27 index [`Instance`]s.
 pub const LEAF_BIT: u32 = 1 << 31;
 /// Bits of a child reference that index.
 pub const CHILD_INDEX: u32 = (1 << 27) - 1;
@@ -57,11 +58,13 @@ macro_rules! kinds {
     };
 }
 
+mod instances;
 mod lights;
 mod materials;
 mod media;
 mod principled;
 
+pub use instances::*;
 pub use lights::*;
 pub use materials::*;
 pub use media::*;
@@ -109,6 +112,10 @@ kinds! {
         Densities = 17, "densities";
         /// `f32` majorants of grid media.
         Majorants = 18, "majorants";
+        /// [`Object`]s, the world first; empty without instances.
+        Objects = 19, "objects";
+        /// [`Instance`]s, those of each object in a run.
+        Instances = 20, "instances";
     }
 }
 
@@ -148,7 +155,7 @@ pub struct Section {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct SceneInfo {
-    /// Smallest coordinates of the triangles, world space; zeros in an empty scene.
+    /// Smallest coordinates of triangles and instances, world space; zeros in an empty scene.
     pub bounds_min: [f32; 3],
     /// Largest coordinates.
     pub bounds_max: [f32; 3],
@@ -163,7 +170,8 @@ pub struct SceneInfo {
 ///
 /// Nodes and leaves are numbered depth-first in preorder, children in slot order: walking the tree from node 0 that way
 /// meets nodes 0, 1, 2 ... and, counted apart, leaves 0, 1, 2 ... Each triangle is in exactly one leaf, every vertex
-/// inside (closed, exactly) the boxes of all its ancestors, at most [`MAX_TREE_DEPTH`] nodes lie on a path.
+/// inside (closed, exactly) the boxes of all its ancestors, at most [`MAX_TREE_DEPTH`] nodes lie on a path. With
+/// instances this holds for each tree of each object, from its first node and leaf on ([`Object`]).
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Node {
@@ -193,7 +201,7 @@ pub struct Triangle {
     pub vertex: [u32; 3],
     /// Material index.
     pub material: u32,
-    /// Light index if it emits, else [`NONE`].
+    /// Light index if it emits, else [`NONE`]. Of an instanced object: its number among the object's emitting triangles.
     pub light: u32,
     /// [`TRIANGLE_SMOOTH`].
     pub flags: u32,
@@ -202,7 +210,7 @@ pub struct Triangle {
 /// Interpolate the vertex normals; else the geometric normal shades.
 pub const TRIANGLE_SMOOTH: u32 = 1;
 
-/// One vertex, world space.
+/// One vertex, world space or that of its object.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Vertex {

@@ -60,6 +60,10 @@ effects! {
     ALPHA = 25, "alpha cut-outs";
     /// Compensation of the energy that rough surfaces lose.
     MULTIPLE_SCATTERING = 26, "multiple scattering";
+    /// Instances of objects.
+    INSTANCES = 27, "instances";
+    /// Instances that move while the shutter is open.
+    MOTION = 28, "motion blur";
     /// Normal maps.
     NORMAL_MAPS = 29, "normal maps";
     /// Orthographic or panoramic camera.

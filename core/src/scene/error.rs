@@ -1,6 +1,7 @@
 //! Errors of scene validation: the object, its index and the number that is wrong.
 
-use super::blob::{MAX_TREE_DEPTH, SectionKind, VERSION};
+use super::blob::{MAX_CONDITION, MAX_TREE_DEPTH, SectionKind, VERSION};
+use super::instances::InstanceFault;
 use core::fmt;
 
 /// A number of a record that must lie in a stated range.
@@ -64,6 +65,8 @@ pub enum Field {
     SheenWidth,
     /// Scale of a normal map, as a magnitude up to [`super::blob::MAX_NORMAL_SCALE`].
     NormalScale,
+    /// Condition of an object: the largest of its instances.
+    Condition,
 }
 
 impl Field {
@@ -96,6 +99,7 @@ impl Field {
             Self::Majorant => "majorant",
             Self::SheenWidth => "width of the sheen",
             Self::NormalScale => "normal scale",
+            Self::Condition => "condition",
         }
     }
 }
@@ -149,6 +153,26 @@ pub enum SlotFault {
     Vertex(f32),
     /// A coordinate outside the leaf's box.
     Outside(f32),
+}
+
+/// Fault of an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ObjectFault {
+    /// Its triangles, nodes, leaves or instances are not the run behind those of the object before, or not within their
+    /// sections; of an object that does not exist: something is left over.
+    Order,
+    /// It holds nothing, is a world without instances, or has things without a tree or a tree without things.
+    Empty,
+    /// Emitting triangles, or lights in all, that are not as many as there are.
+    Lights(u32),
+    /// Its top-level tree does not hold each of its instances, and the tree of its triangles, exactly once.
+    Coverage {
+        /// Instances that it has.
+        instances: u32,
+        /// Instances and trees met.
+        met: u32,
+    },
 }
 
 /// Error of scene validation.
@@ -246,6 +270,20 @@ pub enum SceneError {
         /// Fault of the triangle slot.
         fault: SlotFault,
     },
+    /// An object.
+    Object {
+        /// Object; 0 is the world.
+        object: u32,
+        /// Fault of the object.
+        fault: ObjectFault,
+    },
+    /// An instance.
+    Instance {
+        /// Instance.
+        instance: u32,
+        /// Fault of the instance.
+        fault: InstanceFault,
+    },
     /// Records that the walk from the root does not reach, or a childless node.
     Unreached {
         /// Nodes or leaves.
@@ -315,6 +353,35 @@ impl fmt::Display for SlotFault {
     }
 }
 
+impl fmt::Display for ObjectFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Order => write!(f, "does not follow the object before it, or does not fit into the sections"),
+            Self::Empty => write!(f, "holds nothing, or lacks a tree or what its tree is about"),
+            Self::Lights(n) => write!(f, "states {n} lights, not those of its triangles and instances"),
+            Self::Coverage { instances, met } => {
+                write!(f, "has a top-level tree of {met} references, not each of {instances} instances once")
+            }
+        }
+    }
+}
+
+impl fmt::Display for InstanceFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Entry(x) => write!(f, "its transform has an entry {x}"),
+            Self::Singular(x) => write!(
+                f,
+                "its transform is singular, or may be between its keys (condition {x}, at most {MAX_CONDITION})"
+            ),
+            Self::Outside(x) => write!(f, "it reaches the coordinate {x}"),
+            Self::Object(o) => write!(f, "object {o} does not exist, is the world, or nests too deep"),
+            Self::Derived => write!(f, "its inverse, condition or flags are not those of its transform"),
+            Self::Lights(n) => write!(f, "its lights, from {n} on, are not those of its object"),
+        }
+    }
+}
+
 impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
@@ -339,6 +406,8 @@ impl fmt::Display for SceneError {
             }
             Self::Child { node, slot, fault } => write!(f, "nodes[{node}]: child {slot} {fault}"),
             Self::Slot { leaf, slot, fault } => write!(f, "leaves[{leaf}]: triangle slot {slot} {fault}"),
+            Self::Object { object, fault } => write!(f, "objects[{object}] {fault}"),
+            Self::Instance { instance, fault } => write!(f, "instances[{instance}]: {fault}"),
             Self::Unreached { of, index } => write!(f, "{}[{index}]: not part of the tree, or childless", of.name()),
             Self::Coverage { triangles, slots } => {
                 write!(f, "the leaves' {slots} slots do not hold each of {triangles} triangles exactly once")

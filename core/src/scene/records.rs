@@ -42,6 +42,10 @@ pub struct Records<'s> {
     pub densities: &'s [f32],
     /// Majorants of grid media.
     pub majorants: &'s [f32],
+    /// Objects, the world first; empty without instances.
+    pub objects: &'s [Object],
+    /// Instances, those of each object in a run.
+    pub instances: &'s [Instance],
     /// Material names, newline-separated; see [`super::Scene::material_name`].
     pub names: &'s [u8],
     /// Effects that the scene calls for: of the materials that triangles use, of lights and camera.

@@ -14,6 +14,7 @@ use core::ops::Deref;
 /// * every index that a record holds is in range of its section or [`NONE`], and every section has fewer than 2^31
 ///   records,
 /// * the tree is a tree: at most [`MAX_TREE_DEPTH`] nodes on a path, every triangle in exactly one leaf,
+/// * instances refer to objects in at most [`MAX_INSTANCE_DEPTH`] levels without cycles, their boxes hold what rays can meet,
 /// * every number that a formula reads is finite and in the range that [`super::Field`] states,
 /// * no density of a medium's grid exceeds the majorants of the bricks within one cell of it.
 #[derive(Clone, Copy, Debug)]
@@ -75,6 +76,8 @@ impl<'s> Scene<'s> {
             media: sections.records(SectionKind::Media)?,
             densities: sections.records(SectionKind::Densities)?,
             majorants: sections.records(SectionKind::Majorants)?,
+            objects: sections.records(SectionKind::Objects)?,
+            instances: sections.records(SectionKind::Instances)?,
             names: sections.records(SectionKind::Names)?,
             effects: Effects::default(),
             hash: sections.table().hash,

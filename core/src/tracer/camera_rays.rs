@@ -8,6 +8,7 @@ use super::media_set::MediaSet8;
 use super::packets::RayState8;
 use super::path::Path8;
 use super::root::PixelTarget;
+use super::shading::moves;
 use crate::camera;
 use crate::extension::{Extension, PixelSamples8, SourceRays8};
 use crate::geometry::Ray8;
@@ -144,6 +145,13 @@ pub(crate) fn camera_rays<W: World>(
         SourceRays8 { origin, direction, weight: Vec3x8::ONE, active: asked }
     };
     let (o, d, active) = (source.origin, source.direction, source.active);
+    let mut time = F32x8::ZERO;
+    if moves::<W>(world.scene()) {
+        time = key.time();
+        for (root, time) in root.iter().zip(time.to_array()).take(lanes) {
+            book.roots.get(*root).time = time;
+        }
+    }
     let path = Path8 { root: U32x8::new(root), record: U32x8::new(record), depth: U32x8::splat(1) };
     if W::Extension::RAYS {
         book.close_lanes(asked.and_not(active), &path);
@@ -151,7 +159,7 @@ pub(crate) fn camera_rays<W: World>(
     book.counters.camera_rays += if W::Extension::RAYS { active.count().into() } else { lanes as u64 };
     RayState8 {
         active,
-        ray: Ray8::unbounded(o, d),
+        ray: Ray8::unbounded(o, d).at(time),
         from: o,
         normal: Vec3x8::ZERO,
         travelled: F32x8::ZERO,

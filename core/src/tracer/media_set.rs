@@ -79,7 +79,7 @@ impl MediaSet8 {
 const MOST_SURFACES: usize = 4096;
 
 /// The set of media that the point `p` is inside of: the first boundary of each medium that a ray from there meets says
-/// on which side it was. Rays in eight directions vote, so that a gap in a boundary misleads one of them only.
+/// on which side it was, when the shutter opens. Rays in eight directions vote, so that a gap in a boundary misleads one of them only.
 pub(crate) fn media_at<I: Intersector>(scene: &Scene<'_>, intersector: &I, p: [f32; 3]) -> u32 {
     let a = 0.577_350_3_f32;
     let d = Vec3x8::from_fn(|i| {
@@ -97,8 +97,8 @@ pub(crate) fn media_at<I: Intersector>(scene: &Scene<'_>, intersector: &I, p: [f
         if active.none() {
             break;
         }
-        let hit = SurfaceHit8::gather(scene, &hit);
-        let point = hit.point();
+        let mut hit = SurfaceHit8::gather(scene, &hit);
+        let point = hit.place(scene, ray.time);
         let medium = media_behind(scene, &hit.material);
         let leaving = d.dot(point.ng).gt(F32x8::ZERO);
         for i in active.lanes() {

@@ -6,7 +6,7 @@ use super::packets::{Contribution8, Samples8, ShadowRays8};
 use crate::bsdf::Eval8;
 use crate::geometry::{self, Ray8};
 use crate::learn::cache::NO_BIN;
-use crate::light::{self, LightSample8, power_heuristic};
+use crate::light::{self, LightSample8, Reference8, power_heuristic};
 use crate::world::World;
 use croupier_simd::{F32x8, U32x8, Vec3x8};
 
@@ -22,7 +22,8 @@ pub(crate) fn sample_lights<W: World>(world: &W, samples: &Samples8) -> Option<L
 #[inline(never)]
 fn one_per_lane<W: World>(world: &W, samples: &Samples8) -> LightSample8 {
     let v = &samples.vertex;
-    light::sample_of(W::EFFECTS, world.scene(), world.lights(), v.p, v.ng, samples.key.light(), samples.continues)
+    let at = Reference8 { p: v.p, n: v.ng, time: samples.time };
+    light::sample_at(W::EFFECTS, world.scene(), world.lights(), &at, samples.key.light(), samples.continues)
 }
 
 /// The shadow rays of a packet's light samples, whose BSDF is `f`. With `roulette` they survive by what they would
@@ -68,5 +69,6 @@ fn towards_light(samples: &Samples8, l: &LightSample8) -> Ray8 {
         d: Vec3x8::select(l.infinite, l.wi, finite.d),
         tmin: F32x8::ZERO,
         tmax: l.infinite.select(F32x8::INFINITY, finite.tmax),
+        time: samples.time,
     }
 }

@@ -4,11 +4,11 @@
 use super::book::Bookkeeping;
 use super::crossing::{across, media_towards};
 use super::packets::{Samples8, ShadowRays8};
-use super::shading::{may_pass, straight_share};
+use super::shading::{may_pass, straight_share, surface};
 use crate::accel::Intersector;
 use crate::bsdf;
 use crate::cost::COST_SHADOW;
-use crate::geometry::{self, Hit8, Ray8, SurfaceHit8};
+use crate::geometry::{self, Hit8, NO_INSTANCE, Ray8};
 use crate::media::{self, Segment8};
 use crate::scene::blob::{MATERIAL_CUTOUT, Material, NONE};
 use crate::scene::{Effects, Scene};
@@ -72,14 +72,14 @@ fn walk<W: World>(world: &W, book: &mut Bookkeeping<'_>, samples: &Samples8, s: 
     for passed in 0..MAX_PASSED {
         // what is left to pass is known: behind the last of it nothing needs to be traced
         let search = active.and_not(left.eq(none));
-        let mut hit = Hit8 { hit: Mask8::NONE, t: ray.tmax, triangle: none, u: F32x8::ZERO, v: F32x8::ZERO };
+        let (u, v, instance) = (F32x8::ZERO, F32x8::ZERO, NO_INSTANCE);
+        let mut hit = Hit8 { hit: Mask8::NONE, t: ray.tmax, triangle: none, u, v, instance };
         if search.any() {
             count(book, s, search);
             hit = world.intersector().closest(&ray, search);
             hit.hit &= search;
         }
-        let surface = SurfaceHit8::gather(scene, &hit);
-        let point = surface.point();
+        let (surface, point) = surface::<W>(scene, &hit, ray.time);
         if hit.hit.any() {
             let share = straight_share(world, &surface, -ray.d.normalize(), point.ng, media);
             transmittance = Vec3x8::select(hit.hit, transmittance * share, transmittance);

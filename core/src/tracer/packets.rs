@@ -25,6 +25,8 @@ pub(crate) struct Samples8 {
     pub path: Path8,
     /// Random keys.
     pub key: Key8,
+    /// Times of the paths.
+    pub time: F32x8,
 }
 
 /// One ray per lane, from the camera or from a vertex.

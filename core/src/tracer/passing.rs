@@ -100,7 +100,7 @@ pub(crate) fn wait(
     (o, distance, media): (Vec3x8, F32x8, MediaSet8),
 ) {
     let on = RayState8 {
-        ray: Ray8::unbounded(o, rays.ray.d),
+        ray: Ray8::unbounded(o, rays.ray.d).at(rays.ray.time),
         travelled: distance,
         media,
         key: rays.key.straight_on(),

@@ -28,10 +28,9 @@ use super::refill::{Refill, refill, samples};
 use super::roulette::roulette;
 use super::scatter::scatter;
 use super::settle::settle;
-use super::shading::{albedo, may_pass, shade};
+use super::shading::{albedo, may_pass, moves, shade, surface};
 use super::state::State;
 use super::trace::trace;
-use crate::geometry::SurfaceHit8;
 use crate::scene::Effects;
 use crate::world::World;
 use croupier_simd::{Mask8, U32x8, Vec3x8};
@@ -76,6 +75,9 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
     if rays.active.none() {
         return true;
     }
+    if kind == RayKind::Straight && moves::<W>(world.scene()) {
+        rays.ray.time = book.roots.times(rays.path.root, rays.active);
+    }
 
     let mut hit = trace(world, book, &rays, kind);
     let in_media = W::EFFECTS.contains(Effects::MEDIA) && (rays.active & rays.media.inside()).any();
@@ -91,11 +93,10 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
         return true;
     }
 
-    let mut hit = SurfaceHit8::gather(world.scene(), &hit);
+    let (mut hit, point) = surface::<W>(world.scene(), &hit, rays.ray.time);
     if W::EFFECTS.intersects(Effects::STRAIGHT) {
         hit.t += rays.travelled;
     }
-    let point = hit.point();
     book.counters.surface.count(hit.mask.count());
     if let Some(found) = emission::area(world, &rays, &hit, point.ng) {
         book.accumulate(hit.emitters(), &rays.path, &found);

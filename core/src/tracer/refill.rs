@@ -7,9 +7,10 @@ use super::class::{PacketClass, Queue};
 use super::packets::Samples8;
 use super::path::Path8;
 use super::ring::{RESERVE, Ring, Taken8};
+use super::shading::moves;
 use super::vertex::PathVertex8;
 use crate::world::World;
-use croupier_simd::{Mask8, U32x8};
+use croupier_simd::{F32x8, Mask8, U32x8};
 
 /// What a packet is filled with.
 #[derive(Clone, Copy, Debug)]
@@ -59,6 +60,7 @@ pub(crate) fn samples<W: World>(world: &W, ring: &Ring<'_>, book: &mut Bookkeepi
         with_nee,
         path: Path8 { record: book.open_samples(vertex.path.record, taken.lanes, with_nee), ..vertex.path },
         key: vertex.key.sample(taken.sample),
+        time: if moves::<W>(world.scene()) { book.roots.times(vertex.path.root, active) } else { F32x8::ZERO },
         vertex,
     }
 }

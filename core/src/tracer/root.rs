@@ -19,8 +19,9 @@ pub(crate) struct CameraSample {
     pub target: PixelTarget,
     /// Samples that its splits have added.
     pub splits: u32,
-    /// Makes eight words of what [`Roots::targets`] reads.
-    reserved: u32,
+    /// Time of its rays, see [`Ray8::time`](crate::geometry::Ray8::time). It makes eight words of what [`Roots::targets`]
+    /// reads.
+    pub time: f32,
 }
 
 /// The pixel of a camera sample.
@@ -108,6 +109,13 @@ impl<'m> Roots<'m> {
         let rows = [row(a), row(b), row(c), row(d), row(e), row(f), row(g), row(h)];
         let [x, y, z, share, film, ..] = F32x8::transpose(rows);
         PixelTarget8 { error_weight: Vec3x8::new(x, y, z), share, film: film.to_bits() }
+    }
+
+    /// The times of the roots in `mask`; 0 in other lanes.
+    #[inline(never)]
+    pub(crate) fn times(&self, slots: U32x8, mask: Mask8) -> F32x8 {
+        let slots = U32x8::select(mask, slots, U32x8::splat(u32::MAX)).to_array();
+        F32x8::from_fn(|i| self.slots.get(slots[i] as usize).map_or(0.0, |root| root.time))
     }
 
     pub(crate) fn get(&mut self, slot: u32) -> &mut CameraSample {

@@ -74,7 +74,7 @@ pub(crate) fn scatter<W: World>(world: &W, samples: &Samples8, nee: Option<Vec3x
         broken: valid.and_not(finite),
         rays: RayState8 {
             active: valid & beta.any_positive() & finite,
-            ray: Ray8::unbounded(geometry::offset(v.p, v.ng, v.error, wi), wi),
+            ray: Ray8::unbounded(geometry::offset(v.p, v.ng, v.error, wi), wi).at(samples.time),
             from: v.p,
             normal: v.ng,
             travelled: F32x8::ZERO,

@@ -7,7 +7,7 @@ use super::relief::relief;
 use super::vertex::PathVertex8;
 use crate::bsdf::{self, Bsdf, Inputs8, Lobes, Visitor};
 use crate::extension::{Extension, TextureSamples8};
-use crate::geometry::{SurfaceHit8, SurfacePoint8};
+use crate::geometry::{self, Hit8, SurfaceHit8, SurfacePoint8};
 use crate::learn::cache::NO_BIN;
 use crate::scene::blob::{MATERIAL_CUTOUT, MATERIAL_TWO_SIDED, MaterialKind, NONE};
 use crate::scene::{Effects, Scene};
@@ -109,7 +109,10 @@ impl Materials8 {
         let mut ns = ng;
         if W::EFFECTS.contains(Effects::SMOOTH_NORMALS) && hit.smooth.any() {
             let n = |k: usize| hit.of_vertex(scene, k, |v| v.n);
-            let sum = n(0) * wa + n(1) * wb + n(2) * wc;
+            let mut sum = n(0) * wa + n(1) * wb + n(2) * wc;
+            if places::<W>(scene) {
+                sum = geometry::place_normals(scene, hit.instance, hit.time, sum, hit.placed());
+            }
             let len = sum.length();
             // opposite normals may cancel: then the triangle's own serves (NUMERICS FRM-3)
             let ok = hit.smooth & len.gt(F32x8::splat(1e-6));
@@ -178,6 +181,26 @@ fn own_reflectance<W: World>(world: &W, hit: &SurfaceHit8, reflectance: Vec3x8) 
 #[inline(always)]
 pub(crate) fn may_pass<W: World>(scene: &Scene<'_>) -> bool {
     W::EFFECTS.intersects(Effects::STRAIGHT) && scene.effects.intersects(Effects::STRAIGHT)
+}
+
+/// Does the scene place triangles in instances?
+#[inline(always)]
+pub(crate) fn places<W: World>(scene: &Scene<'_>) -> bool {
+    W::EFFECTS.contains(Effects::INSTANCES) && scene.effects.contains(Effects::INSTANCES)
+}
+
+/// Does anything move while the shutter is open?
+#[inline(always)]
+pub(crate) fn moves<W: World>(scene: &Scene<'_>) -> bool {
+    W::EFFECTS.contains(Effects::MOTION) && scene.effects.contains(Effects::MOTION)
+}
+
+/// The triangles of hits, read and where they are in the world, and the hit points.
+#[inline(always)]
+pub(crate) fn surface<W: World>(scene: &Scene<'_>, hit: &Hit8, time: F32x8) -> (SurfaceHit8, SurfacePoint8) {
+    let mut surface = SurfaceHit8::gather(scene, hit);
+    let point = if places::<W>(scene) { surface.place(scene, time) } else { surface.point() };
+    (surface, point)
 }
 
 /// Share of the light from the directions `wo` that passes the surfaces of `hit` straight on, within `media`; `ng` are

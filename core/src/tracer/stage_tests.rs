@@ -129,6 +129,7 @@ fn floor_samples(shard: &mut Shard<'_>, kind: MaterialKind, with_nee: bool) -> S
         path: vertex.path,
         key: vertex.key,
         vertex,
+        time: F32x8::ZERO,
     }
 }
 
@@ -286,7 +287,7 @@ fn occlusion_is_found_and_charged() {
             let path = paths(shard, 1);
             let d = Vec3x8::from_fn(|i| [0.0, 0.0, if i % 2 == 0 { -1.5 } else { 0.4 }]);
             let o = Vec3x8::splat(0.25, 0.25, 0.5);
-            let ray = Ray8 { o, d, tmin: F32x8::ZERO, tmax: F32x8::ONE };
+            let ray = Ray8 { tmax: F32x8::ONE, ..Ray8::unbounded(o, d) };
             let found = Contribution8 { pixel: Vec3x8::ONE, local: Vec3x8::ONE };
             let active = Mask8::from_bits(0b0011_1111);
             let samples = Samples8 { path, ..floor_samples(shard, MaterialKind::Diffuse, true) };

@@ -3,6 +3,7 @@
 //! | file | bakes |
 //! |---|---|
 //! | `geometry` | vertices, triangles, which of them are degenerate |
+//! | `instances` | trees, objects and their instances |
 //! | `materials` | materials, their tables, textures |
 //! | `principled` | the records of principled materials |
 //! | `lights` | lights, their choice, the environment |
@@ -19,6 +20,7 @@ mod camera;
 mod emission;
 mod error;
 mod geometry;
+mod instances;
 mod lights;
 mod materials;
 mod media;
@@ -82,11 +84,15 @@ pub struct BakeReport {
     pub flattened: u32,
     /// Lights, the environment included.
     pub lights: u32,
-    /// Nodes of the tree.
+    /// Instances, those within other objects included.
+    pub instances: u32,
+    /// Prototypes that no instance leads to, which are left out.
+    pub unused_prototypes: u32,
+    /// Nodes of all trees.
     pub nodes: u32,
-    /// Leaves of the tree.
+    /// Leaves of all trees.
     pub leaves: u32,
-    /// Nodes on the tree's longest path.
+    /// Nodes on the longest path of any tree.
     pub depth: u32,
     /// Bytes of the sections, in blob order.
     pub sections: Vec<(SectionKind, u64)>,
@@ -120,13 +126,14 @@ pub fn bake(
     let stage = staged(Stage::Geometry);
     let camera = camera::bake(&scene.camera)?;
     let emission = lights::emission_of_materials(scene)?;
-    let mut geometry = geometry::bake(scene, &emission)?;
+    let plan = instances::plan(scene)?;
+    let mut geometry = geometry::bake(scene, &emission, &plan.runs)?;
     let media = media::bake(&scene.media)?;
-    boundary::check(scene)?;
+    boundary::check(scene, &plan.runs)?;
     done(stage);
 
     let stage = staged(Stage::Tree);
-    let tree = bvh::build(&geometry.corners, options.effort);
+    let mut forest = instances::bake(scene, &plan, &geometry, options.effort)?;
     done(stage);
 
     let stage = staged(Stage::Materials);
@@ -134,11 +141,11 @@ pub fn bake(
     done(stage);
 
     let stage = staged(Stage::Lights);
-    let lights = lights::bake(scene, &emission, &mut geometry)?;
+    let lights = lights::bake(scene, &emission, &mut geometry, &mut forest)?;
     done(stage);
 
     let stage = staged(Stage::Write);
-    let [bounds_min, bounds_max] = geometry.bounds;
+    let [bounds_min, bounds_max] = forest.bounds;
     let info = SceneInfo {
         bounds_min,
         bounds_max,
@@ -151,9 +158,11 @@ pub fn bake(
         dropped_lights: geometry.dropped_lights,
         flattened: geometry.flattened,
         lights: lights.lights.len() as u32,
-        nodes: tree.nodes.len() as u32,
-        leaves: tree.leaves.len() as u32,
-        depth: tree.depth,
+        instances: forest.instances.len() as u32,
+        unused_prototypes: plan.unused(),
+        nodes: forest.nodes.len() as u32,
+        leaves: forest.leaves.len() as u32,
+        depth: forest.depth,
         ..BakeReport::default()
     };
     let (info, camera) = ([info], [camera]);
@@ -161,8 +170,8 @@ pub fn bake(
     writer
         .section(SectionKind::Info, &info)
         .section(SectionKind::Cameras, &camera)
-        .section(SectionKind::Nodes, &tree.nodes)
-        .section(SectionKind::Leaves, &tree.leaves)
+        .section(SectionKind::Nodes, &forest.nodes)
+        .section(SectionKind::Leaves, &forest.leaves)
         .section(SectionKind::Triangles, &geometry.triangles)
         .section(SectionKind::Vertices, &geometry.vertices)
         .section(SectionKind::Materials, &materials.materials)
@@ -177,7 +186,9 @@ pub fn bake(
         .section(SectionKind::EnvAlias, &lights.env_alias)
         .section(SectionKind::Media, &media.media)
         .section(SectionKind::Densities, &media.densities)
-        .section(SectionKind::Majorants, &media.majorants);
+        .section(SectionKind::Majorants, &media.majorants)
+        .section(SectionKind::Objects, &forest.objects)
+        .section(SectionKind::Instances, &forest.instances);
     report.sections = writer.sizes();
     let bytes = writer.finish();
     report.bytes = bytes.len() as u64;

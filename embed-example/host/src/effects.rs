@@ -7,8 +7,8 @@ use croupier::Scene;
 use croupier::unstable::Effects;
 use croupier::unstable::profile::AnyProfile;
 use croupier::unstable::scene::blob::{
-    CameraKind, LightKind, MATERIAL_COMPENSATED, MATERIAL_CUTOUT, Material, MaterialKind, MediumKind, NONE,
-    TRIANGLE_SMOOTH,
+    CameraKind, INSTANCE_MOVING, LightKind, MATERIAL_COMPENSATED, MATERIAL_CUTOUT, MAX_INSTANCE_DEPTH, Material,
+    MaterialKind, MediumKind, NONE, Object, TRIANGLE_SMOOTH,
 };
 use serde::{Serialize, Serializer};
 use std::collections::BTreeSet;
@@ -158,6 +158,13 @@ fn triangles(n: usize) -> Fact {
     Fact::Count(["triangle", "triangles"], n)
 }
 
+/// Triangles of an object, those that its instances place included.
+fn placed_triangles(scene: &Scene<'_>, o: &Object, level: u32) -> u64 {
+    let own = (o.first_instance as usize..).take(if level < MAX_INSTANCE_DEPTH { o.instances as usize } else { 0 });
+    let object = |i: usize| scene.instances.get(i).and_then(|i| scene.objects.get(i.object as usize));
+    u64::from(o.triangles) + own.filter_map(object).map(|o| placed_triangles(scene, o, level + 1)).sum::<u64>()
+}
+
 /// What uses an effect.
 type Facts = fn(&Census<'_>) -> Vec<Fact>;
 
@@ -188,6 +195,19 @@ const REASONS: &[(Effects, Facts)] = &[
     }),
     (Effects::GRID_MEDIA, |c| vec![Fact::Sizes("cells", c.grids())]),
     (Effects::ALPHA, |c| c.textures(|m| m.flags & MATERIAL_CUTOUT != 0)),
+    (Effects::INSTANCES, |c| {
+        let objects = c.scene.objects.len().saturating_sub(1);
+        let placed: u64 = c.scene.objects.first().map_or(0, |world| placed_triangles(c.scene, world, 0));
+        vec![
+            Fact::Count(["instance", "instances"], c.scene.instances.len()),
+            Fact::Count(["object", "objects"], objects),
+            Fact::Count(["triangle in the world", "triangles in the world"], placed as usize),
+        ]
+    }),
+    (Effects::MOTION, |c| {
+        let moving = c.scene.instances.iter().filter(|i| i.flags & INSTANCE_MOVING != 0).count();
+        vec![Fact::Count(["moving instance", "moving instances"], moving)]
+    }),
     (Effects::MULTIPLE_SCATTERING, |c| c.surfaces(|m| m.flags & MATERIAL_COMPENSATED != 0)),
     (Effects::PROJECTIONS, |c| match CameraKind::from_u32(c.scene.camera.kind) {
         Some(CameraKind::Orthographic) => vec![Fact::Count(["orthographic camera", "orthographic cameras"], 1)],

@@ -116,6 +116,7 @@ impl Set {
                 d: vector(c, &|r| r.d),
                 tmin: F32x8::ZERO,
                 tmax: F32x8::from_fn(|i| c.get(i).map_or(1.0, |r| r.tmax)),
+                time: F32x8::ZERO,
             };
             (ray, Mask8::first(c.len()))
         });

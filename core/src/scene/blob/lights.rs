@@ -99,10 +99,10 @@ pub struct Light {
     pub kind: u32,
     /// Area: index of the triangle.
     pub triangle: u32,
-    /// Area: area of the triangle.
+    /// Area: area of the triangle, world units squared; in a moving instance, when the shutter opens.
     pub area: f32,
-    /// Zero.
-    pub reserved: u32,
+    /// Area: 1 + index of the world's [`super::Instance`] that the triangle is in; 0 if it is the world's own.
+    pub instance: u32,
     /// Point, spot: position. Directional, sun: unit direction towards the light.
     pub vector: [f32; 3],
     /// Area: radiance. Point: intensity. Spot: intensity on the axis. Directional, sun: irradiance on a facing surface.

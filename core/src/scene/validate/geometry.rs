@@ -1,7 +1,7 @@
 //! Vertices and triangles.
 
 use super::record::{Record, records};
-use super::{materials, media};
+use super::{instances, materials, media};
 use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError};
 use crate::scene::{Effects, Records};
@@ -36,12 +36,25 @@ pub(super) fn triangles(scene: &Records<'_>) -> Result<Effects, SceneError> {
         if smooth {
             effects = effects.with(Effects::SMOOTH_NORMALS);
         }
-        if t.light != NONE {
-            let light = at.follow(SectionKind::Lights, t.light, scene.lights)?;
-            if light.kind != LightKind::Area as u32 || light.triangle as usize != at.index {
-                return Err(at.wrong_reference(SectionKind::Lights, t.light, scene.lights.len()));
+        let object = instances::placed(scene, at.index).and_then(|o| scene.objects.get(o as usize));
+        match object {
+            None => world_light(scene, at, t)?,
+            Some(o) if t.light != NONE && t.light >= o.emitters => {
+                return Err(at.wrong_reference(SectionKind::Lights, t.light, o.emitters as usize));
             }
+            Some(_) => {}
         }
     }
     Ok(effects)
+}
+
+/// The light of a triangle that is in the world itself.
+fn world_light(scene: &Records<'_>, at: Record, t: &Triangle) -> Result<(), SceneError> {
+    if t.light != NONE {
+        let light = at.follow(SectionKind::Lights, t.light, scene.lights)?;
+        if light.kind != LightKind::Area as u32 || light.triangle as usize != at.index || light.instance != 0 {
+            return Err(at.wrong_reference(SectionKind::Lights, t.light, scene.lights.len()));
+        }
+    }
+    Ok(())
 }

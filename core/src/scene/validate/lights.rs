@@ -1,6 +1,7 @@
 //! Lights and the table that chooses among them.
 
 use super::alias;
+use super::instances;
 use super::record::{Record, cross, dot64, records};
 use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError, SectionFault};
@@ -8,6 +9,7 @@ use crate::scene::{Effects, Records};
 
 /// Every light. Triangles have been checked.
 pub(super) fn lights(scene: &Records<'_>) -> Result<Effects, SceneError> {
+    instances::lights(scene)?;
     let mut effects = Effects::default();
     for (at, l) in records(SectionKind::Lights, scene.lights) {
         let kind = light(scene, at, l)?;
@@ -23,7 +25,7 @@ pub(super) fn lights(scene: &Records<'_>) -> Result<Effects, SceneError> {
 pub(super) fn light(scene: &Records<'_>, at: Record, l: &Light) -> Result<LightKind, SceneError> {
     let kind = LightKind::from_u32(l.kind);
     let kind = kind.ok_or(SceneError::Kind { of: at.of, index: at.index(), found: l.kind })?;
-    at.zero(l.reserved == 0 && unused_params_are_zero(kind, &l.params))?;
+    at.zero((l.instance == 0 || kind == LightKind::Area) && unused_params_are_zero(kind, &l.params))?;
     at.finite(Field::Area, &[l.area])?;
     at.finite(Field::Direction, &l.vector)?;
     field(scene, at, l, LightField::Emission)?;
@@ -84,15 +86,30 @@ pub(super) fn table(scene: &Records<'_>, environment_emits: bool) -> Result<(), 
     alias::consistent(of, 0, table)
 }
 
-/// An emitting triangle: both name each other, and the area is that of the triangle.
+/// An emitting triangle: both name each other, and the area is that of the triangle in the world.
 fn area(scene: &Records<'_>, at: Record, l: &Light) -> Result<(), SceneError> {
     let t = at.follow(SectionKind::Triangles, l.triangle, scene.triangles)?;
-    if t.light as usize != at.index {
-        return Err(at.wrong_reference(SectionKind::Triangles, l.triangle, scene.triangles.len()));
-    }
+    let wrong = at.wrong_reference(SectionKind::Triangles, l.triangle, scene.triangles.len());
+    let maps = match (l.instance.checked_sub(1), instances::placed(scene, l.triangle as usize)) {
+        (None, None) if t.light as usize == at.index => [None; 2],
+        (Some(index), Some(object)) => {
+            let i = at.follow(SectionKind::Instances, index, scene.instances)?;
+            let world = scene.objects.first().is_some_and(|o| index < o.instances);
+            let found = instances::emitter(scene, at.index, i).filter(|e| world && e.object == object);
+            found.filter(|e| e.number == t.light).ok_or(wrong)?.maps
+        }
+        _ => return Err(wrong),
+    };
     let mut corners = [[0.0f64; 3]; 3];
     for (corner, v) in corners.iter_mut().zip(t.vertex) {
         *corner = at.follow(SectionKind::Vertices, v, scene.vertices)?.p.map(f64::from);
+        for map in maps.into_iter().flatten() {
+            let [x, y, z] = *corner;
+            *corner = map.map(|row| {
+                let [a, b, c, t] = row.map(f64::from);
+                a * x + b * y + c * z + t
+            });
+        }
     }
     let [[ax, ay, az], b, c] = corners;
     let [ab, ac] = [b, c].map(|[x, y, z]| [x - ax, y - ay, z - az]);

@@ -5,6 +5,7 @@
 mod alias;
 mod environment;
 mod geometry;
+mod instances;
 mod lights;
 mod materials;
 mod media;
@@ -27,12 +28,13 @@ pub(super) fn scene(scene: &Records<'_>) -> Result<Effects, SceneError> {
     media::media(scene)?;
     materials::materials(scene)?;
     geometry::vertices(scene)?;
+    let instances = instances::instances(scene)?;
     let surfaces = geometry::triangles(scene)?;
     let lights = lights::lights(scene)?;
     let environment = environment::environment(scene)?;
     lights::table(scene, environment.emits)?;
     tree::tree(scene)?;
-    Ok(surfaces.with(lights).with(environment.effects).with(camera))
+    Ok(surfaces.with(instances).with(lights).with(environment.effects).with(camera))
 }
 
 /// Checks of single records that take the places of others in a validated scene; each gives the effects that it calls

@@ -9,32 +9,40 @@ use super::BakeError;
 use crate::description::{SceneDescription, Triangle};
 use glam::DVec3;
 use std::collections::HashMap;
+use std::ops::Range;
 
-/// Every medium has a boundary, which is closed and as a whole faces outwards. Indices of vertices and materials have been
+/// Every medium has a boundary, which is closed and as a whole faces outwards, in each object on its own. Indices of vertices and materials have been
 /// checked, those of media are checked with the materials.
-pub(super) fn check(scene: &SceneDescription) -> Result<(), BakeError> {
+pub(super) fn check(scene: &SceneDescription, runs: &[Vec<Range<u32>>]) -> Result<(), BakeError> {
     if scene.media.is_empty() {
         return Ok(());
     }
-    let mut fronts: Vec<Vec<u32>> = vec![Vec::new(); scene.media.len()];
-    for (i, t) in (0..).zip(&scene.triangles) {
-        let medium = scene.materials[t.material as usize].medium;
-        if let Some(triangles) = medium.and_then(|m| fronts.get_mut(m as usize)) {
-            triangles.push(i);
+    let mut bounded = vec![false; scene.media.len()];
+    for runs in runs {
+        let mut fronts: Vec<Vec<u32>> = vec![Vec::new(); scene.media.len()];
+        for i in runs.iter().cloned().flatten() {
+            let medium = scene.materials[scene.triangles[i as usize].material as usize].medium;
+            if let Some(triangles) = medium.and_then(|m| fronts.get_mut(m as usize)) {
+                triangles.push(i);
+            }
+        }
+        for (index, (medium, triangles)) in scene.media.iter().zip(&fronts).enumerate() {
+            let name = || medium.name.clone();
+            let Some(first) = triangles.first() else { continue };
+            bounded[index] = true;
+            closed(scene, triangles).map_err(|(triangle, edge, times)| {
+                let object = scene.object_of(triangle).into();
+                BakeError::Leak { medium: name(), object, edge, times }
+            })?;
+            if faces_inwards(scene, triangles) {
+                return Err(BakeError::InsideOut { medium: name(), object: scene.object_of(*first).into() });
+            }
         }
     }
-    for (medium, triangles) in scene.media.iter().zip(&fronts) {
-        let name = || medium.name.clone();
-        let Some(first) = triangles.first() else { return Err(BakeError::NoBoundary { medium: name() }) };
-        closed(scene, triangles).map_err(|(triangle, edge, times)| {
-            let object = scene.object_of(triangle).into();
-            BakeError::Leak { medium: name(), object, edge, times }
-        })?;
-        if faces_inwards(scene, triangles) {
-            return Err(BakeError::InsideOut { medium: name(), object: scene.object_of(*first).into() });
-        }
+    match bounded.iter().position(|b| !b) {
+        Some(medium) => Err(BakeError::NoBoundary { medium: scene.media[medium].name.clone() }),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 fn corners(scene: &SceneDescription, triangle: u32) -> [[f32; 3]; 3] {

@@ -152,6 +152,22 @@ pub enum BakeError {
         /// Object with the first triangle.
         object: String,
     },
+    /// An instance that cannot be.
+    Instance {
+        /// Name of the instance.
+        name: String,
+        /// Name of what it places.
+        prototype: String,
+        /// Fault of the instance.
+        what: String,
+    },
+    /// A prototype that cannot be.
+    Prototype {
+        /// Name of the prototype.
+        name: String,
+        /// Fault of the prototype.
+        what: String,
+    },
     /// More of something than indices of 31 bits can tell apart.
     TooMany {
         /// Plural of the thing.
@@ -211,6 +227,8 @@ impl fmt::Display for BakeError {
             Self::InsideOut { medium, object } => {
                 write!(f, "medium `{medium}`: the front sides of its boundary (object `{object}`) face inwards")
             }
+            Self::Instance { name, prototype, what } => write!(f, "instance `{name}` of `{prototype}`: {what}"),
+            Self::Prototype { name, what } => write!(f, "prototype `{name}`: {what}"),
             Self::TooMany { what, count } => write!(f, "{count} {what} are too many"),
         }
     }

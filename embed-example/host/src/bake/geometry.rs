@@ -5,6 +5,7 @@ use crate::description::{SceneDescription, Triangle, Vertex};
 use croupier::unstable::scene::blob::MAX_COORDINATE;
 use croupier::unstable::scene::blob::{self, NONE, TRIANGLE_SMOOTH};
 use glam::Vec3;
+use std::ops::Range;
 
 /// Geometry of the blob, and what else baking needs of it.
 pub(super) struct Geometry {
@@ -12,8 +13,8 @@ pub(super) struct Geometry {
     pub triangles: Vec<blob::Triangle>,
     /// Corner positions of `triangles`.
     pub corners: Vec<[[f32; 3]; 3]>,
-    /// Smallest and largest coordinates of `corners`; zeros without triangles.
-    pub bounds: [[f32; 3]; 2],
+    /// Triangles by object; one object without instances.
+    pub objects: Vec<Range<u32>>,
     pub dropped_degenerate: u32,
     pub dropped_lights: u32,
     pub flattened: u32,
@@ -30,8 +31,12 @@ fn unit(n: [f32; 3]) -> [f32; 3] {
     Vec3::from_array(n).as_dvec3().normalize_or_zero().as_vec3().to_array()
 }
 
-/// `emission` tells which materials emit.
-pub(super) fn bake(scene: &SceneDescription, emission: &[[f32; 3]]) -> Result<Geometry, BakeError> {
+/// `emission` tells which materials emit, `runs` which triangles make up each object.
+pub(super) fn bake(
+    scene: &SceneDescription,
+    emission: &[[f32; 3]],
+    runs: &[Vec<Range<u32>>],
+) -> Result<Geometry, BakeError> {
     for (what, count) in [("vertices", scene.vertices.len()), ("triangles", scene.triangles.len())] {
         if count >= 1 << 27 {
             return Err(BakeError::TooMany { what, count });
@@ -41,7 +46,7 @@ pub(super) fn bake(scene: &SceneDescription, emission: &[[f32; 3]]) -> Result<Ge
         vertices: scene.vertices.iter().map(|v| blob::Vertex { p: v.position, n: unit(v.normal), uv: v.uv }).collect(),
         triangles: Vec::with_capacity(scene.triangles.len()),
         corners: Vec::with_capacity(scene.triangles.len()),
-        bounds: [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]],
+        objects: Vec::with_capacity(runs.len()),
         dropped_degenerate: 0,
         dropped_lights: 0,
         flattened: 0,
@@ -56,13 +61,16 @@ pub(super) fn bake(scene: &SceneDescription, emission: &[[f32; 3]]) -> Result<Ge
         if let Some(v) = t.vertices.iter().find(|v| **v as usize >= scene.vertices.len()) {
             return index("vertex", *v, scene.vertices.len());
         }
-        let Some(emission) = emission.get(t.material as usize) else {
+        if t.material as usize >= scene.materials.len() {
             return index("material", t.material, scene.materials.len());
-        };
-        g.add(t, *emission != [0.0; 3]);
+        }
     }
-    if g.triangles.is_empty() {
-        g.bounds = [[0.0; 3]; 2];
+    for runs in runs {
+        let first = g.triangles.len() as u32;
+        for t in runs.iter().flat_map(|run| &scene.triangles[run.start as usize..run.end as usize]) {
+            g.add(t, emission[t.material as usize] != [0.0; 3]);
+        }
+        g.objects.push(first..g.triangles.len() as u32);
     }
     Ok(g)
 }
@@ -96,20 +104,23 @@ impl Geometry {
         // normal has no shading normal all around it.
         let smooth = t.smooth && corner.iter().all(|v| v.n != [0.0; 3]);
         self.flattened += u32::from(t.smooth && !smooth);
-        for p in corners {
-            for (i, x) in p.into_iter().enumerate() {
-                self.bounds[0][i] = self.bounds[0][i].min(x);
-                self.bounds[1][i] = self.bounds[1][i].max(x);
-            }
-        }
         let flags = if smooth { TRIANGLE_SMOOTH } else { 0 };
         self.triangles.push(blob::Triangle { vertex: t.vertices, material: t.material, light: NONE, flags });
         self.corners.push(corners);
     }
 
-    /// Half the diagonal of the bounds.
-    pub(crate) fn radius(&self) -> f64 {
-        let [lo, hi] = self.bounds.map(|p| Vec3::from_array(p).as_dvec3());
-        (hi - lo).length() / 2.0
+    /// Smallest and largest coordinates of an object's triangles; zeros without any.
+    pub(super) fn bounds_of(&self, object: usize) -> [[f32; 3]; 2] {
+        let Some(own) = self.objects.get(object).filter(|o| !o.is_empty()) else { return [[0.0; 3]; 2] };
+        let points = self.corners[own.start as usize..own.end as usize].as_flattened();
+        points.iter().fold([[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]], |[lo, hi], p| {
+            [std::array::from_fn(|i| lo[i].min(p[i])), std::array::from_fn(|i| hi[i].max(p[i]))]
+        })
     }
+}
+
+/// Half the diagonal of bounds.
+pub(super) fn radius(bounds: [[f32; 3]; 2]) -> f64 {
+    let [lo, hi] = bounds.map(|p| Vec3::from_array(p).as_dvec3());
+    (hi - lo).length() / 2.0
 }

@@ -1,6 +1,7 @@
 //! Lights, the table that chooses among them, the environment.
 
-use super::geometry::{Geometry, area};
+use super::geometry::{Geometry, area, radius};
+use super::instances::Forest;
 use super::{BakeError, emission};
 use crate::description::{Emitter, Environment, Model, SceneDescription};
 use crate::{alias, environment};
@@ -8,7 +9,8 @@ use bytemuck::Zeroable;
 use croupier::unstable::light::luminance;
 use croupier::unstable::scene::blob::{self, Alias, EnvironmentKind, Light, LightKind};
 use croupier::unstable::scene::blob::{MAX_COORDINATE, MAX_EMISSION, MAX_SIDE};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+use std::ops::Range;
 
 /// Smallest half angle of a spot and smallest diameter of a sun, degrees: the rounding of a direction moves the edge by
 /// 1e-3 of it.
@@ -58,16 +60,18 @@ pub(super) fn emission_of_materials(scene: &SceneDescription) -> Result<Vec<[f32
     Ok(emission.into_iter().map(Option::unwrap_or_default).collect())
 }
 
-/// Makes the lights and tells the triangles theirs.
+/// Makes the lights and tells the triangles and instances theirs.
 pub(super) fn bake(
     scene: &SceneDescription,
     emission: &[[f32; 3]],
     geometry: &mut Geometry,
+    forest: &mut Forest,
 ) -> Result<Lights, BakeError> {
     let mut out = Lights::default();
     // of area lights with a texture: its mean in luminance over the whole
     let mut shares = Vec::new();
-    for (i, (t, corners)) in (0..).zip(geometry.triangles.iter_mut().zip(&geometry.corners)) {
+    let world = geometry.objects.first().map_or(0, |world| world.len());
+    for (i, (t, corners)) in (0..).zip(geometry.triangles.iter_mut().zip(&geometry.corners)).take(world) {
         let emission = emission[t.material as usize];
         if emission != [0.0; 3] {
             let mut share = 1.0;
@@ -89,9 +93,11 @@ pub(super) fn bake(
     if let Some(e) = &scene.environment {
         out.surround(e)?;
     }
-    let mut weights =
-        environment::light_weights(&out.lights, out.environment.first(), &out.env_texels, geometry.radius());
+    let hidden = out.place(scene, emission, geometry, forest)?;
+    let radius = radius(forest.bounds);
+    let mut weights = environment::light_weights(&out.lights, out.environment.first(), &out.env_texels, radius);
     weights.iter_mut().zip(&shares).for_each(|(weight, share)| *weight *= share);
+    hidden.into_iter().flatten().for_each(|light| weights[light] = 0.0);
     out.alias = alias::build(&weights);
     Ok(out)
 }
@@ -122,6 +128,80 @@ fn cone(emitter: &str, direction: [f32; 3], [outer, inner]: [f32; 2]) -> Result<
 /// 1 - cos of an angle in degrees, as 2 sin^2 of half of it: without cancellation.
 fn versine(degrees: f32) -> f32 {
     (2.0 * (f64::from(degrees).to_radians() / 2.0).sin().powi(2)) as f32
+}
+
+impl Lights {
+    /// Adds the lights of instances, one for each emitting triangle of each; returns those that are hidden.
+    fn place(
+        &mut self,
+        scene: &SceneDescription,
+        emission: &[[f32; 3]],
+        geometry: &mut Geometry,
+        forest: &mut Forest,
+    ) -> Result<Vec<Range<usize>>, BakeError> {
+        let Forest { objects, instances, .. } = forest;
+        let mut emitters: Vec<Vec<u32>> = Vec::with_capacity(objects.len());
+        for (index, (o, own)) in objects.iter_mut().zip(&geometry.objects).enumerate() {
+            let emits = |i: &u32| emission[geometry.triangles[*i as usize].material as usize] != [0.0; 3];
+            let own: Vec<u32> = own.clone().filter(emits).collect();
+            o.emitters = own.len() as u32;
+            o.lights = if index == 0 { 0 } else { o.emitters };
+            if index > 0 {
+                (0..).zip(&own).for_each(|(number, i)| geometry.triangles[*i as usize].light = number);
+            }
+            emitters.push(own);
+        }
+        for index in (1..objects.len()).filter(|o| objects[*o].instances > 0).collect::<Vec<_>>() {
+            let o = objects[index];
+            for i in &mut instances[o.first_instance as usize..(o.first_instance + o.instances) as usize] {
+                i.first_light = objects[index].lights;
+                objects[index].lights += objects[i.object as usize].lights;
+            }
+        }
+        let mut hidden = Vec::new();
+        let world = objects.first().map_or(0, |world| world.instances);
+        for index in 0..world {
+            let outer = instances[index as usize];
+            let o = objects[outer.object as usize];
+            let first = self.lights.len();
+            instances[index as usize].first_light = if o.lights > 0 { first as u32 } else { 0 };
+            let mut add = |object: u32, maps: &[[[f32; 4]; 3]]| {
+                for i in &emitters[object as usize] {
+                    let corners = geometry.corners[*i as usize].map(|p| maps.iter().fold(p.map(f64::from), apply));
+                    let area = 0.5 * (sub(corners[1], corners[0])).cross(sub(corners[2], corners[0])).length();
+                    let emission = emission[geometry.triangles[*i as usize].material as usize];
+                    let (kind, instance, area) = (LightKind::Area as u32, index + 1, area as f32);
+                    self.lights.push(Light { kind, triangle: *i, area, instance, emission, ..Zeroable::zeroed() });
+                }
+            };
+            let [open, _] = outer.to_world;
+            add(outer.object, &[open]);
+            for i in &instances[o.first_instance as usize..(o.first_instance + o.instances) as usize] {
+                add(i.object, &[i.to_world[0], open]);
+            }
+            if let Some(light) = self.lights[first..].iter().find(|l| l.area < f32::MIN_POSITIVE) {
+                let (name, prototype) = (&scene.instances[index as usize].name, outer.object);
+                let what = format!("emitting triangle {} has no area in the world", light.triangle);
+                return Err(BakeError::Instance { name: name.clone(), prototype: prototype.to_string(), what });
+            }
+            if !scene.instances[index as usize].visible {
+                hidden.push(first..self.lights.len());
+            }
+        }
+        if self.lights.len() >= 1 << 27 {
+            return Err(BakeError::TooMany { what: "lights", count: self.lights.len() });
+        }
+        Ok(hidden)
+    }
+}
+
+/// A point through an affine map.
+fn apply(p: [f64; 3], map: &[[f32; 4]; 3]) -> [f64; 3] {
+    map.map(|row| row[..3].iter().zip(p).map(|(a, x)| f64::from(*a) * x).sum::<f64>() + f64::from(row[3]))
+}
+
+fn sub(a: [f64; 3], b: [f64; 3]) -> DVec3 {
+    DVec3::from_array(a) - DVec3::from_array(b)
 }
 
 /// A light that no ray meets; black ones are left out.
