@@ -34,8 +34,8 @@
 //! | `edit` | changes of a scene between frames | sessions, how paths are traced |
 //! | `extension` | what hosts compute in place of the core | where it is used |
 //! | `world` | what paths read | who owns it |
-//! | `record` | scalars of a suspended session | what they stand for |
 //! | `tracer` | packets, the refill ring, stages, books | files, threads, clocks |
+//! | `record` | scalars of a suspended session | what they stand for |
 //! | `plan` | how many bytes a render needs | where they come from |
 //! | `session` | iterations: merge, learn, begin again | how paths are traced |
 //!

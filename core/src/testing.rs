@@ -3,7 +3,6 @@
 extern crate std;
 
 use crate::accel::Intersector;
-use crate::film::{Film, FilmScalars};
 use crate::geometry::{Hit8, Ray8};
 use crate::learn::{LearnedScalars, LearnedState};
 use crate::light::PowerSelector;
@@ -236,7 +235,7 @@ pub(crate) fn world<R>(change: impl FnOnce(&mut Settings), f: impl FnOnce(&TestW
         let scalars = LearnedScalars::new([scene.info.bounds_min, scene.info.bounds_max]);
         let mut learned = LearnedState::carve(&mut carver, &needs, &scalars).expect("memory");
         learned.forget();
-        learned.begin(4, &Film::new(settings.size, &mut [], &mut [], FilmScalars::new()));
+        learned.begin(4);
         let world = TestWorld {
             scene,
             intersector: BruteForce(scene),

@@ -253,8 +253,9 @@ fn shards_may_be_put_away_between_steps() {
                 session.end_iteration(&shards).unwrap();
                 shards.into_iter().for_each(Shard::suspend);
             }
-            let film: Vec<u8> =
-                [bytemuck::cast_slice(session.film().pixels()), bytemuck::cast_slice(session.film().aovs())].concat();
+            let film = session.film();
+            let pixels = film.pixels().flat_map(|p| bytemuck::bytes_of(&p).to_vec());
+            let film: Vec<u8> = pixels.chain(film.aovs().iter().flat_map(|a| bytemuck::bytes_of(a).to_vec())).collect();
             (film, *session.counters())
         };
         let (whole, parts) = (run(u64::MAX, false), run(37, true));

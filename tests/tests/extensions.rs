@@ -29,7 +29,7 @@ fn render<X: Extension>(bytes: &[u8], s: &Settings, iterations: &[u32], extensio
         session.end_iteration([&shard]).unwrap();
     }
     assert_eq!(session.counters().non_finite, 0);
-    session.film().pixels().to_vec()
+    session.film().pixels().collect()
 }
 
 fn bits(pixels: &[PixelStats]) -> &[u8] {

@@ -42,7 +42,7 @@ impl Viewport {
     }
 
     fn film(&self) -> Vec<u8> {
-        self.renderer.with_film(|film| bytemuck::cast_slice(film.pixels()).to_vec())
+        self.renderer.with_film(|film| film.pixels().flat_map(|p| bytemuck::bytes_of(&p).to_vec()).collect())
     }
 }
 
@@ -86,7 +86,7 @@ fn kept_statistics_do_not_change_the_mean() {
     v.camera.origin[1] += 0.2;
     v.renderer.edit(Keep::Statistics, |scene| scene.camera(v.camera)).unwrap();
     (0..256).for_each(|_| v.iterate(u64::MAX));
-    let film = v.renderer.with_film(|film| film.pixels().to_vec());
+    let film: Vec<_> = v.renderer.with_film(|film| film.pixels().collect());
     let mean = film.iter().flat_map(|p| p.mean()).sum::<f64>() / (3 * film.len()) as f64;
     let error = film.iter().map(|p| p.variance_of_mean().iter().sum::<f64>()).sum::<f64>().sqrt() / film.len() as f64;
     let Viewport { renderer, .. } = v;

@@ -169,14 +169,14 @@ impl<P: Profile> Renderer<P> {
         let scene = EditableScene::new(blob)?;
         let plan = Plan::new(&settings.with_scene(&scene.scene()))?;
         let shards = plan.settings().shards;
-        let needed = plan.shard().size.saturating_mul(shards as usize).saturating_add(plan.session().size);
+        let needed = (0..shards).fold(plan.session().size, |sum, shard| sum.saturating_add(plan.shard_of(shard).size));
         let block = |size| AlignedBytes::try_zeroed(size).ok_or(RendererError::Memory { needed });
         let state = OwnedState::try_new(MutBorrow::new(block(plan.session().size)?), |owner| {
             let session = builder::<P>(scene.scene()).build(&plan, owner.borrow_mut().as_mut());
             session.map(Session::into_state)
         })?;
         let shard = |index| {
-            let owner = MutBorrow::new(block(plan.shard().size)?);
+            let owner = MutBorrow::new(block(plan.shard_of(index).size)?);
             let shard = OwnedShard::try_new(owner, |owner| Shard::new(&plan, index, owner.borrow_mut().as_mut()))?;
             Ok(Mutex::new(Some(shard)))
         };
@@ -230,19 +230,28 @@ impl<P: Profile> Renderer<P> {
         Ok(own.as_mut().map_or(StepResult::Done, step))
     }
 
-    /// Ends the iteration: merges what the shards have gathered, estimates the error, learns.
+    /// Goes on with the end of the iteration: merges what the shards have gathered, estimates the error, learns. Work is
+    /// counted as that of [`Self::step`]; the next iteration can begin when it is done.
     ///
     /// # Errors
     /// No iteration, or a shard that has not finished it. The film is as before then.
-    pub fn end_iteration(&self) -> Result<(), RendererError> {
+    pub fn finish_iteration(&self, budget: Budget) -> Result<StepResult, RendererError> {
         let Shared { state, shards, .. } = &mut *write(&self.shared);
         shards.extend(self.shards.iter().filter_map(|slot| own(slot).take()));
-        let result =
-            state.with_dependent_mut(|_, state| state.end_iteration(shards.iter().map(OwnedShard::borrow_dependent)));
+        let all = shards.iter().map(OwnedShard::borrow_dependent);
+        let result = state.with_dependent_mut(|_, state| state.finish_iteration(all, budget));
         for (slot, shard) in self.shards.iter().zip(shards.drain(..)) {
             *own(slot) = Some(shard);
         }
         Ok(result?)
+    }
+
+    /// [`Self::finish_iteration`] in one call.
+    ///
+    /// # Errors
+    /// As of [`Self::finish_iteration`].
+    pub fn end_iteration(&self) -> Result<(), RendererError> {
+        self.finish_iteration(Budget { rays: u64::MAX }).map(|_| ())
     }
 
     /// Starts no further camera samples in this iteration: stepping on finishes those in flight, and the iteration may
