@@ -25,7 +25,7 @@ mod presets;
 mod scene_json;
 
 pub use error::LoadError;
-pub use files::MAX_FILE_BYTES;
+pub use files::{MAX_FILE_BYTES, read as read_file};
 pub use loader::{LoadOptions, LoadReport};
 
 use crate::description::SceneDescription;
