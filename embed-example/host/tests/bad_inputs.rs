@@ -2,9 +2,15 @@
 
 mod common;
 
-use common::{croupier, text};
+use common::text;
 use std::fs;
 use std::path::Path;
+use std::process::{Command, Output};
+
+/// Runs the program in a folder.
+fn croupier(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_croupier")).args(arguments).current_dir(folder).output().unwrap()
+}
 
 const V: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
 
