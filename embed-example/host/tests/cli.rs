@@ -228,7 +228,7 @@ fn notes_about_a_scene_are_printed() {
     let said = [
         "has no camera",
         "`foggy`: opacity 0.75 was taken as 1",
-        "`foggy`: reflectance [2.0, 0.0, 0.0] was limited",
+        "`foggy`: reflectance [2, 0, 0] was limited",
         "more than three corners, split into triangles: 1",
         "points and lines, left out: 1",
         "triangles without area, left out: 1",
