@@ -113,9 +113,9 @@ struct State {
 impl Watch<'_> {
     fn snapshot(&self, film: &Film<'_>, core_seconds: f64, wall_seconds: f64) -> Result<Snapshot, CompareError> {
         let [width, height] = film.size().map(|s| s as usize);
-        let pixels = film.pixels().iter().map(|p| p.mean().map(|x| x as f32)).collect();
+        let pixels = film.pixels().map(|p| p.mean().map(|x| x as f32)).collect();
         let image = Rgb { width, height, pixels };
-        let sum = |f: fn(&PixelStats) -> u64| film.pixels().iter().map(f).sum::<u64>();
+        let sum = |f: fn(PixelStats) -> u64| film.pixels().map(f).sum::<u64>();
         Ok(Snapshot {
             core_seconds,
             wall_seconds,

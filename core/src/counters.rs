@@ -137,6 +137,11 @@ impl Counters {
         self.camera_samples + self.splits
     }
 
+    /// Is there room for as many counts again in each of them, many times over?
+    pub(crate) fn have_room(&self) -> bool {
+        bytemuck::cast_slice::<_, u64>(core::slice::from_ref(self)).iter().all(|n| *n < 1 << 58)
+    }
+
     /// Adds another shard's counts.
     pub fn merge(&mut self, o: &Self) {
         self.camera_rays += o.camera_rays;

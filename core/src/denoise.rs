@@ -29,11 +29,12 @@ mod noisy;
 mod pixels;
 mod planes;
 mod prepare;
+mod work;
 
+pub(crate) use noisy::NoisySource;
 pub use noisy::{COLOR_LIMIT, DenoiseError, Noisy, Part};
 pub use planes::Planes;
-
-use grid::{FEATURES, Grid, SIGNAL};
+pub(crate) use work::{Progress, Work, window_len};
 
 /// Distance of the taps at each level, pixels.
 const STEPS: [usize; 5] = [1, 2, 4, 8, 16];
@@ -45,21 +46,22 @@ const MEMBERSHIP: f32 = 2.75;
 /// independent.
 const MEMBERSHIP_DECAY: f32 = 0.95;
 
-/// Number of values of scratch memory that [`denoise`] needs for a picture of `size`; `usize::MAX` if that is not
-/// addressable.
+/// Number of values of scratch memory that [`denoise`] needs for a picture of `size`: two per pixel and a window of rows;
+/// `usize::MAX` if that is not addressable.
 pub fn scratch_len(size: [u32; 2]) -> usize {
-    let grid = Grid::new(size);
-    grid.rows.saturating_mul(grid.stride).saturating_mul(2 * SIGNAL + FEATURES)
+    let [columns, rows] = size.map(|n| n as usize);
+    columns.saturating_mul(rows).saturating_mul(2).saturating_add(window_len(size))
 }
 
 /// Denoises into `out`, three planes like those of [`Noisy::color`]. What `scratch` and `out` hold before does not
 /// matter. A picture without noise comes back as it is, but for rounding; what comes back is finite, always.
 pub fn denoise(noisy: &Noisy<'_>, scratch: &mut [f32], out: [&mut [f32]; 3]) -> Result<(), DenoiseError> {
-    let (size, grid) = (noisy.size, Grid::new(noisy.size));
+    let size = noisy.size;
     let check = |part, needed, given| {
         if given < needed { Err(DenoiseError { part, size, needed, given }) } else { Ok(()) }
     };
-    let pixels = grid.columns.saturating_mul(grid.rows);
+    let [columns, rows] = size.map(|n| n as usize);
+    let pixels = columns.saturating_mul(rows);
     for (part, planes) in [(Part::Color, &noisy.color), (Part::Variance, &noisy.variance)] {
         planes.iter().try_for_each(|p| check(part, pixels, p.len()))?;
     }
@@ -75,17 +77,10 @@ pub fn denoise(noisy: &Noisy<'_>, scratch: &mut [f32], out: [&mut [f32]; 3]) -> 
         return Ok(());
     }
 
-    let signal = grid.rows * grid.stride * SIGNAL;
-    let (mut from, rest) = scratch.split_at_mut(signal);
-    let (mut to, features) = rest.split_at_mut(signal);
-    prepare::prepare(noisy, grid, from, to, features);
-    let mut factor = MEMBERSHIP;
-    for step in STEPS {
-        filter::smooth(grid, step, factor * factor, from, features, to);
-        core::mem::swap(&mut from, &mut to);
-        factor *= MEMBERSHIP_DECAY;
-    }
-    filter::despeckle(grid, from, features, to);
-    finish::finish(noisy, grid, to, features, out);
+    let (variance, rest) = scratch.split_at_mut(pixels);
+    let (reach, window) = rest.split_at_mut(pixels);
+    let mut work = Work { e: out, variance, reach, window };
+    let mut progress = Progress::default();
+    while !progress.row(size, noisy, &mut work) {}
     Ok(())
 }

@@ -31,8 +31,8 @@
 //! | `learn` | statistics by place and direction | materials, lights, how paths are traced |
 //! | `settings` | the caller's choices, their ranges | how they are followed |
 //! | `world` | what paths read | who owns it |
-//! | `record` | scalars of a suspended session | what they stand for |
 //! | `tracer` | packets, the refill ring, stages, books | files, threads, clocks |
+//! | `record` | scalars of a suspended session | what they stand for |
 //! | `plan` | how many bytes a render needs | where they come from |
 //! | `session` | iterations: merge, learn, begin again | how paths are traced |
 //!

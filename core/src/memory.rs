@@ -78,21 +78,14 @@ impl<'m> Carver<'m> {
         Ok(Self { rest })
     }
 
-    /// Takes the next `n` records, zeroed; the sequence of calls must be that of [`Measure::add`].
-    pub(crate) fn take<T: Pod>(&mut self, n: usize) -> Result<&'m mut [T], MemoryError> {
-        let records = self.take_unset(n)?;
-        records.fill(T::zeroed());
-        Ok(records)
-    }
-
-    /// Takes the next record with the bytes that the caller's memory holds.
+    /// Takes the next record, as [`Self::take_unset`] does.
     pub(crate) fn take_one<T: Pod>(&mut self) -> Result<&'m mut T, MemoryError> {
         let given = self.rest.len();
         self.take_unset(1)?.first_mut().ok_or(MemoryError::TooSmall { needed: size_of::<T>(), given })
     }
 
-    /// Takes the next `n` records with the bytes that the caller's memory holds: for slabs that are written before they
-    /// are read. Pages that are never used need not exist. `Debug` shows the bytes that are there.
+    /// Takes the next `n` records with the bytes that the caller's memory holds: slabs are written before they are
+    /// read. The sequence of calls must be that of [`Measure::add`]. Pages that are never used need not exist. `Debug` shows the bytes that are there.
     pub(crate) fn take_unset<T: Pod>(&mut self, n: usize) -> Result<&'m mut [T], MemoryError> {
         let used = n * size_of::<T>();
         let padded = (used + BLOCK_ALIGN - 1) & !(BLOCK_ALIGN - 1);

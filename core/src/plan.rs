@@ -1,6 +1,6 @@
 //! How much memory a render needs: sizes first, so that nothing is ever asked for again.
 
-use crate::film::{PixelAov, PixelStats};
+use crate::film::{DIGITS, Film};
 use crate::learn::LearnedState;
 use crate::memory::{Layout, Measure};
 use crate::record::{SessionRecord, fingerprint};
@@ -25,15 +25,14 @@ impl Plan {
     pub fn new(settings: &Settings) -> Result<Self, SettingsError> {
         let s = *settings;
         let cache = s.check()?;
-        let pixels = s.size[0] as usize * s.size[1] as usize;
         let session = Measure::new().add::<SessionRecord>(1);
-        let session = session.add::<PixelStats>(pixels).add::<PixelAov>(if s.aovs { pixels } else { 0 });
+        let session = Film::measure(session.add::<u32>(DIGITS), &s.film_layout());
         let session = LearnedState::measure(session, &s.needs(cache));
         let job = Job { settings: s, tiles: Tiles::new(s.size, s.shards), cache };
         Ok(Self {
             job,
             session: session.layout().ok_or(SettingsError::Memory)?,
-            shard: Shard::measure(&job).layout().ok_or(SettingsError::Memory)?,
+            shard: Shard::measure(&job, job.tiles.most_pixels()).layout().ok_or(SettingsError::Memory)?,
             fingerprint: fingerprint(settings),
         })
     }
@@ -43,9 +42,16 @@ impl Plan {
         self.session
     }
 
-    /// Size and alignment of each shard's block.
+    /// Size and alignment of a block for any of the shards. It is at most a few per cent larger than the largest of
+    /// them needs; [`Self::shard_of`] is exact.
     pub fn shard(&self) -> Layout {
         self.shard
+    }
+
+    /// Size and alignment of the block of shard `index`, which depend on its pixels; those of a shard without pixels if
+    /// there is no such shard.
+    pub fn shard_of(&self, index: u32) -> Layout {
+        Shard::measure(&self.job, self.job.tiles.pixels_of(index)).layout().unwrap_or(self.shard)
     }
 
     /// Hash of the settings, which tells blocks of other plans.
@@ -60,11 +66,11 @@ impl Plan {
 }
 
 impl<'m> Shard<'m> {
-    /// Carves shard `index` out of a block of at least [`Plan::shard`] bytes.
+    /// Carves shard `index` out of a block of at least [`Plan::shard_of`] bytes.
     ///
     /// # Errors
     /// An index beyond the plan's shards, or a block that does not fit.
     pub fn new(plan: &Plan, index: u32, block: &'m mut [u8]) -> Result<Self, ShardError> {
-        Self::carve(&plan.job, plan.shard, index, block)
+        Self::carve(&plan.job, index, block)
     }
 }

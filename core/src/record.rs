@@ -1,11 +1,12 @@
 //! What is left of a session in its block while it is suspended: all its scalars as one record at the head of the block.
 
 use crate::counters::Counters;
-use crate::film::FilmScalars;
+use crate::film::{FilmScalars, Selection};
 use crate::learn::{LearnedScalars, Needs};
 use crate::scene::Scene;
 use crate::scene::blob::content_hash;
 use crate::settings::Settings;
+use crate::tracer::ShardCursor;
 use crate::world::Iteration;
 use bytemuck::{Pod, Zeroable};
 use core::fmt::{self, Write};
@@ -16,6 +17,24 @@ const MAGIC: u64 = u64::from_le_bytes(*b"CRPSESSN");
 const OPEN: u64 = 1;
 /// State of a block whose session is suspended.
 const SUSPENDED: u64 = 2;
+
+/// How far the end of an iteration has come.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Finishing {
+    /// Values of pixels without the largest.
+    pub selection: Selection,
+    /// Counts of all shards.
+    pub counters: Counters,
+    /// Next pixel of the film, or next bin.
+    pub at: u64,
+    /// Next tile of the shard.
+    pub cursor: ShardCursor,
+    /// Stage of the work; 0 before it begins.
+    pub stage: u32,
+    /// Next shard.
+    pub shard: u32,
+}
 
 /// Scalars of a session.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -31,6 +50,7 @@ pub(crate) struct SessionScalars {
     pub counters: Counters,
     pub film: FilmScalars,
     pub learned: LearnedScalars,
+    pub finishing: Finishing,
     /// Bits of the media that the camera is inside of, in that scene.
     pub camera_media: u32,
     /// Not 0 while an iteration runs.
@@ -47,6 +67,7 @@ impl SessionScalars {
             counters: Counters::default(),
             film: FilmScalars::new(),
             learned: LearnedScalars::new(scene),
+            finishing: Finishing::default(),
             camera_media,
             running: 0,
         }
@@ -112,7 +133,8 @@ impl SessionRecord {
             return Err(ResumeError::Plan);
         }
         let s = self.scalars;
-        if self.hash != content_hash(bytemuck::bytes_of(&s)) || !s.learned.fit(needs) {
+        let counters = s.counters.have_room() && s.finishing.counters.have_room();
+        if self.hash != content_hash(bytemuck::bytes_of(&s)) || !counters || !s.learned.fit(needs) {
             return Err(ResumeError::Damaged);
         }
         Ok(s)

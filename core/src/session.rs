@@ -1,18 +1,20 @@
 //! What all shards share: frozen while they work, changed between iterations.
 
+mod finish;
+
 use crate::accel::{Intersector, WideBvh};
 use crate::counters::Counters;
-use crate::film::{Film, PixelSums};
+use crate::film::{DIGITS, Film};
 use crate::learn::cache::Cache;
 use crate::learn::{LearnedScalars, LearnedState, PictureStatistics};
 use crate::light::{LightSelector, PowerSelector};
 use crate::memory::{Carver, MemoryError};
 use crate::plan::Plan;
 use crate::profile::{Full, Profile};
-use crate::record::{ResumeError, SessionRecord, SessionScalars};
+use crate::record::{Finishing, ResumeError, SessionRecord, SessionScalars};
 use crate::scene::{Effects, Scene};
 use crate::settings::MAX_PATH_LENGTH;
-use crate::tracer::{Shard, media_at};
+use crate::tracer::media_at;
 use crate::world::sealed::Sealed;
 use crate::world::{Iteration, World};
 use core::fmt;
@@ -65,7 +67,7 @@ impl fmt::Display for SessionError {
                 names.try_for_each(|(i, name)| write!(f, "{}{name}", if i == 0 { " " } else { ", " }))
             }
             Self::Shards { expected } => {
-                write!(f, "end_iteration needs every shard in order; shard {expected} is missing")
+                write!(f, "the end of an iteration needs every shard in order; shard {expected} is missing")
             }
             Self::Unfinished { shard } => write!(f, "shard {shard} has not finished the iteration"),
             Self::Plan { shard } => write!(f, "shard {shard} was made for another plan"),
@@ -100,7 +102,10 @@ pub struct Session<'s, 'm, P: Profile = Full, I: Intersector = WideBvh<'s>, L: L
     record: &'m mut SessionRecord,
     intersector: I,
     selector: L,
+    /// Counters of a selection among the pixels.
+    digits: &'m mut [u32],
     film: Film<'m>,
+    finishing: Finishing,
     counters: Counters,
     learned: LearnedState<'m>,
     epoch: u64,
@@ -185,7 +190,6 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector> SessionBuilder<'s, P, I, 
         if scalars.scene != scene.hash {
             scalars.camera_media = camera_media();
         }
-        let pixels = s.size[0] as usize * s.size[1] as usize;
         record.open();
         Ok(Session {
             scene,
@@ -193,12 +197,9 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector> SessionBuilder<'s, P, I, 
             record,
             intersector,
             selector,
-            film: Film::new(
-                s.size,
-                c.take_unset(pixels).map_err(SessionError::Memory)?,
-                c.take_unset(if s.aovs { pixels } else { 0 }).map_err(SessionError::Memory)?,
-                scalars.film,
-            ),
+            digits: c.take_unset(DIGITS).map_err(SessionError::Memory)?,
+            film: Film::carve(&mut c, &s.film_layout(), scalars.film).map_err(SessionError::Memory)?,
+            finishing: scalars.finishing,
             counters: scalars.counters,
             learned: LearnedState::carve(&mut c, &needs, &scalars.learned).map_err(SessionError::Memory)?,
             epoch: scalars.epoch,
@@ -296,6 +297,7 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
             counters: self.counters,
             film: self.film.scalars(),
             learned: self.learned.scalars(LearnedScalars::new(&self.scene)),
+            finishing: self.finishing,
             camera_media: self.camera_media,
             running: u32::from(self.running),
         };
@@ -311,7 +313,9 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
         self.iteration = Iteration::default();
         self.running = false;
         self.counters = Counters::default();
+        self.finishing = Finishing::default();
         self.film.clear();
+        self.learned.forget_film();
         if !keep_statistics {
             self.learned.forget();
         }
@@ -325,68 +329,14 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
     /// Begins a round of `samples` camera samples per pixel. Shards notice at their next step.
     pub fn begin_iteration(&mut self, samples: u32) {
         let i = self.iteration;
-        self.iteration =
-            Iteration { number: i.number + 1, first_sample: i.first_sample.wrapping_add(i.samples), samples };
-        self.learned.begin(samples, &self.film);
-        self.running = true;
-    }
-
-    /// Merges what the shards gathered, in shard order. All of them must be there and have finished (or have been
-    /// stopped and drained); after an error the film is as before.
-    pub fn end_iteration<'a, 'b: 'a>(
-        &mut self,
-        shards: impl IntoIterator<Item = &'a Shard<'b>> + Clone,
-    ) -> Result<(), SessionError> {
-        self.end_iteration_in_phases(shards, |_| ())
-    }
-
-    /// [`Self::end_iteration`] for hosts with a clock: `passed` is called after each phase.
-    pub fn end_iteration_in_phases<'a, 'b: 'a>(
-        &mut self,
-        shards: impl IntoIterator<Item = &'a Shard<'b>> + Clone,
-        mut passed: impl FnMut(Phase),
-    ) -> Result<(), SessionError> {
-        if !self.running {
-            return Err(SessionError::NoIteration);
-        }
-        let mut expected = 0;
-        for s in shards.clone() {
-            if s.index() != expected {
-                return Err(SessionError::Shards { expected });
-            }
-            // its sums would go to the wrong pixels
-            if s.settings() != self.plan.settings() {
-                return Err(SessionError::Plan { shard: s.index() });
-            }
-            if !s.is_done(World::identity(self)) {
-                return Err(SessionError::Unfinished { shard: s.index() });
-            }
-            expected += 1;
-        }
-        if expected != self.plan.settings().shards {
-            return Err(SessionError::Shards { expected });
-        }
-        let mut counters = Counters::default();
-        shards.clone().into_iter().for_each(|s| counters.merge(s.counters()));
-        let visit = |show: &mut dyn FnMut(usize, &PixelSums)| {
-            shards.clone().into_iter().for_each(|s| s.for_each_pixel(|i, sums, _| show(i, sums)));
+        self.iteration = Iteration {
+            number: i.number.wrapping_add(1),
+            first_sample: i.first_sample.wrapping_add(i.samples),
+            samples,
         };
-        self.learned.measure_picture(&counters, visit);
-        for s in shards.clone() {
-            s.for_each_pixel(|i, sums, aov| {
-                let w = self.learned.weight_of(i);
-                self.film.merge(i, sums, aov, w);
-            });
-        }
-        self.film.end_iteration();
-        self.counters.merge(&counters);
-        passed(Phase::Merged);
-        self.learned.learn_picture(&self.film, &counters, visit);
-        passed(Phase::Estimated);
-        self.learned.learn_scene(shards.into_iter().filter_map(Shard::training));
-        passed(Phase::Learned);
-        self.running = false;
-        Ok(())
+        self.learned.begin(samples);
+        self.finishing = Finishing::default();
+        self.running = true;
     }
 
     /// The picture so far, without the iteration under way.
@@ -423,7 +373,7 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector> Session<'s, 'm, P, I,
     /// [`SessionError::Estimate`] if there is not one value per pixel, the settings have no estimate per pixel, or an
     /// iteration runs.
     pub fn give_estimate(&mut self, rgb: &[[f32; 3]]) -> Result<(), SessionError> {
-        if self.running || !self.learned.give_estimate(rgb) {
+        if self.running || !self.learned.give_estimate(rgb, &self.film) {
             return Err(SessionError::Estimate { given: rgb.len() });
         }
         Ok(())

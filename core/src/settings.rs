@@ -1,5 +1,6 @@
 //! Settings of a render.
 
+use crate::film::FilmLayout;
 use crate::learn::cache::CacheSize;
 use crate::learn::{ControlVariate, Learning, Needs};
 use crate::rrs::{Space, Strategy};
@@ -106,12 +107,21 @@ impl Settings {
         if fits { Ok(()) } else { Err(SettingsError::ControlVariate) }
     }
 
+    /// What the film holds.
+    pub(crate) fn film_layout(&self) -> FilmLayout {
+        FilmLayout { size: self.size, weights: self.adaptive, rays: self.counts_rays(), aovs: self.aovs }
+    }
+
+    /// Are the rays of every pixel counted?
+    pub(crate) fn counts_rays(&self) -> bool {
+        self.aovs || self.adaptive
+    }
+
     /// What these settings have the render learn, with room for `cache`.
     pub(crate) fn needs(&self, cache: Option<CacheSize>) -> Needs {
         let pixels = self.strategy.needs_image() || self.shadow_roulette || self.adaptive;
         Needs {
             size: self.size,
-            features: self.aovs,
             space: self.strategy.space(),
             cache,
             pixels: pixels.then_some(self.learning.pixel_estimator),

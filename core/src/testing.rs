@@ -3,9 +3,8 @@
 extern crate std;
 
 use crate::accel::Intersector;
-use crate::film::Film;
 use crate::geometry::{Hit8, Ray8};
-use crate::learn::LearnedState;
+use crate::learn::{LearnedScalars, LearnedState};
 use crate::light::PowerSelector;
 use crate::memory::{BLOCK_ALIGN, Carver, Measure};
 use crate::plan::Plan;
@@ -201,6 +200,10 @@ impl<'a> World for TestWorld<'a> {
     fn camera_media(&self) -> u32 {
         0
     }
+
+    fn epoch(&self) -> u64 {
+        0
+    }
 }
 
 fn block(size: usize) -> (Vec<u8>, usize) {
@@ -220,8 +223,9 @@ pub(crate) fn world<R>(change: impl FnOnce(&mut Settings), f: impl FnOnce(&TestW
         let layout = LearnedState::measure(Measure::new(), &needs).layout().expect("a layout");
         let (mut shared, at) = block(layout.size);
         let mut carver = Carver::new(&mut shared[at..], layout).expect("memory");
-        let mut learned = LearnedState::carve(&mut carver, &needs, scene).expect("memory");
-        learned.begin(4, &Film::new(settings.size, &mut [], &mut []));
+        let mut learned = LearnedState::carve(&mut carver, &needs, &LearnedScalars::new(scene)).expect("memory");
+        learned.forget();
+        learned.begin(4);
         let world = TestWorld {
             scene,
             intersector: BruteForce(scene),

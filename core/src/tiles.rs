@@ -86,6 +86,15 @@ pub(crate) struct Tiles {
     skew: u32,
 }
 
+/// Greatest common divisor.
+fn greatest_divisor(a: u32, b: u32) -> u32 {
+    let (mut a, mut b) = (a, b);
+    while b != 0 {
+        (a, b) = (b, a % b);
+    }
+    a
+}
+
 /// Bits 0, 2, 4 of `x`, packed.
 const fn even_bits(x: u32) -> u32 {
     x & 1 | x >> 1 & 2 | x >> 2 & 4
@@ -110,20 +119,59 @@ impl Tiles {
         Self { size, columns, rows, shards, skew }
     }
 
-    fn owner(&self, tile: u32) -> u32 {
-        let (x, y) = (tile % self.columns, tile / self.columns);
-        ((u64::from(x) + u64::from(y) * u64::from(self.skew.max(1))) % u64::from(self.shards)) as u32
+    /// First column of tiles at or after `from`, in row `y` of tiles, that belongs to `shard`; it may be beyond the row.
+    /// Column x belongs to shard (x + y skew) mod shards.
+    fn next_in_row(&self, shard: u32, from: u32, y: u32) -> u64 {
+        let shards = u64::from(self.shards);
+        let owner = (u64::from(from) + u64::from(y) * u64::from(self.skew.max(1))) % shards;
+        u64::from(from) + (u64::from(shard) + shards - owner) % shards
     }
 
-    /// First tile of `shard` at or after `tile`.
+    /// First tile of `shard` at or after `tile`. The time depends on the rows of tiles between them.
     pub(crate) fn next_of(&self, shard: u32, tile: u32) -> Option<u32> {
-        (tile..self.columns * self.rows).find(|&t| self.owner(t) == shard)
+        if shard >= self.shards {
+            return None;
+        }
+        let (mut from, first) = (tile % self.columns.max(1), tile / self.columns.max(1));
+        for y in first..self.rows {
+            let x = self.next_in_row(shard, from, y);
+            if x < u64::from(self.columns) {
+                return Some(y * self.columns + x as u32);
+            }
+            from = 0;
+        }
+        None
     }
 
-    /// Upper bound of the tiles that a shard owns.
-    pub(crate) fn most_tiles(&self) -> usize {
-        // per row of tiles the owners run through all shards in turn
-        (self.rows as usize).saturating_mul(self.columns.div_ceil(self.shards) as usize)
+    /// Number of pixels that `shard` owns.
+    pub(crate) fn pixels_of(&self, shard: u32) -> usize {
+        let last = self.columns.saturating_sub(1);
+        let wide = |x: u64| if x == u64::from(last) { self.size[0] - last * TILE } else { TILE };
+        let row = |y: u32| {
+            let x = self.next_in_row(shard, 0, y);
+            let columns = u64::from(self.columns);
+            let tiles = if x < columns { (columns - x).div_ceil(u64::from(self.shards)) } else { 0 };
+            // all but the last tile of the picture are as wide as tiles are
+            let end = x + tiles.saturating_sub(1) * u64::from(self.shards);
+            let pixels = if tiles == 0 { 0 } else { (tiles - 1) * u64::from(TILE) + u64::from(wide(end)) };
+            pixels * u64::from(TILE.min(self.size[1] - y * TILE))
+        };
+        if shard < self.shards { (0..self.rows).map(row).sum::<u64>() as usize } else { 0 }
+    }
+
+    /// Upper bound of the pixels that a shard owns.
+    pub(crate) fn most_pixels(&self) -> usize {
+        // Per row of tiles the owners run through all shards in turn. In as many rows as the skew takes to come back to
+        // the first shard, every shard of its residue class is the first of one row.
+        let (columns, rows, skew) = (self.columns as usize, self.rows as usize, self.skew.max(1));
+        let class = greatest_divisor(skew, self.shards).max(1);
+        let of_row = columns.div_ceil(self.shards as usize);
+        let (period, of_period) = ((self.shards / class) as usize, columns.div_ceil(class as usize));
+        let rest = (rows % period).saturating_mul(of_row).min(of_period);
+        let by_row = rows.saturating_mul(of_row);
+        let by_period = (rows / period).saturating_mul(of_period).saturating_add(rest);
+        let [w, h] = self.size.map(|n| n.min(TILE) as usize);
+        by_row.min(by_period).saturating_mul(w * h).min(self.size[0] as usize * self.size[1] as usize)
     }
 
     /// First column and row of a tile.
@@ -150,6 +198,7 @@ mod tests {
     extern crate std;
     use super::*;
     use std::vec;
+    use std::vec::Vec;
 
     /// Shards, slots, corners and the block around a pixel number tiles alike; every pixel is one shard's, once. Killed
     /// by: columns and rows exchanged, a border that is not cut off, a slot of another order, a tile of two shards.
@@ -161,7 +210,7 @@ mod tests {
                 let mut seen = vec![0; (size[0] * size[1]) as usize];
                 let mut owned = 0;
                 for shard in 0..shards {
-                    let mut of_shard = 0;
+                    let (mut of_shard, mut pixels) = (0, 0);
                     let mut next = tiles.next_of(shard, 0);
                     while let Some(tile) = next {
                         let [from, to] = grid.corners(tile);
@@ -175,15 +224,34 @@ mod tests {
                             inside += 1;
                         }
                         assert_eq!(grid.area(tile), inside);
+                        pixels += inside as usize;
                         of_shard += 1;
                         next = tiles.next_of(shard, tile + 1);
                     }
-                    assert!(of_shard <= tiles.most_tiles());
+                    assert_eq!(pixels, tiles.pixels_of(shard), "{size:?}, {shard} of {shards}");
+                    assert!(pixels <= tiles.most_pixels());
                     owned += of_shard;
                 }
                 assert!(seen.iter().all(|n| *n == 1));
                 assert_eq!(owned, grid.count());
             }
+        }
+    }
+
+    /// Pictures of one column or row, more shards than tiles. Killed by: a slot for each pixel of a tile that is cut off,
+    /// a bound by the rows.
+    #[test]
+    fn shards_own_their_share_of_odd_pictures() {
+        for (size, shards) in
+            [([1, 65_536], 256), ([65_536, 1], 256), ([1, 65_536], 65_536), ([9, 9], 300), ([1920, 1080], 64)]
+        {
+            let tiles = Tiles::new(size, shards);
+            let owned: Vec<usize> = (0..shards).map(|s| tiles.pixels_of(s)).collect();
+            let (all, most) = ((size[0] * size[1]) as usize, tiles.most_pixels());
+            assert_eq!(owned.iter().sum::<usize>(), all);
+            let largest = owned.iter().max().unwrap();
+            assert!(most >= *largest && most <= largest + 64.max(largest / 16), "{size:?}: {most} for {largest}");
+            assert_eq!((tiles.pixels_of(shards), tiles.next_of(shards, 0)), (0, None));
         }
     }
 

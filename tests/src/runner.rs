@@ -137,7 +137,7 @@ pub trait Learned {
     fn counters(&self) -> Counters;
 
     /// Pixels of the finished iterations.
-    fn pixels(&self) -> &[PixelStats];
+    fn pixels(&self) -> Vec<PixelStats>;
 }
 
 /// Puts random sums in place of all statistics of the scene.
@@ -171,8 +171,8 @@ impl<P: Profile, I: Intersector> Learned for Session<'_, '_, P, I> {
         *Session::counters(self)
     }
 
-    fn pixels(&self) -> &[PixelStats] {
-        self.film().pixels()
+    fn pixels(&self) -> Vec<PixelStats> {
+        self.film().pixels().collect()
     }
 }
 
@@ -214,7 +214,7 @@ fn learning_with<P: Profile + Sync, I: Intersector + Sync>(
     let film = session.film();
     Image {
         size: film.size(),
-        pixels: film.pixels().to_vec(),
+        pixels: film.pixels().collect(),
         aovs: film.aovs().to_vec(),
         counters: *session.counters(),
         error: film.error_estimate(),

@@ -61,7 +61,7 @@ fn both(description: &SceneDescription, max_depth: u32, iterations: &[u32]) -> B
     // the last "iteration" of no samples shows what the one before it left
     let iterations = [iterations, &[0]].concat();
     learning(&bytes, &s, &iterations, IN_ORDER, &mut |i, l: &mut dyn Learned| {
-        states.push((bins(l), l.pixels().to_vec(), l.counters()));
+        states.push((bins(l), l.pixels(), l.counters()));
         if i == 1 && greedy {
             let mut bytes = l.saved().unwrap();
             overwrite(&mut bytes, || GREEDY);

@@ -96,7 +96,7 @@ fn moments_leave_fireflies_out() {
             oracle.leaves[leaf].iter().flat_map(|bin| bin.iter().enumerate()).for_each(|(i, x)| sums[i] += x);
         });
     let sun = (80.0 / std::f64::consts::PI).powi(2);
-    let moment = |p: &PixelStats| p.sum_sqr[0] / p.samples as f64;
+    let moment = |p: &PixelStats| p.spread[0] / p.samples as f64 + p.mean()[0].powi(2);
     let seen = image.pixels.iter().map(moment).sum::<f64>() / image.pixels.len() as f64 / sun;
     let logged = sums[6] / sums[0];
     assert!(seen > 1000.0, "{seen}: no firefly was met, so nothing is tested");

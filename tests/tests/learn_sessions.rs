@@ -297,7 +297,7 @@ fn overflowing_radiance_is_not_learned() {
         let (count, statistics) = last.unwrap();
         assert!(image.counters.non_finite > 100 && count > 100.0, "{strategy}: {:?}", image.counters);
         assert!(statistics.iter().all(|p| p.variance.is_finite() && p.cost.is_finite()), "{statistics:?}");
-        assert!(image.pixels.iter().all(|p| p.sum.iter().chain(&p.sum_sqr).all(|x| x.is_finite())));
+        assert!(image.pixels.iter().all(|p| p.sum.iter().chain(&p.spread).all(|x| x.is_finite())));
     }
 }
 

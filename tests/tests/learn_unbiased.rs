@@ -274,8 +274,7 @@ fn weights_of_iterations_do_not_follow_their_light() {
             s.learning.cache_bytes = 32 << 10;
             let mut films: Vec<Vec<PixelStats>> = Vec::new();
             let all = [&iterations[..], &[0]].concat();
-            let image =
-                learning(&scene, &s, &all, IN_ORDER, &mut |_, l: &mut dyn Learned| films.push(l.pixels().to_vec()));
+            let image = learning(&scene, &s, &all, IN_ORDER, &mut |_, l: &mut dyn Learned| films.push(l.pixels()));
             // sums over an iteration, free of its weight
             let brightness = |i: usize| {
                 let pixels = films[i].iter().zip(&films[i + 1]);

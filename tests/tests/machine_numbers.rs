@@ -18,7 +18,7 @@ const IN_ORDER: Schedule = Schedule::InOrder(1 << 20);
 
 /// Every number of a film is finite.
 fn all_finite(image: &Image) -> bool {
-    let pixel = |p: &PixelStats| p.sum.iter().chain(&p.sum_sqr).all(|x| x.is_finite());
+    let pixel = |p: &PixelStats| p.sum.iter().chain(&p.spread).all(|x| x.is_finite());
     let aov = |a: &PixelAov| bytemuck::cast_ref::<_, [f64; 17]>(a).iter().all(|x| x.is_finite());
     image.pixels.iter().all(pixel) && image.aovs.iter().all(aov)
 }

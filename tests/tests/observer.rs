@@ -23,8 +23,8 @@ impl Observer for Slow {
     }
 
     fn iteration(&self, film: &Film<'_>, seconds: f64) {
-        let sum = film.pixels().iter().map(|p| p.mean()[0]).sum();
-        self.seen.lock().unwrap().push((film.pixels()[0].samples, sum, seconds));
+        let sum = film.pixels().map(|p| p.mean()[0]).sum();
+        self.seen.lock().unwrap().push((film.pixel(0).samples, sum, seconds));
         std::thread::sleep(self.pause);
     }
 }

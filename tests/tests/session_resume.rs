@@ -32,7 +32,7 @@ fn memory(bytes: usize) -> AlignedBytes {
 fn everything(session: &Session<'_, '_>) -> Vec<u8> {
     let film = session.film();
     let mut all = format!("{:?} {:?}", session.counters(), film.error_estimate()).into_bytes();
-    all.extend_from_slice(bytemuck::cast_slice(film.pixels()));
+    all.extend_from_slice(bytemuck::cast_slice(&film.pixels().collect::<Vec<_>>()));
     all.extend_from_slice(bytemuck::cast_slice(film.aovs()));
     if let Some(cache) = session.cache() {
         let mut saved = vec![0; cache.saved_len()];

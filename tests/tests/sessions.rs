@@ -95,7 +95,9 @@ fn blocks_may_hold_garbage() {
                 saved
             });
             let leaves = session.cache().map_or(0, |c| c.leaves());
-            let bits = [bytemuck::cast_slice::<_, u8>(film.pixels()), bytemuck::cast_slice(film.aovs())].concat();
+            let bits =
+                [bytemuck::cast_slice::<_, u8>(&film.pixels().collect::<Vec<_>>()), bytemuck::cast_slice(film.aovs())]
+                    .concat();
             (bits, saved, *session.counters(), leaves)
         };
         let clean = run(&|_| 0);
@@ -183,8 +185,8 @@ fn a_profile_without_an_effect_refuses_the_scene() {
 
 /// The pixels of a session's film as bytes.
 fn film_of(session: &Session<'_, '_, DiffuseOnly, WideBvh<'_>>) -> Vec<u8> {
-    let (pixels, aovs) = (session.film().pixels(), session.film().aovs());
-    [bytemuck::cast_slice::<_, u8>(pixels), bytemuck::cast_slice(aovs)].concat()
+    let (pixels, aovs): (Vec<_>, _) = (session.film().pixels().collect(), session.film().aovs());
+    [bytemuck::cast_slice::<_, u8>(&pixels), bytemuck::cast_slice(aovs)].concat()
 }
 
 /// Killed by: a merge that starts before all shards were checked, a check of the count alone, an iteration that counts
@@ -238,7 +240,7 @@ fn iterations_end_with_every_shard_in_order_or_not_at_all() {
     assert!((film_of(&session), *session.counters()) == before);
 
     session.end_iteration(&shards).unwrap();
-    assert!(session.film().pixels().iter().all(|p| p.samples == 5));
+    assert!(session.film().pixels().all(|p| p.samples == 5));
     assert_eq!(session.counters().camera_samples, 5 * 40 * 24);
 }
 
@@ -258,7 +260,7 @@ fn shards_of_another_plan_are_refused() {
         let mut shard = Shard::new(&other, 0, block.as_mut()).unwrap();
         finish(&session, &mut shard, 1000);
         assert_eq!(session.end_iteration([&shard]), Err(SessionError::Plan { shard: 0 }));
-        assert!(session.film().pixels().iter().all(|p| p.samples == 0));
+        assert!(session.film().pixels().all(|p| p.samples == 0));
     }
 }
 
@@ -280,7 +282,7 @@ fn a_shard_can_be_stopped_before_it_starts() {
     shards[1].stop();
     assert_eq!(shards[1].step(&session, Budget { rays: 1 }), StepResult::Done);
     session.end_iteration(&shards).unwrap();
-    let samples: Vec<u64> = session.film().pixels().iter().map(|p| p.samples).collect();
+    let samples: Vec<u64> = session.film().pixels().map(|p| p.samples).collect();
     assert_eq!(samples.iter().filter(|n| **n == 4).count(), 128);
     assert_eq!(samples.iter().filter(|n| **n == 0).count(), 128);
     // the next iteration starts as usual
@@ -289,7 +291,7 @@ fn a_shard_can_be_stopped_before_it_starts() {
         finish(&session, s, 1000);
     }
     session.end_iteration(&shards).unwrap();
-    assert_eq!(session.film().pixels().iter().map(|p| p.samples).sum::<u64>(), 4 * 128 + 256);
+    assert_eq!(session.film().pixels().map(|p| p.samples).sum::<u64>(), 4 * 128 + 256);
 }
 
 /// Stopping and draining leaves every started sample finished: the sum over (sample - truth) has mean 0, because
@@ -321,11 +323,11 @@ fn a_stopped_iteration_is_unbiased_and_merges() {
             stopped += 1;
         }
         session.end_iteration([&shard]).unwrap();
-        let samples = session.film().pixels().iter().map(|p| p.samples).sum::<u64>();
+        let samples = session.film().pixels().map(|p| p.samples).sum::<u64>();
         partial += u32::from(samples % 5 != 0);
         assert!(samples > 0 && samples < 320);
         assert_eq!(session.counters().camera_samples, samples);
-        for (i, p) in session.film().pixels().iter().enumerate() {
+        for (i, p) in session.film().pixels().enumerate() {
             let t = &truth.pixels[i];
             let n = p.samples as f64;
             started[i] += n;
@@ -337,7 +339,7 @@ fn a_stopped_iteration_is_unbiased_and_merges() {
         session.begin_iteration(1);
         finish(&session, &mut shard, 1 << 20);
         session.end_iteration([&shard]).unwrap();
-        assert_eq!(session.film().pixels().iter().map(|p| p.samples).sum::<u64>(), samples + 64);
+        assert_eq!(session.film().pixels().map(|p| p.samples).sum::<u64>(), samples + 64);
     }
     assert!(stopped == 1500 && partial > 300, "{stopped} stopped, {partial} within a pixel");
     let (mut scores, mut total, mut error) = (0, 0.0, 0.0f64);
@@ -379,7 +381,7 @@ fn used_shards_begin_anew() {
         session.begin_iteration(9);
         finish(&session, &mut shard, 1 << 20);
         session.end_iteration([&shard]).unwrap();
-        assert!(session.film().pixels().iter().all(|p| p.samples == 9));
+        assert!(session.film().pixels().all(|p| p.samples == 9));
         film_of(&session)
     };
     let expected = rendered(&|_, _| ());

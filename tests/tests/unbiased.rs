@@ -181,7 +181,7 @@ fn chosen_uniformly(scene: &[u8], s: &Settings, spp: u32, stated: f32) -> Image 
     let film = session.film();
     Image {
         size: film.size(),
-        pixels: film.pixels().to_vec(),
+        pixels: film.pixels().collect(),
         aovs: Vec::new(),
         counters: *session.counters(),
         error: film.error_estimate(),

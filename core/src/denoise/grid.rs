@@ -1,4 +1,5 @@
-//! Scratch memory: rows of planes with margins, read and written eight pixels at a time.
+//! Memory: planes of the picture, which the passes change in place, and a window of rows with margins, which hold what
+//! the planes held before. Both are read and written eight pixels at a time.
 
 use croupier_simd::F32x8;
 
@@ -16,7 +17,7 @@ pub(super) const NOWHERE: f32 = 1e9;
 /// Squared radiance below all that matters: avoids 0 / 0.
 pub(super) const TINY: f32 = 1e-20;
 
-/// Layout of scratch memory: rows of planes, each plane with a margin on both sides.
+/// Layout of the rows that a pass reads: planes with a margin on both sides.
 #[derive(Clone, Copy)]
 pub(super) struct Grid {
     pub(super) columns: usize,
@@ -26,6 +27,9 @@ pub(super) struct Grid {
     /// Distance from one plane of a row to the next, values.
     pub(super) stride: usize,
 }
+
+/// Rows on either side of the current one that a pass can reach.
+const REACHED_ROWS: usize = MARGIN;
 
 impl Grid {
     pub(super) fn new(size: [u32; 2]) -> Self {
@@ -39,19 +43,62 @@ impl Grid {
         (MARGIN..MARGIN + self.padded).step_by(8)
     }
 
-    /// Row `y` of a block with `planes` planes; empty if there is no such row.
-    pub(super) fn row(self, block: &[f32], planes: usize, y: usize) -> &[f32] {
-        let len = planes * self.stride;
-        if y < self.rows { block.get(y * len..).and_then(|r| r.get(..len)).unwrap_or(&[]) } else { &[] }
+    /// Number of rows that are there at once.
+    fn kept(self) -> usize {
+        self.rows.clamp(1, 2 * REACHED_ROWS + 1)
     }
 
-    pub(super) fn row_mut(self, block: &mut [f32], planes: usize, y: usize) -> &mut [f32] {
-        let len = planes * self.stride;
-        if y < self.rows { block.get_mut(y * len..).and_then(|r| r.get_mut(..len)).unwrap_or(&mut []) } else { &mut [] }
+    /// Number of values of the rows that are there at once.
+    pub(super) fn window_len(self) -> usize {
+        self.kept().saturating_mul(self.stride).saturating_mul(SIGNAL + FEATURES)
+    }
+
+    /// Range of row `y` in the window; empty if the picture has no such row.
+    fn window_row(self, y: usize) -> core::ops::Range<usize> {
+        let len = (SIGNAL + FEATURES) * self.stride;
+        let at = y % self.kept() * len;
+        if y < self.rows { at..at + len } else { 0..0 }
+    }
+
+    /// Signal and features of row `y`; empty if the picture has no such row.
+    pub(super) fn row(self, window: &[f32], y: usize) -> (&[f32], &[f32]) {
+        let row = window.get(self.window_row(y)).unwrap_or(&[]);
+        row.split_at_checked(SIGNAL * self.stride).unwrap_or((&[], &[]))
+    }
+
+    pub(super) fn row_mut(self, window: &mut [f32], y: usize) -> (&mut [f32], &mut [f32]) {
+        let row = window.get_mut(self.window_row(y)).unwrap_or(&mut []);
+        row.split_at_mut_checked(SIGNAL * self.stride).unwrap_or((&mut [], &mut []))
+    }
+
+    /// Index of the first pixel of a packet, and how many of its pixels are in the picture. `x` counts from the
+    /// beginning of a plane.
+    pub(super) fn pixels(self, x: usize, y: usize) -> (usize, usize) {
+        let column = x - MARGIN;
+        (y * self.columns + column, (self.columns - column).min(8))
     }
 }
 
-/// Eight values from `at`; 0 if they are not all there.
+/// The first `lanes` of eight values from `at` of a plane without margins, 0 for others.
+#[inline(always)]
+pub(super) fn load_pixels(plane: &[f32], (at, lanes): (usize, usize)) -> F32x8 {
+    match plane.get(at..).and_then(|p| p.first_chunk()) {
+        Some(a) if lanes == 8 => F32x8::new(*a),
+        _ => {
+            let plane = plane.get(at..).unwrap_or(&[]);
+            F32x8::from_fn(|i| if i < lanes { plane.get(i).copied().unwrap_or(0.0) } else { 0.0 })
+        }
+    }
+}
+
+/// Stores the first `lanes` values.
+#[inline(always)]
+pub(super) fn store_pixels(plane: &mut [f32], (at, lanes): (usize, usize), x: F32x8) {
+    if let (Some(to), Some(from)) = (plane.get_mut(at..at + lanes), x.to_array().get(..lanes)) {
+        to.copy_from_slice(from);
+    }
+}
+
 #[inline(always)]
 pub(super) fn load(row: &[f32], at: usize) -> F32x8 {
     match row.get(at..).and_then(|r| r.first_chunk()) {

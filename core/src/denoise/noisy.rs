@@ -1,6 +1,7 @@
 //! Input of the denoiser: planes of the noisy picture, and errors about them.
 
 use core::fmt;
+use croupier_simd::F32x8;
 
 /// Noisy picture: planes of `columns * rows` values, row by row; longer ones are cut. Pixels whose color or
 /// variance is not finite (or beyond [`COLOR_LIMIT`] or its square) count as absent.
@@ -17,6 +18,16 @@ pub struct Noisy<'a> {
     pub albedo: [&'a [f32]; 3],
     /// Mean shading normal of the first hits, world space, 0 where nothing is hit. Three empty slices: unknown.
     pub normal: [&'a [f32]; 3],
+}
+
+/// Source of eight neighbouring pixels of the noisy picture, from pixel index `at` on, row by row. What it gives for
+/// pixels beyond the end of the row does not matter. Every call gives the same bits.
+pub(crate) trait NoisySource {
+    /// Mean radiance, and its squared standard error; see [`Noisy::color`].
+    fn color(&self, at: usize) -> ([F32x8; 3], [F32x8; 3]);
+
+    /// Albedo (1 if unknown) and normal (0 if unknown); see [`Noisy::albedo`].
+    fn features(&self, at: usize) -> ([F32x8; 3], [F32x8; 3]);
 }
 
 /// Radiance above which a pixel counts as absent: squares of sums of it stay finite.

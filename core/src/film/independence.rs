@@ -44,7 +44,7 @@ impl Differences {
             *sum += x;
         }
         self.weight[0] += p.weight;
-        self.weight[1] += w * o.samples as f64;
+        self.weight[1] += w * f64::from(o.samples);
     }
 }
 

@@ -1,35 +1,65 @@
-//! Sums of every pixel in f64, so that the mean stays exact after 1e9 samples or a firefly (NUMERICS FLM-1), and the
-//! estimate of the picture's error.
+//! Sums of every pixel, so that the mean stays exact after 1e9 samples or a firefly (NUMERICS FLM-1), and the estimate of
+//! the picture's error.
 //!
 //! | file | holds |
 //! |---|---|
 //! | `pixel` | sums of one pixel |
+//! | `short` | 32-bit numbers with the range of `f64` |
 //! | `error` | relMSE of a pixel, [`ErrorEstimate`] |
 //! | `independence` | correlation of an iteration's samples, measured |
-//! | `trimmed` | sums without the largest values |
+//! | `selection` | sums without the largest values |
 //! | `sqrt` | square root in f64 |
 
 mod error;
 mod independence;
 mod pixel;
+mod selection;
+mod short;
 mod sqrt;
-mod trimmed;
 
 pub use error::{ErrorEstimate, REL_MSE_EPSILON};
 pub(crate) use pixel::PixelSums;
 pub use pixel::{PixelAov, PixelStats};
+pub(crate) use selection::{DIGITS, Selection};
 pub(crate) use sqrt::SqrtNewton;
-pub(crate) use trimmed::trimmed;
 
+use crate::memory::{Carver, Measure, MemoryError};
 use bytemuck::{Pod, Zeroable};
 use error::relative_error;
 use independence::{Differences, Independence};
+use pixel::PixelWeights;
+
+/// What a film holds of each pixel besides its mean and error.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FilmLayout {
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// Samples have weights.
+    pub weights: bool,
+    /// Rays are counted.
+    pub rays: bool,
+    /// There are auxiliary values.
+    pub aovs: bool,
+}
+
+impl FilmLayout {
+    /// Number of pixels.
+    pub(crate) fn pixels(&self) -> usize {
+        self.size[0] as usize * self.size[1] as usize
+    }
+
+    fn if_any(&self, wanted: bool) -> usize {
+        if wanted { self.pixels() } else { 0 }
+    }
+}
 
 /// Picture: sums of all pixels, row 0 at the top.
 #[derive(Debug)]
 pub struct Film<'m> {
     size: [u32; 2],
-    pixels: &'m mut [PixelStats],
+    pixels: &'m mut [PixelSums],
+    weights: &'m mut [PixelWeights],
+    rays: &'m mut [u32],
     aovs: &'m mut [PixelAov],
     scalars: FilmScalars,
 }
@@ -40,23 +70,41 @@ pub struct Film<'m> {
 pub(crate) struct FilmScalars {
     differences: Differences,
     independence: Independence,
+    error: ErrorEstimate,
+    /// 0 until an iteration is merged: what memory holds are no pixels then.
+    filled: u64,
 }
 
 impl FilmScalars {
     /// Those of a film without samples.
     pub(crate) fn new() -> Self {
-        Self { differences: Differences::default(), independence: Independence::UNKNOWN }
+        Self {
+            differences: Differences::default(),
+            independence: Independence::UNKNOWN,
+            error: ErrorEstimate { independence: Independence::UNKNOWN.ratio, ..ErrorEstimate::default() },
+            filled: 0,
+        }
     }
 }
 
 impl<'m> Film<'m> {
-    pub(crate) fn new(
-        size: [u32; 2],
-        pixels: &'m mut [PixelStats],
-        aovs: &'m mut [PixelAov],
-        scalars: FilmScalars,
-    ) -> Self {
-        Self { size, pixels, aovs, scalars }
+    pub(crate) fn measure(m: Measure, l: &FilmLayout) -> Measure {
+        m.add::<PixelSums>(l.pixels())
+            .add::<PixelWeights>(l.if_any(l.weights))
+            .add::<u32>(l.if_any(l.rays))
+            .add::<PixelAov>(l.if_any(l.aovs))
+    }
+
+    /// Carves without touching the memory.
+    pub(crate) fn carve(c: &mut Carver<'m>, l: &FilmLayout, scalars: FilmScalars) -> Result<Self, MemoryError> {
+        Ok(Self {
+            size: l.size,
+            pixels: c.take_unset(l.pixels())?,
+            weights: c.take_unset(l.if_any(l.weights))?,
+            rays: c.take_unset(l.if_any(l.rays))?,
+            aovs: c.take_unset(l.if_any(l.aovs))?,
+            scalars,
+        })
     }
 
     pub(crate) fn scalars(&self) -> FilmScalars {
@@ -65,8 +113,6 @@ impl<'m> Film<'m> {
 
     /// Forgets all samples.
     pub(crate) fn clear(&mut self) {
-        self.pixels.fill(PixelStats::default());
-        self.aovs.fill(PixelAov::default());
         self.scalars = FilmScalars::new();
     }
 
@@ -75,52 +121,116 @@ impl<'m> Film<'m> {
         self.size
     }
 
-    /// Sums of the pixels, row by row.
-    pub fn pixels(&self) -> &[PixelStats] {
-        self.pixels
+    /// Number of pixels.
+    pub(crate) fn len(&self) -> usize {
+        self.pixels.len()
     }
 
-    /// Auxiliary sums of the pixels, row by row; empty if the settings do not ask for them.
-    pub fn aovs(&self) -> &[PixelAov] {
-        self.aovs
+    /// Has any iteration been merged?
+    fn is_filled(&self) -> bool {
+        self.scalars.filled != 0
     }
 
-    /// Adds the sums of an iteration to a pixel, each sample with weight `w`.
-    pub(crate) fn merge(&mut self, pixel: usize, sums: &PixelSums, aov: Option<&PixelAov>, w: f64) {
-        if let Some(p) = self.pixels.get_mut(pixel) {
-            self.scalars.differences.add(p, sums, w);
-            p.merge(sums, w);
+    /// Statistics of a pixel by its index, row by row from the top left; without samples before the end of the first
+    /// iteration and for pixels that do not exist. While an iteration is being finished
+    /// ([`crate::Session::finish_iteration`]), some pixels have it and others do not.
+    #[inline]
+    pub fn pixel(&self, index: usize) -> PixelStats {
+        match self.pixels.get(index) {
+            Some(p) if self.is_filled() => p.stats(self.weights.get(index), self.rays.get(index).copied().unwrap_or(0)),
+            _ => PixelStats::default(),
         }
-        if let (Some(a), Some(b)) = (self.aovs.get_mut(pixel), aov) {
-            a.merge(b);
+    }
+
+    /// Number of samples of a pixel.
+    pub(crate) fn samples(&self, index: usize) -> u32 {
+        if self.is_filled() { self.pixels.get(index).map_or(0, |p| p.samples) } else { 0 }
+    }
+
+    /// Statistics of the pixels, row by row; see [`Self::pixel`].
+    pub fn pixels(&self) -> impl ExactSizeIterator<Item = PixelStats> + DoubleEndedIterator + Clone + '_ {
+        (0..self.pixels.len()).map(|i| self.pixel(i))
+    }
+
+    /// Auxiliary sums of the pixels, row by row; empty if the settings do not ask for them, and before the end of the
+    /// first iteration.
+    pub fn aovs(&self) -> &[PixelAov] {
+        if self.is_filled() { self.aovs } else { &[] }
+    }
+
+    /// Adds the sums of an iteration to a pixel, each sample with weight `w` if samples have weights.
+    #[inline]
+    pub(crate) fn merge(&mut self, pixel: usize, sums: &PixelSums, rays: u32, aov: Option<&PixelAov>, w: f64) {
+        let fresh = !self.is_filled();
+        let before = self.pixel(pixel);
+        let Some(p) = self.pixels.get_mut(pixel) else { return };
+        if fresh {
+            *p = PixelSums::default();
+        }
+        match self.weights.get_mut(pixel) {
+            Some(weights) => {
+                if fresh {
+                    *weights = PixelWeights::default();
+                }
+                self.scalars.differences.add(&before, sums, w);
+                p.merge_weighted(weights, sums, w);
+            }
+            None => {
+                self.scalars.differences.add(&before, sums, 1.0);
+                p.merge(sums);
+            }
+        }
+        if let Some(r) = self.rays.get_mut(pixel) {
+            *r = if fresh { rays } else { r.saturating_add(rays) };
+        }
+        if let Some(a) = self.aovs.get_mut(pixel) {
+            if fresh {
+                *a = PixelAov::default();
+            }
+            if let Some(b) = aov {
+                a.merge(b);
+            }
         }
     }
 
     /// Ends the merge of an iteration: all its pixels were added.
-    pub(crate) fn end_iteration(&mut self) {
+    pub(crate) fn end_merge(&mut self) {
         let s = &mut self.scalars;
         s.independence = s.independence.after(&core::mem::take(&mut s.differences));
+        s.filled = 1;
     }
 
-    /// Estimated error of the picture. The interval is the normal one over the pixels' contributions, which are
-    /// independent; it is wide while few samples cause most of the error.
+    /// Estimated error of the picture, as of the end of the last iteration. The interval is the normal one over the
+    /// pixels' contributions, which are independent; it is wide while few samples cause most of the error.
     pub fn error_estimate(&self) -> ErrorEstimate {
-        let n = self.pixels.len();
-        if n == 0 {
-            return ErrorEstimate::default();
-        }
-        let t = trimmed(n / 10_000, |show| self.pixels.iter().for_each(|p| show(relative_error(p))));
+        self.scalars.error
+    }
+
+    /// Shows the errors of pixels from `at` on, `limit` at most, to the selection. Number shown.
+    pub(crate) fn show_errors(&self, at: usize, limit: usize, s: &mut Selection, counters: &mut [u32]) -> usize {
+        let end = at.saturating_add(limit).min(self.pixels.len());
+        (at..end).for_each(|i| s.show(relative_error(&self.pixel(i)), counters));
+        end.saturating_sub(at)
+    }
+
+    /// Number of the pixels with most error that [`ErrorEstimate::rel_mse`] leaves out.
+    pub(crate) fn outliers(pixels: u64) -> u64 {
+        pixels / 10_000
+    }
+
+    /// Estimates the error from the selection that has seen all pixels, without the outliers.
+    pub(crate) fn estimate_error(&mut self, t: &Selection) {
         let m = t.count.max(1) as f64;
         let mean = t.sum / m;
         let Independence { ratio, noise } = self.scalars.independence;
         let spread = (t.sum_sqr / m - mean * mean).max(0.0) / m;
         let spread = (ratio * ratio * spread + noise * noise * mean * mean).sqrt_newton();
-        ErrorEstimate {
+        self.scalars.error = ErrorEstimate {
             rel_mse: ratio * mean,
             low: (ratio * mean - 1.96 * spread).max(0.0),
             high: ratio * mean + 1.96 * spread,
-            rel_mse_all: ratio * (t.sum + t.rest) / n as f64,
+            rel_mse_all: ratio * (t.sum + t.rest) / self.pixels.len().max(1) as f64,
             independence: ratio,
-        }
+        };
     }
 }

@@ -2,18 +2,19 @@
 //! relative to.
 
 use super::settings::{Learning, Objective, PixelEstimator};
-use crate::denoise::{self, Planes};
+use crate::denoise::{NoisySource, Progress, Work, window_len};
 use crate::film::{Film, REL_MSE_EPSILON};
 use crate::memory::{Carver, Measure, MemoryError};
-use crate::tiles::BlockGrid;
+use crate::tiles::{BlockGrid, film_index};
 use bytemuck::{Pod, Zeroable};
+use croupier_simd::F32x8;
 
 /// Storage of the estimates.
 #[derive(Debug)]
-#[expect(clippy::large_enum_variant, reason = "there is one per session, and no allocator to box it")]
 enum Values<'m> {
     None,
-    Denoised { planes: Planes<'m>, scratch: &'m mut [f32] },
+    /// Three planes of the denoised picture, and what the denoiser works in.
+    Denoised(Work<'m>),
     Blocks([&'m mut [f32]; 3]),
 }
 
@@ -34,14 +35,20 @@ pub(super) struct EstimateScalars {
     known: u32,
     /// Not 0: the estimates are the host's.
     given: u32,
+    /// How far the denoiser has come.
+    progress: Progress,
+    /// Next row of the means of blocks.
+    row: u32,
+    reserved: u32,
 }
 
 impl<'m> PixelEstimates<'m> {
-    pub(super) fn measure(m: Measure, size: [u32; 2], features: bool, how: Option<PixelEstimator>) -> Measure {
+    pub(super) fn measure(m: Measure, size: [u32; 2], how: Option<PixelEstimator>) -> Measure {
         match how {
             None => m,
             Some(PixelEstimator::Denoised) => {
-                m.add::<f32>(Planes::len(size, features)).add::<f32>(denoise::scratch_len(size))
+                let pixels = size[0] as usize * size[1] as usize;
+                (0..5).fold(m, |m, _| m.add::<f32>(pixels)).add::<f32>(window_len(size))
             }
             Some(PixelEstimator::Blocks) => (0..3).fold(m, |m, _| m.add::<f32>(BlockGrid::tiles(size).count())),
         }
@@ -50,7 +57,6 @@ impl<'m> PixelEstimates<'m> {
     pub(super) fn carve(
         c: &mut Carver<'m>,
         size: [u32; 2],
-        features: bool,
         how: Option<PixelEstimator>,
         learning: &Learning,
         state: EstimateScalars,
@@ -58,11 +64,13 @@ impl<'m> PixelEstimates<'m> {
         let values = match how {
             None => Values::None,
             Some(PixelEstimator::Denoised) => {
-                let memory = c.take_unset(Planes::len(size, features))?;
-                let given = memory.len();
-                let planes = Planes::carve(size, features, memory)
-                    .map_err(|e| MemoryError::TooSmall { needed: e.needed, given })?;
-                Values::Denoised { planes, scratch: c.take_unset(denoise::scratch_len(size))? }
+                let pixels = size[0] as usize * size[1] as usize;
+                Values::Denoised(Work {
+                    e: [c.take_unset(pixels)?, c.take_unset(pixels)?, c.take_unset(pixels)?],
+                    variance: c.take_unset(pixels)?,
+                    reach: c.take_unset(pixels)?,
+                    window: c.take_unset(window_len(size))?,
+                })
             }
             Some(PixelEstimator::Blocks) => {
                 let tiles = BlockGrid::tiles(size).count();
@@ -94,7 +102,7 @@ impl<'m> PixelEstimates<'m> {
         }
         let (planes, i) = match &self.values {
             Values::None => return [0.0; 3],
-            Values::Denoised { planes, .. } => (planes.out.each_ref(), film as usize),
+            Values::Denoised(work) => (work.e.each_ref(), film as usize),
             Values::Blocks(planes) => (planes.each_ref(), BlockGrid::tiles(self.size).of_pixel(film) as usize),
         };
         planes.map(|p| p.get(i).copied().unwrap_or(0.0))
@@ -109,72 +117,117 @@ impl<'m> PixelEstimates<'m> {
         self.value(film).map(|x| 1.0 / (x * x + REL_MSE_EPSILON as f32))
     }
 
-    /// Plane with room for one value per pixel, on loan until [`Self::take_back`]; empty if there is none.
-    pub(super) fn lend(&mut self) -> &'m mut [f32] {
-        match &mut self.values {
-            Values::Denoised { planes, .. } => core::mem::take(&mut planes.color[0]),
-            Values::None | Values::Blocks(_) => &mut [],
+    /// Keeps a number of a pixel until the estimates are made anew, if there is room for one per pixel.
+    pub(super) fn keep(&mut self, film: usize, x: f32) {
+        if let Values::Denoised(Work { reach, .. }) = &mut self.values
+            && let Some(kept) = reach.get_mut(film)
+        {
+            *kept = x;
         }
     }
 
-    /// Returns the plane that [`Self::lend`] gave.
-    pub(super) fn take_back(&mut self, plane: &'m mut [f32]) {
-        if let Values::Denoised { planes, .. } = &mut self.values {
-            planes.color[0] = plane;
+    /// The number that [`Self::keep`] has kept.
+    pub(super) fn kept(&self, film: usize) -> Option<f32> {
+        match &self.values {
+            Values::Denoised(work) => work.reach.get(film).copied(),
+            Values::None | Values::Blocks(_) => None,
         }
     }
 
     /// Estimates as rgb planes, if there is one per pixel.
     pub(super) fn planes(&self) -> Option<[&[f32]; 3]> {
         match &self.values {
-            Values::Denoised { planes, .. } if self.known() => Some(planes.out.each_ref().map(|p| &**p)),
+            Values::Denoised(work) if self.known() => Some(work.e.each_ref().map(|p| &**p)),
             _ => None,
         }
     }
 
     /// Replaces the built-in estimates by the host's from now on; `false` if there is not one per pixel.
     pub(super) fn give(&mut self, rgb: &[[f32; 3]]) -> bool {
-        let Values::Denoised { planes, .. } = &mut self.values else { return false };
-        if planes.out.iter().any(|p| p.len() != rgb.len()) {
+        let Values::Denoised(work) = &mut self.values else { return false };
+        if work.e.iter().any(|p| p.len() != rgb.len()) {
             return false;
         }
-        for (c, plane) in planes.out.iter_mut().enumerate() {
+        for (c, plane) in work.e.iter_mut().enumerate() {
             for (to, from) in plane.iter_mut().zip(rgb) {
                 *to = if from[c].is_finite() { from[c] } else { 0.0 };
             }
         }
-        self.state = EstimateScalars { known: 1, given: 1 };
+        self.state = EstimateScalars { known: 1, given: 1, ..EstimateScalars::default() };
         true
     }
 
-    /// Estimates the pixels anew from the film, unless the host has given estimates.
-    pub(super) fn refresh(&mut self, film: &Film<'_>) {
-        if self.state.given != 0 {
-            return;
+    /// Begins to estimate the pixels anew, unless the host has given estimates.
+    pub(super) fn begin_refresh(&mut self) {
+        if self.state.given == 0 {
+            self.clear();
         }
-        match &mut self.values {
-            Values::None => return,
-            Values::Denoised { planes, scratch } => {
-                for (i, p) in film.pixels().iter().enumerate() {
-                    planes.set(i, p, film.aovs().get(i));
-                }
-                // sizes are those of the plan, so this cannot fail; if it did, the last values would serve on
-                let _ = planes.denoise(scratch);
-            }
+    }
+
+    /// Estimates the pixels anew from the film, a row of one pass; `true` after the last.
+    pub(super) fn refresh_row(&mut self, film: &Film<'_>) -> bool {
+        if self.state.given != 0 {
+            return true;
+        }
+        let done = match &mut self.values {
+            Values::None => return true,
+            Values::Denoised(work) => self.state.progress.row(self.size, &NoisyFilm(film), work),
             Values::Blocks(planes) => {
+                let (y, [columns, rows]) = (self.state.row, self.size);
+                if y == 0 {
+                    planes.iter_mut().for_each(|p| p.fill(0.0));
+                }
                 let tiles = BlockGrid::tiles(self.size);
-                planes.iter_mut().for_each(|p| p.fill(0.0));
-                for (i, p) in film.pixels().iter().enumerate() {
+                for x in 0..if y < rows { columns } else { 0 } {
+                    let i = film_index(self.size, [x, y]);
                     let tile = tiles.of_pixel(i as u32);
                     let area = f64::from(tiles.area(tile));
-                    for (plane, mean) in planes.iter_mut().zip(p.mean()) {
+                    for (plane, mean) in planes.iter_mut().zip(film.pixel(i).mean()) {
                         if let Some(sum) = plane.get_mut(tile as usize) {
                             *sum += (mean / area) as f32;
                         }
                     }
                 }
+                self.state.row = y.saturating_add(1);
+                self.state.row >= rows
+            }
+        };
+        self.state.known = u32::from(done);
+        done
+    }
+}
+
+/// A film as the denoiser reads it: pixels without samples count as absent.
+struct NoisyFilm<'a, 'm>(&'a Film<'m>);
+
+impl NoisySource for NoisyFilm<'_, '_> {
+    fn color(&self, at: usize) -> ([F32x8; 3], [F32x8; 3]) {
+        let (mut color, mut variance) = ([[0.0; 8]; 3], [[0.0; 8]; 3]);
+        for i in 0..8 {
+            let p = self.0.pixel(at + i);
+            let (m, v) = (p.mean(), p.variance_of_mean());
+            for c in 0..3 {
+                color[c][i] = if p.samples > 0 { m[c] as f32 } else { f32::NAN };
+                variance[c][i] = v[c] as f32;
             }
         }
-        self.state.known = 1;
+        (color.map(F32x8::new), variance.map(F32x8::new))
+    }
+
+    fn features(&self, at: usize) -> ([F32x8; 3], [F32x8; 3]) {
+        let aovs = self.0.aovs();
+        if aovs.is_empty() {
+            return ([F32x8::ONE; 3], [F32x8::ZERO; 3]);
+        }
+        let (mut albedo, mut normal) = ([[0.0; 8]; 3], [[0.0; 8]; 3]);
+        for i in 0..8 {
+            let Some(a) = aovs.get(at + i) else { continue };
+            let n = f64::from(self.0.samples(at + i).max(1));
+            for c in 0..3 {
+                albedo[c][i] = (a.albedo[c] / n) as f32;
+                normal[c][i] = (a.normal[c] / n) as f32;
+            }
+        }
+        (albedo.map(F32x8::new), normal.map(F32x8::new))
     }
 }

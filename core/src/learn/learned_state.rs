@@ -1,14 +1,14 @@
 //! The session's side of learning: all learned statistics, frozen while an iteration runs.
 
-use super::adaptive::SampleAllocation;
+use super::adaptive::{AllocationScalars, SampleAllocation};
 use super::cache::{BINS, Cache, CacheScalars, NO_BIN, Training, VertexKind8};
 use super::estimate::{EstimateScalars, PixelEstimates};
 use super::needs::Needs;
-use super::picture::{Picture, PictureStatistics, Visit};
+use super::picture::{Picture, PictureStatistics, error_of, outliers};
 use super::settings::{Learning, Objective};
 use crate::cost::COST_BOUNCE;
 use crate::counters::Counters;
-use crate::film::Film;
+use crate::film::{Film, PixelSums, Selection};
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::rrs::{Learned8, Local8, Space};
 use crate::scene::Scene;
@@ -41,9 +41,7 @@ pub(crate) struct LearnedScalars {
     picture: Picture,
     cache: CacheScalars,
     estimate: EstimateScalars,
-    /// Mean samples per pixel of the allocation.
-    samples: u32,
-    reserved: u32,
+    allocation: AllocationScalars,
 }
 
 impl LearnedScalars {
@@ -53,8 +51,7 @@ impl LearnedScalars {
             picture: Picture::default(),
             cache: CacheScalars::new([scene.info.bounds_min, scene.info.bounds_max]),
             estimate: EstimateScalars::default(),
-            samples: 1,
-            reserved: 0,
+            allocation: AllocationScalars::new(),
         }
     }
 
@@ -67,7 +64,7 @@ impl LearnedScalars {
 impl<'m> LearnedState<'m> {
     pub(crate) fn measure(m: Measure, needs: &Needs) -> Measure {
         let m = needs.cache.map_or(m, |size| Cache::measure(m, size));
-        let m = PixelEstimates::measure(m, needs.size, needs.features, needs.pixels);
+        let m = PixelEstimates::measure(m, needs.size, needs.pixels);
         SampleAllocation::measure(m, needs.size, needs.adaptive)
     }
 
@@ -89,11 +86,16 @@ impl<'m> LearnedState<'m> {
             size: n.size,
             cache,
             block,
-            pixels: PixelEstimates::carve(c, n.size, n.features, n.pixels, &n.learning, scalars.estimate)?,
-            allocation: SampleAllocation::carve(c, n.size, n.adaptive, scalars.samples)?,
+            pixels: PixelEstimates::carve(c, n.size, n.pixels, &n.learning, scalars.estimate)?,
+            allocation: SampleAllocation::carve(c, n.size, n.adaptive, scalars.allocation)?,
             picture: scalars.picture,
             needed: n.pixels.is_some(),
         })
+    }
+
+    /// Forgets the picture, but nothing learned.
+    pub(crate) fn forget_film(&mut self) {
+        self.allocation.begin_densities();
     }
 
     /// Forgets everything learned.
@@ -103,6 +105,7 @@ impl<'m> LearnedState<'m> {
         }
         self.pixels.clear();
         self.picture = Picture::default();
+        self.allocation.begin_densities();
     }
 
     /// The scalars, `fresh` those of a render that has learned nothing.
@@ -111,8 +114,7 @@ impl<'m> LearnedState<'m> {
             picture: self.picture,
             cache: self.cache.as_ref().map_or(fresh.cache, Cache::scalars),
             estimate: self.pixels.scalars(),
-            samples: self.allocation.samples(),
-            reserved: 0,
+            allocation: self.allocation.scalars(),
         }
     }
 
@@ -152,8 +154,8 @@ impl<'m> LearnedState<'m> {
     }
 
     /// Begins an iteration of `samples` camera samples per pixel in the mean.
-    pub(crate) fn begin(&mut self, samples: u32, film: &Film<'_>) {
-        self.allocation.allocate(samples, film, &self.pixels);
+    pub(crate) fn begin(&mut self, samples: u32) {
+        self.allocation.allocate(samples);
     }
 
     /// Camera samples of each pixel of a tile in this iteration.
@@ -237,16 +239,55 @@ impl<'m> LearnedState<'m> {
         self.pixels.planes()
     }
 
-    /// Replaces the built-in estimate of the pixels by the host's from now on; `false` if it does not fit.
-    pub(crate) fn give_estimate(&mut self, rgb: &[[f32; 3]]) -> bool {
-        self.pixels.give(rgb)
+    /// Replaces the built-in estimate of the pixels by the host's from now on; `false` if it does not fit. The densities
+    /// of the next iteration's samples follow.
+    pub(crate) fn give_estimate(&mut self, rgb: &[[f32; 3]], film: &Film<'_>) -> bool {
+        if !self.pixels.give(rgb) {
+            return false;
+        }
+        self.allocation.begin_densities();
+        while !self.density_of_next(film) {}
+        true
     }
 
-    /// Measures variance and cost of an iteration, whose pixels `visit` shows, against the estimate made before it.
-    pub(crate) fn measure_picture(&mut self, counters: &Counters, visit: impl Visit) {
-        if self.needed && self.pixels.known() {
-            self.picture.measure(&self.learning, &mut self.pixels, &self.allocation, counters, visit);
+    /// Is the picture to be measured against the estimate made before the iteration (`first` is false), or is it the
+    /// first, which is measured against its own?
+    pub(crate) fn measures(&self, first: bool) -> bool {
+        self.needed && if first { !self.picture.known() } else { self.pixels.known() }
+    }
+
+    /// Shows the error of an iteration's pixel to the selection. In the first visit errors are kept where there is room.
+    pub(crate) fn show_error(
+        &mut self,
+        film: usize,
+        sums: &PixelSums,
+        s: &mut Selection,
+        digits: &mut [u32],
+        first_visit: bool,
+    ) {
+        if sums.samples == 0 {
+            return;
         }
+        let norm = self.learning.norm;
+        let error = match self.pixels.kept(film).filter(|_| !first_visit) {
+            Some(kept) => kept,
+            None => {
+                let e = error_of(film as u32, sums, norm, &self.pixels, &self.allocation);
+                self.pixels.keep(film, e);
+                e
+            }
+        };
+        s.show(f64::from(error), digits);
+    }
+
+    /// Number of pixels whose errors are left out.
+    pub(crate) fn outliers(pixels: u64) -> u64 {
+        outliers(pixels)
+    }
+
+    /// Takes variance and cost of the iteration from the selection that has seen all of its pixels.
+    pub(crate) fn picture_measured(&mut self, s: &Selection, counters: &Counters) {
+        self.picture.measured(&self.learning, s, counters);
     }
 
     /// Weight of each sample of a pixel: less where adaptive sampling took more, so that an iteration has the same
@@ -261,22 +302,45 @@ impl<'m> LearnedState<'m> {
         1.0 / self.allocation.share(film as u32)
     }
 
-    /// Ends an iteration: a new estimate of the pixels from the film. The first iteration is measured against its own.
-    pub(crate) fn learn_picture(&mut self, film: &Film<'_>, counters: &Counters, visit: impl Visit) {
+    /// Begins a new estimate of the pixels from the film.
+    pub(crate) fn begin_refresh(&mut self) {
         if self.needed {
-            self.pixels.refresh(film);
-            if !self.picture.known() {
-                self.picture.measure(&self.learning, &mut self.pixels, &self.allocation, counters, visit);
-            }
+            self.pixels.begin_refresh();
+        }
+        self.allocation.begin_densities();
+    }
+
+    /// Estimates pixels from the film, a row of one pass; `true` after the last.
+    pub(crate) fn refresh_row(&mut self, film: &Film<'_>) -> bool {
+        !self.needed || self.pixels.refresh_row(film)
+    }
+
+    /// Computes the density of the next iteration's samples in one tile; `true` after the last.
+    pub(crate) fn density_of_next(&mut self, film: &Film<'_>) -> bool {
+        self.allocation.density_of_next(film, &self.pixels)
+    }
+
+    /// Discounts statistics of the scene from bin `at` on, `limit` at most; their number, and `true` after the last.
+    pub(crate) fn discount(&mut self, at: usize, limit: usize) -> (usize, bool) {
+        let keep = f64::from(self.learning.decay);
+        self.cache.as_mut().map_or((0, true), |c| c.discount(keep, at, limit))
+    }
+
+    /// Adds what a shard learned, from bin `at` on, `limit` at most; their number, and `true` after the last.
+    pub(crate) fn absorb(&mut self, t: &Training<'_>, at: usize, limit: usize) -> (usize, bool) {
+        self.cache.as_mut().map_or((0, true), |c| c.absorb_some(t, at, limit))
+    }
+
+    /// Begins to compute what look-ups read.
+    pub(crate) fn begin_freeze(&mut self) {
+        if let Some(c) = &mut self.cache {
+            c.begin_freeze();
         }
     }
 
-    /// Ends an iteration: merges what the shards learned of the scene.
-    pub(crate) fn learn_scene<'a, 'b: 'a>(&mut self, shards: impl Iterator<Item = &'a Training<'b>>) {
-        if let Some(cache) = &mut self.cache {
-            cache.begin_merge(f64::from(self.learning.decay));
-            shards.for_each(|t| cache.absorb(t));
-            cache.freeze(f64::from(self.learning.subdivide_count));
-        }
+    /// Computes what look-ups read; work done, in units of about a ray, and `true` after the last.
+    pub(crate) fn freeze_some(&mut self) -> (u64, bool) {
+        let count = f64::from(self.learning.subdivide_count);
+        self.cache.as_mut().map_or((0, true), |c| c.freeze_some(count))
     }
 }

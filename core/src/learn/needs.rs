@@ -9,8 +9,6 @@ use crate::rrs::Space;
 pub(crate) struct Needs {
     /// Columns and rows of the picture.
     pub size: [u32; 2],
-    /// Albedos and normals are in the film, for the denoiser.
-    pub features: bool,
     /// Domain of local statistics, if there are any.
     pub space: Option<Space>,
     /// Room for local statistics, if there are any.

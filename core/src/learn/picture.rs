@@ -4,7 +4,7 @@ use super::adaptive::SampleAllocation;
 use super::estimate::PixelEstimates;
 use super::settings::Learning;
 use crate::counters::Counters;
-use crate::film::{PixelSums, trimmed};
+use crate::film::{PixelSums, Selection};
 use crate::rrs::Norm;
 use bytemuck::{Pod, Zeroable};
 
@@ -26,11 +26,6 @@ pub struct PictureStatistics {
     /// Weighted squared error at which one sample makes its pixel an outlier.
     pub limit: f64,
 }
-
-/// Visitor of an iteration's pixels: calls its argument with the film index and the sums of each.
-pub(crate) trait Visit: Fn(&mut dyn FnMut(usize, &PixelSums)) {}
-
-impl<F: Fn(&mut dyn FnMut(usize, &PixelSums))> Visit for F {}
 
 /// Statistics of the picture, over the iterations.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -58,40 +53,9 @@ impl Picture {
         if b.variance > 0.0 { (b.cost / b.variance).min(1e30) as f32 } else { 0.0 }
     }
 
-    /// Measures an iteration against the estimate of the pixels.
-    pub(super) fn measure(
-        &mut self,
-        learning: &Learning,
-        pixels: &mut PixelEstimates<'_>,
-        allocation: &SampleAllocation<'_>,
-        counters: &Counters,
-        visit: impl Visit,
-    ) {
-        // errors are read six times; where there is room for them they are computed once
-        let kept = pixels.lend();
-        let error = |film: usize, sums: &PixelSums| {
-            // sums of finite samples may make errors that f32 does not hold
-            error_of(film as u32, sums, learning.norm, pixels, allocation).min(f64::from(f32::MAX)) as f32
-        };
-        let mut n = 0u64;
-        visit(&mut |film, sums| {
-            if sums.samples > 0 {
-                n += 1;
-                if let Some(e) = kept.get_mut(film) {
-                    *e = error(film, sums);
-                }
-            }
-        });
-        let outliers = (n as f64 * OUTLIERS) as u64 + 1;
-        let t = trimmed(outliers.min(n.saturating_sub(1)) as usize, |show| {
-            visit(&mut |film, sums| {
-                if sums.samples > 0 {
-                    show(f64::from(kept.get(film).copied().unwrap_or_else(|| error(film, sums))));
-                }
-            });
-        });
-        pixels.take_back(kept);
-        let n = n.max(1) as f64;
+    /// Takes the errors of an iteration's pixels ([`error_of`]), of which the outliers were left out.
+    pub(super) fn measured(&mut self, learning: &Learning, t: &Selection, counters: &Counters) {
+        let n = t.shown.max(1) as f64;
         let work = counters.cost();
         let s = PictureStatistics {
             variance: t.sum / t.count.max(1) as f64,
@@ -115,21 +79,24 @@ impl Picture {
     }
 }
 
+/// How many of so many pixels are outliers.
+pub(super) fn outliers(pixels: u64) -> u64 {
+    ((pixels as f64 * OUTLIERS) as u64 + 1).min(pixels.saturating_sub(1))
+}
+
 /// Mean squared error of a pixel's samples against its estimate, times its error weight, as a norm over the channels.
 /// It is divided by the pixel's share of the samples, so that the mean over the pixels is the picture's.
-fn error_of(
+pub(super) fn error_of(
     film: u32,
     p: &PixelSums,
     norm: Norm,
     pixels: &PixelEstimates<'_>,
     allocation: &SampleAllocation<'_>,
-) -> f64 {
-    let (n, share) = (p.samples as f64, allocation.share(film));
+) -> f32 {
+    let share = allocation.share(film);
     let (value, error_weight) = (pixels.value(film), pixels.error_weight(film));
-    let error = |c: usize| {
-        let x = f64::from(value[c]);
-        let square = (p.sum_sqr[c] - 2.0 * x * p.sum[c]) / n + x * x;
-        square.max(0.0) * f64::from(error_weight[c]) / share
-    };
-    norm.of_color([error(0), error(1), error(2)])
+    let square = p.mean_square_about(value);
+    let error = |c: usize| square[c] * f64::from(error_weight[c]) / share;
+    // sums of finite samples may make errors that f32 does not hold
+    norm.of_color([error(0), error(1), error(2)]).min(f64::from(f32::MAX)) as f32
 }

@@ -32,8 +32,13 @@ pub(crate) struct Bookkeeping<'m> {
     pub(super) roots: Roots<'m>,
     pub(super) ledger: Ledger<'m>,
     pub(crate) training: Option<Training<'m>>,
-    pub(super) pixels: &'m mut [PixelSums],
+    /// Sums of the shard's pixels in this iteration, tile by tile in Morton order, as far as they are begun.
+    pixels: &'m mut [PixelSums],
+    /// Rays of those pixels, if anything needs them.
+    rays: &'m mut [u32],
     pub(super) aovs: &'m mut [PixelAov],
+    /// Number of pixels begun; what memory holds of others is of no iteration.
+    begun: usize,
     pub(crate) counters: Counters,
     /// Error of a sample beyond which it is an outlier to the statistics.
     outlier: f32,
@@ -53,21 +58,27 @@ fn ledger_capacity(settings: &Settings) -> usize {
 
 impl<'m> Bookkeeping<'m> {
     /// Bytes; [`Self::carve`] carves in the same order.
-    pub(crate) fn measure(m: Measure, job: &Job) -> Measure {
-        let (s, pixels) = (&job.settings, job.pixel_slots());
+    pub(crate) fn measure(m: Measure, job: &Job, pixels: usize) -> Measure {
+        let s = &job.settings;
         let m = Ledger::measure(Roots::measure(m, roots_capacity(s)), ledger_capacity(s));
         let m = job.cache.map_or(m, |size| Training::measure(m, size));
-        m.add::<PixelSums>(pixels).add::<PixelAov>(if s.aovs { pixels } else { 0 })
+        m.add::<PixelSums>(pixels).add::<u32>(if s.counts_rays() { pixels } else { 0 }).add::<PixelAov>(if s.aovs {
+            pixels
+        } else {
+            0
+        })
     }
 
-    pub(crate) fn carve(c: &mut Carver<'m>, job: &Job) -> Result<Self, MemoryError> {
-        let (s, pixels) = (&job.settings, job.pixel_slots());
+    pub(crate) fn carve(c: &mut Carver<'m>, job: &Job, pixels: usize) -> Result<Self, MemoryError> {
+        let s = &job.settings;
         Ok(Self {
             roots: Roots::carve(c, roots_capacity(s))?,
             ledger: Ledger::carve(c, ledger_capacity(s))?,
             training: job.cache.map(|size| Training::carve(c, size)).transpose()?,
-            pixels: c.take(pixels)?,
-            aovs: c.take(if s.aovs { pixels } else { 0 })?,
+            pixels: c.take_unset(pixels)?,
+            rays: c.take_unset(if s.counts_rays() { pixels } else { 0 })?,
+            aovs: c.take_unset(if s.aovs { pixels } else { 0 })?,
+            begun: 0,
             counters: Counters::default(),
             outlier: f32::INFINITY,
             norm: s.learning.norm,
@@ -79,11 +90,43 @@ impl<'m> Bookkeeping<'m> {
         self.roots.reset();
         self.ledger.reset();
         self.counters = Counters::default();
-        self.pixels.fill(PixelSums::default());
-        self.aovs.fill(PixelAov::default());
+        self.begun = 0;
         self.outlier = learned.outlier();
         if let Some(t) = &mut self.training {
-            t.clear(learned.used_bins());
+            t.begin(learned.used_bins());
+        }
+    }
+
+    /// Clears the next of the statistics of this iteration; `true` when all are clear.
+    pub(super) fn clear_some(&mut self) -> bool {
+        self.training.as_mut().is_none_or(Training::clear_some)
+    }
+
+    /// Are the statistics of this iteration clear of those before?
+    pub(super) fn is_clear(&self) -> bool {
+        self.training.as_ref().is_none_or(Training::is_clear)
+    }
+
+    /// Begins pixel `slot` of the shard, the next one, with empty sums.
+    pub(super) fn begin_pixel(&mut self, slot: u32) {
+        let slot = slot as usize;
+        if let Some(p) = self.pixels.get_mut(slot) {
+            *p = PixelSums::default();
+        }
+        if let Some(r) = self.rays.get_mut(slot) {
+            *r = 0;
+        }
+        if let Some(a) = self.aovs.get_mut(slot) {
+            *a = PixelAov::default();
+        }
+        self.begun = slot + 1;
+    }
+
+    /// Sums, rays and auxiliary sums of pixel `slot` in this iteration; none before it begins.
+    pub(super) fn pixel(&self, slot: usize) -> (PixelSums, u32, Option<&PixelAov>) {
+        match self.pixels.get(slot) {
+            Some(p) if slot < self.begun => (*p, self.rays.get(slot).copied().unwrap_or(0), self.aovs.get(slot)),
+            _ => (PixelSums::default(), 0, None),
         }
     }
 
@@ -278,7 +321,10 @@ impl<'m> Bookkeeping<'m> {
         if let Some(done) = self.roots.close(root) {
             self.counters.camera_samples += 1;
             if let Some(p) = self.pixels.get_mut(done.target.pixel as usize) {
-                p.add(done.radiance, done.rays);
+                p.add(done.radiance);
+            }
+            if let Some(r) = self.rays.get_mut(done.target.pixel as usize) {
+                *r = r.saturating_add(done.rays);
             }
             if let Some(a) = self.aovs.get_mut(done.target.pixel as usize) {
                 a.paths += 1.0 + f64::from(done.splits);

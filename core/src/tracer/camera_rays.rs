@@ -23,8 +23,8 @@ pub(super) struct CameraCursor {
     tile: Option<u32>,
     /// First column and row of the current tile.
     start: [u32; 2],
-    /// Pixel slots of the tiles before it.
-    base: u32,
+    /// Pixel of the shard, tile by tile in Morton order.
+    pixel: u32,
     /// Slot within the tile.
     slot: u32,
     /// Sample within the pixel.
@@ -34,29 +34,29 @@ pub(super) struct CameraCursor {
 impl CameraCursor {
     pub(super) fn new(tiles: &Tiles, shard: u32, samples: u32) -> Self {
         let tile = if samples == 0 { None } else { tiles.next_of(shard, 0) };
-        Self { tile, start: tile.map_or([0; 2], |tile| tiles.start(tile)), base: 0, slot: 0, sample: 0 }
+        Self { tile, start: tile.map_or([0; 2], |tile| tiles.start(tile)), pixel: 0, slot: 0, sample: 0 }
     }
 
     pub(super) const fn finished() -> Self {
-        Self { tile: None, start: [0; 2], base: 0, slot: 0, sample: 0 }
+        Self { tile: None, start: [0; 2], pixel: 0, slot: 0, sample: 0 }
     }
 
     pub(super) fn is_finished(&self) -> bool {
         self.tile.is_none()
     }
 
-    /// The next (pixel, pixel slot, sample); a finished cursor gives `None`. `samples` is the number per pixel of a
+    /// The next (pixel, number of the pixel in the shard, sample); a finished cursor gives `None`. `samples` is the number per pixel of a
     /// tile.
     fn next(&mut self, tiles: &Tiles, shard: u32, samples: impl Fn(u32) -> u32) -> Option<([u32; 2], u32, u32)> {
         while let Some(tile) = self.tile {
-            let found = tiles.pixel(self.start, self.slot).map(|p| (p, self.base + self.slot, self.sample));
+            let found = tiles.pixel(self.start, self.slot).map(|p| (p, self.pixel, self.sample));
             self.sample += 1;
             if found.is_none() || self.sample >= samples(tile) {
                 self.sample = 0;
+                self.pixel += u32::from(found.is_some());
                 self.slot += 1;
                 if self.slot == TILE_PIXELS {
                     self.slot = 0;
-                    self.base += TILE_PIXELS;
                     self.tile = tiles.next_of(shard, tile + 1);
                     self.start = self.tile.map_or([0; 2], |tile| tiles.start(tile));
                 }
@@ -90,6 +90,9 @@ pub(crate) fn camera_rays<W: World>(
     while lanes < 8 {
         let Some((p, slot, s)) = cursor.next(tiles, index, |t| learned.samples_of_tile(t)) else { break };
         let film = tiles.film_index(p) as u32;
+        if s == 0 {
+            book.begin_pixel(slot);
+        }
         let (error_weight, share) = learned.error_weight(film);
         let target = PixelTarget { error_weight, share, film, pixel: slot };
         let Some(opened) = book.open_camera_sample(target, s < settings.learning.samples) else { break };

@@ -2,7 +2,7 @@
 
 use crate::learn::cache::CacheSize;
 use crate::settings::Settings;
-use crate::tiles::{TILE_PIXELS, Tiles};
+use crate::tiles::Tiles;
 
 /// Checked settings and what follows from them.
 #[derive(Clone, Copy, Debug)]
@@ -11,11 +11,4 @@ pub(crate) struct Job {
     pub tiles: Tiles,
     /// Room for statistics of the scene, if they are wanted.
     pub cache: Option<CacheSize>,
-}
-
-impl Job {
-    /// Pixel slots of one shard.
-    pub(super) fn pixel_slots(&self) -> usize {
-        self.tiles.most_tiles().saturating_mul(TILE_PIXELS as usize)
-    }
 }

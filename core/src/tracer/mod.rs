@@ -53,6 +53,7 @@ mod vertex;
 pub(crate) use job::Job;
 pub(crate) use media_set::media_at;
 pub use occlude::MAX_PASSED;
+pub(crate) use shard::ShardCursor;
 pub use shard::{Budget, Shard, ShardError, StepResult};
 
 /// Bytes of the state of a path in flight: a waiting vertex with its link in the ring, and a camera sample.

@@ -7,10 +7,11 @@ use super::state::State;
 use crate::counters::Counters;
 use crate::film::{PixelAov, PixelSums};
 use crate::learn::cache::Training;
-use crate::memory::{Carver, Layout, Measure, MemoryError};
+use crate::memory::{Carver, Measure, MemoryError};
 use crate::settings::Settings;
 use crate::tiles::TILE_PIXELS;
 use crate::world::{Identity, World};
+use bytemuck::{Pod, Zeroable};
 use core::fmt;
 
 /// How much a step may do.
@@ -28,6 +29,16 @@ pub enum StepResult {
     More,
     /// This shard has finished the iteration.
     Done,
+}
+
+/// Place in the pixels of a shard, tile by tile.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct ShardCursor {
+    /// The next tile is this one or a later one.
+    tile: u32,
+    /// Number of the next pixel in the shard.
+    pixel: u32,
 }
 
 /// Why a shard cannot be made.
@@ -67,20 +78,28 @@ pub struct Shard<'m> {
 }
 
 impl<'m> Shard<'m> {
-    /// Bytes of a shard; [`Self::carve`] carves in the same order.
-    pub(crate) fn measure(job: &Job) -> Measure {
-        State::measure(job)
+    /// Bytes of a shard with so many pixels; [`Self::carve`] carves in the same order.
+    pub(crate) fn measure(job: &Job, pixels: usize) -> Measure {
+        State::measure(job, pixels)
     }
 
-    /// Carves shard `index` out of a block of `layout`.
-    pub(crate) fn carve(job: &Job, layout: Layout, index: u32, block: &'m mut [u8]) -> Result<Self, ShardError> {
+    /// Carves shard `index` out of a block. No memory of pixels is touched.
+    pub(crate) fn carve(job: &Job, index: u32, block: &'m mut [u8]) -> Result<Self, ShardError> {
         let s = &job.settings;
         if index >= s.shards {
             return Err(ShardError::Index { index, shards: s.shards });
         }
-        let memory = ShardError::Memory;
+        let (memory, given) = (ShardError::Memory, block.len());
+        let pixels = job.tiles.pixels_of(index);
+        let too_small = ShardError::Memory(MemoryError::TooSmall { needed: usize::MAX, given });
+        let layout = Self::measure(job, pixels).layout().ok_or(too_small)?;
         let mut c = Carver::new(block, layout).map_err(memory)?;
-        Ok(Self { job: *job, index, joined: Identity::default(), state: State::carve(&mut c, job).map_err(memory)? })
+        Ok(Self {
+            job: *job,
+            index,
+            joined: Identity::default(),
+            state: State::carve(&mut c, job, pixels).map_err(memory)?,
+        })
     }
 
     /// Number of the shard in the plan.
@@ -106,8 +125,16 @@ impl<'m> Shard<'m> {
         if self.joined != world.identity() {
             self.begin(world);
         }
+        let mut cleared = 0;
+        while !self.state.book.is_clear() {
+            if cleared == budget.rays {
+                return StepResult::More;
+            }
+            self.state.book.clear_some();
+            cleared += 1;
+        }
         let start = self.state.book.counters.work();
-        while self.state.book.counters.work() - start < budget.rays {
+        while self.state.book.counters.work() - start + cleared < budget.rays {
             if !turn(world, &self.job, self.index, &mut self.state) {
                 return StepResult::Done;
             }
@@ -133,23 +160,52 @@ impl<'m> Shard<'m> {
 
     /// Has the shard finished this iteration of this scene?
     pub(crate) fn is_done(&self, identity: Identity) -> bool {
-        self.joined == identity && self.state.cursor.is_finished() && self.state.ring.waiting() == 0
+        let State { cursor, ring, book, .. } = &self.state;
+        self.joined == identity && cursor.is_finished() && ring.waiting() == 0 && book.is_clear()
     }
 
-    /// Calls `f(film index, sums, auxiliary sums)` for each pixel of the shard.
-    pub(crate) fn for_each_pixel(&self, mut f: impl FnMut(usize, &PixelSums, Option<&PixelAov>)) {
-        let tiles = &self.job.tiles;
-        let mut next = tiles.next_of(self.index, 0);
-        let mut slot = 0;
-        while let Some(tile) = next {
-            let start = tiles.start(tile);
-            for k in 0..TILE_PIXELS {
-                if let (Some(p), Some(stats)) = (tiles.pixel(start, k), self.state.book.pixels.get(slot)) {
-                    f(tiles.film_index(p), stats, self.state.book.aovs.get(slot));
+    /// Calls `f(film index, mean radiance, samples)` for each pixel of the shard that has finished camera samples in the
+    /// iteration of the shard's last step, which may be under way: for previews.
+    ///
+    /// The means are biased while samples of the pixel are in flight: those that take long (long paths, split paths)
+    /// finish last, so a pixel of few samples shows the short ones. When the shard is done the means are unbiased. The
+    /// picture as of the iterations before is in [`crate::Session::film`].
+    pub fn for_each_pixel(&self, mut f: impl FnMut(usize, [f64; 3], u32)) {
+        let mut at = ShardCursor::default();
+        while !self
+            .visit(&mut at, u64::MAX, |film, sums, _, _| {
+                if sums.samples > 0 {
+                    let n = f64::from(sums.samples);
+                    f(film, sums.sum.map(|x| x / n), sums.samples);
                 }
-                slot += 1;
+            })
+            .1
+        {}
+    }
+
+    /// Calls `f(film index, sums, rays, auxiliary sums)` for the pixels of the shard's next tiles, until they are
+    /// `limit` at least; their number, and `true` after the last of them.
+    pub(crate) fn visit(
+        &self,
+        at: &mut ShardCursor,
+        limit: u64,
+        mut f: impl FnMut(usize, &PixelSums, u32, Option<&PixelAov>),
+    ) -> (u64, bool) {
+        let tiles = &self.job.tiles;
+        let mut visited = 0;
+        while let Some(tile) = tiles.next_of(self.index, at.tile) {
+            if visited >= limit {
+                return (visited, false);
             }
-            next = tiles.next_of(self.index, tile + 1);
+            let start = tiles.start(tile);
+            for p in (0..TILE_PIXELS).filter_map(|slot| tiles.pixel(start, slot)) {
+                let (sums, rays, aov) = self.state.book.pixel(at.pixel as usize);
+                f(tiles.film_index(p), &sums, rays, aov);
+                at.pixel = at.pixel.saturating_add(1);
+                visited += 1;
+            }
+            at.tile = tile.saturating_add(1);
         }
+        (visited, true)
     }
 }

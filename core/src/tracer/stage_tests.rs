@@ -63,6 +63,7 @@ fn strategy(name: &str) -> impl FnOnce(&mut Settings) {
 /// A camera sample per lane, of pixel `i`.
 fn paths(shard: &mut Shard<'_>, depth: u32) -> Path8 {
     let root = U32x8::from_fn(|i| {
+        shard.state.book.begin_pixel(i as u32);
         let target = PixelTarget { error_weight: [1.0; 3], share: 1.0, film: i as u32, pixel: i as u32 };
         shard.state.book.open_camera_sample(target, false).expect("a root").0
     });
@@ -529,8 +530,7 @@ fn books_close_into_pixels() {
             shard.state.book.accumulate(Mask8::from_bits(0b0011_0110), &path, &found);
             shard.state.book.accumulate(Mask8::from_bits(0b0000_0010), &path, &found);
             shard.state.book.close_lanes(Mask8::all_lanes(), &path);
-            let sums =
-                [0, 1, 2, 5].map(|p: usize| (shard.state.book.pixels[p].sum, shard.state.book.pixels[p].samples));
+            let sums = [0, 1, 2, 5].map(|p| shard.state.book.pixel(p).0).map(|p| (p.sum, p.samples));
             assert_eq!(sums, [([0.0; 3], 1), ([2.0, 2.0, 1.0], 1), ([2.0, 1.0, 0.5], 1), ([0.0; 3], 1)]);
             let c = &shard.state.book.counters;
             assert_eq!((c.non_finite, c.first_non_finite, c.path_segments), (1, 6, 24));

@@ -22,16 +22,16 @@ pub(crate) struct State<'m> {
 }
 
 impl<'m> State<'m> {
-    /// Bytes; [`Self::carve`] carves in the same order.
-    pub(crate) fn measure(job: &Job) -> Measure {
-        Bookkeeping::measure(Ring::measure(Measure::new(), job.settings.ring as usize), job)
+    /// Bytes of a shard with so many pixels; [`Self::carve`] carves in the same order.
+    pub(crate) fn measure(job: &Job, pixels: usize) -> Measure {
+        Bookkeeping::measure(Ring::measure(Measure::new(), job.settings.ring as usize), job, pixels)
     }
 
-    pub(crate) fn carve(c: &mut Carver<'m>, job: &Job) -> Result<Self, MemoryError> {
+    pub(crate) fn carve(c: &mut Carver<'m>, job: &Job, pixels: usize) -> Result<Self, MemoryError> {
         Ok(Self {
             cursor: CameraCursor::finished(),
             ring: Ring::carve(c, job.settings.ring as usize)?,
-            book: Bookkeeping::carve(c, job)?,
+            book: Bookkeeping::carve(c, job, pixels)?,
             comb: CombNumbers::new(0, 0, 0),
         })
     }

@@ -187,7 +187,7 @@ pub fn drive_with<P: Profile + Send + Sync>(
     let used = session.cache();
     Ok(Rendered {
         size: film.size(),
-        pixels: film.pixels().to_vec(),
+        pixels: film.pixels().collect(),
         aovs: film.aovs().to_vec(),
         counters: *session.counters(),
         error: film.error_estimate(),

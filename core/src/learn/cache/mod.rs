@@ -21,9 +21,11 @@
 //! | `size` | [`CacheSize`]: room for leaves |
 //! | `training` | [`Training`]: one shard's side, of the current iteration |
 //! | `shared` | [`Cache`]: the side that all shards look up in |
+//! | `freeze` | from sums to what look-ups read |
 //! | `save` | the cache as bytes |
 
 mod bins;
+mod freeze;
 mod kind;
 mod save;
 mod shared;

@@ -1,7 +1,7 @@
 //! The side of the cache that all shards look up in.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
-use super::bins::{BINS, BinSums, FrozenBin, NO_BIN, freeze_leaf};
+use super::bins::{BINS, BinSums, FrozenBin, NO_BIN};
 use super::kind::VertexKind8;
 use super::size::CacheSize;
 use super::training::Training;
@@ -11,9 +11,6 @@ use crate::memory::{Carver, Layout, Measure, MemoryError};
 use crate::rrs::Local8;
 use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
-
-/// Samples that the surroundings of a cell count for in it.
-const PRIOR_SAMPLES: f64 = 4.0;
 
 impl CacheSize {
     /// Capacity of the largest cache whose shared side and `shards` training sides fit in `bytes` together; `None` if
@@ -43,8 +40,51 @@ impl CacheSize {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct CacheScalars {
-    subdivisions_refused: u64,
+    pub(super) subdivisions_refused: u64,
+    pub(super) freeze: Freeze,
+    /// Number of bins that look-ups may read.
+    pub(super) readable: u32,
+    /// Not 0: the sums in memory are not of this render.
+    unset: u32,
     tree: TreeScalars,
+}
+
+/// How far [`Cache::freeze`] has come.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Freeze {
+    /// Samples above which a leaf is subdivided in this pass.
+    pub(super) threshold: f64,
+    /// Samples of the largest leaf left that may be subdivided.
+    pub(super) largest: f64,
+    pub(super) pass: u32,
+    /// Next node, cell, group or leaf.
+    pub(super) index: u32,
+    /// Nodes of this pass end before this index.
+    pub(super) end: u32,
+    /// Not 0 if a subdivision was refused.
+    pub(super) full: u32,
+    /// Passes of subdivision.
+    pub(super) passes: u32,
+    pub(super) reserved: u32,
+}
+
+impl Freeze {
+    /// The beginning of a pass; one over nodes ends before `end`.
+    pub(super) fn at(pass: u32, end: u32) -> Self {
+        Self { threshold: f64::INFINITY, pass, end, ..Self::default() }
+    }
+
+    /// The next node of a pass over all nodes.
+    pub(super) fn next_node(&mut self) -> Option<u32> {
+        let [mut next, end] = [self.index, self.end];
+        // behind the roots lie unused words
+        if next == ROOTS {
+            next = Tree::group_nodes(0).start;
+        }
+        self.index = next.saturating_add(1);
+        (next < end).then_some(next)
+    }
 }
 
 /// Shared side of the statistics: frozen while shards work, changed between iterations.
@@ -52,21 +92,24 @@ pub(crate) struct CacheScalars {
 pub struct Cache<'m> {
     pub(super) tree: Tree<'m>,
     pub(super) sums: &'m mut [BinSums],
-    frozen: &'m mut [FrozenBin],
+    pub(super) frozen: &'m mut [FrozenBin],
     /// Square roots of visibilities in 255ths, apart from `frozen` because they are read for other bins.
-    visibility: &'m mut [u8],
+    pub(super) visibility: &'m mut [u8],
     pub(super) size: CacheSize,
     /// Objective, on which the units of first vertices depend.
     pub(super) objective: Objective,
-    subdivisions_refused: u64,
+    pub(super) scalars: CacheScalars,
+    /// Sums over groups of children, while look-ups are computed.
+    pub(super) groups: &'m mut [BinSums],
     /// Number of leaves of a cache without a tree.
-    flat: Option<u32>,
+    pub(super) flat: Option<u32>,
 }
 
 impl CacheScalars {
     /// Those of an empty cache over the bounds `lo` to `hi`.
     pub(crate) fn new([lo, hi]: [[f32; 3]; 2]) -> Self {
-        Self { subdivisions_refused: 0, tree: TreeScalars::roots(lo, hi) }
+        let tree = TreeScalars::roots(lo, hi);
+        Self { subdivisions_refused: 0, freeze: Freeze::default(), readable: 0, unset: 1, tree }
     }
 
     /// Are these the scalars of a cache of this size?
@@ -102,6 +145,7 @@ impl<'m> Cache<'m> {
             .add::<BinSums>(size.bins())
             .add::<FrozenBin>(size.bins())
             .add::<u8>(size.bins())
+            .add::<BinSums>(size.subdivisions as usize)
     }
 
     pub(crate) fn carve(
@@ -113,12 +157,12 @@ impl<'m> Cache<'m> {
         let tree = Tree::carve(c, Tree::nodes_for(size.subdivisions), size.leaves(), &scalars.tree)?;
         let (sums, frozen) = (c.take_unset(size.bins())?, c.take_unset(size.bins())?);
         let visibility = c.take_unset(size.bins())?;
-        let subdivisions_refused = scalars.subdivisions_refused;
-        Ok(Self { tree, sums, frozen, visibility, size, objective, subdivisions_refused, flat: None })
+        let groups = c.take_unset(size.subdivisions as usize)?;
+        Ok(Self { tree, sums, frozen, visibility, size, objective, scalars: *scalars, groups, flat: None })
     }
 
     pub(crate) fn scalars(&self) -> CacheScalars {
-        CacheScalars { subdivisions_refused: self.subdivisions_refused, tree: self.tree.scalars() }
+        CacheScalars { tree: self.tree.scalars(), ..self.scalars }
     }
 
     /// Bins of eight vertices, [`NO_BIN`] in inactive lanes. `p`: positions, world space; those outside the bounds
@@ -152,7 +196,7 @@ impl<'m> Cache<'m> {
     /// unoccluded, rounded up to 255ths; 1 where nothing is known and for bins that are not in use.
     #[inline]
     pub fn visibility_root(&self, bin: U32x8) -> F32x8 {
-        let used = self.visibility.get(..self.bins() as usize).unwrap_or(&[]);
+        let used = self.visibility.get(..self.scalars.readable as usize).unwrap_or(&[]);
         let one = |b: u32| f32::from(used.get(b as usize).copied().unwrap_or(u8::MAX));
         F32x8::new(bin.to_array().map(one)) / F32x8::splat(255.0)
     }
@@ -162,8 +206,8 @@ impl<'m> Cache<'m> {
     /// `count` has the samples of the bin itself, without those of its surroundings that the others are shrunk towards.
     #[inline]
     pub fn local(&self, bin: U32x8, active: Mask8) -> Local8 {
-        // beyond the bins in use lies whatever the caller's memory held
-        let used = self.frozen.get(..self.bins() as usize).unwrap_or(&[]);
+        // beyond the bins that were computed lies whatever the caller's memory held
+        let used = self.frozen.get(..self.scalars.readable as usize).unwrap_or(&[]);
         let row = |b: u32| used.get(b as usize).unwrap_or(&FrozenBin::ZERO);
         let [a, b, c, d, e, f, g, h] = U32x8::select(active, bin, U32x8::splat(NO_BIN)).to_array();
         FrozenBin::transpose([row(a), row(b), row(c), row(d), row(e), row(f), row(g), row(h)])
@@ -171,14 +215,47 @@ impl<'m> Cache<'m> {
 
     /// Begins the end of an iteration: all sums so far are multiplied by `keep`, 0 to 1.
     pub fn begin_merge(&mut self, keep: f64) {
+        while !self.discount(keep, 0, usize::MAX).1 {}
+    }
+
+    /// [`Self::begin_merge`] of bins from `at` on, `limit` at most; their number, and `true` after the last.
+    pub(crate) fn discount(&mut self, keep: f64, at: usize, limit: usize) -> (usize, bool) {
         let keep = if keep >= 0.0 { keep.min(1.0) } else { 0.0 };
-        self.used_mut().iter_mut().for_each(|b| b.scale(keep));
+        let (unset, used) = (self.scalars.unset != 0, self.used_mut());
+        let (end, len) = (at.saturating_add(limit).min(used.len()), used.len());
+        for b in used.get_mut(at..end).unwrap_or(&mut []) {
+            if unset {
+                *b = BinSums::ZERO;
+            } else {
+                b.scale(keep);
+            }
+        }
+        let done = end >= len;
+        if done {
+            self.scalars.unset = 0;
+        }
+        (end.saturating_sub(at), done)
     }
 
     /// Adds the sums of one shard. The order of shards must be fixed: the bits of the sums depend on it.
     pub fn absorb(&mut self, t: &Training<'_>) {
-        self.used_mut().iter_mut().zip(t.records()).for_each(|(b, r)| b.absorb(r));
-        self.used_mut().iter_mut().zip(t.shadows()).for_each(|(b, s)| b.absorb_shadows(s));
+        let _ = self.absorb_some(t, 0, usize::MAX);
+    }
+
+    /// [`Self::absorb`] of bins from `at` on, `limit` at most; their number, and `true` after the last.
+    pub(crate) fn absorb_some(&mut self, t: &Training<'_>, at: usize, limit: usize) -> (usize, bool) {
+        let (records, shadows) = (t.records(), t.shadows());
+        let end = at.saturating_add(limit).min(records.len());
+        let of = |n: usize| at..end.min(n).max(at);
+        let sums = self.used_mut();
+        let range = of(sums.len());
+        let sums = sums.get_mut(range).unwrap_or(&mut []);
+        let (records, shadows_some) = (records.get(at..end).unwrap_or(&[]), shadows.get(at..end).unwrap_or(&[]));
+        for ((b, r), s) in sums.iter_mut().zip(records).zip(shadows_some) {
+            b.absorb(r);
+            b.absorb_shadows(s);
+        }
+        (end.saturating_sub(at), end >= t.records().len())
     }
 
     /// Completes the end of an iteration: subdivides leaves of more than `subdivide_count` samples (taken as at least
@@ -188,49 +265,12 @@ impl<'m> Cache<'m> {
     /// If leaves run out, those with most samples have been subdivided first; [`Self::subdivisions_refused`] counts the
     /// rest.
     pub fn freeze(&mut self, subdivide_count: f64) {
-        if self.flat.is_some() {
-            return self.refresh();
-        }
-        let limit = if subdivide_count.is_nan() { f64::INFINITY } else { subdivide_count.max(1.0) };
-        let mut threshold = f64::INFINITY;
-        // A pass subdivides what is above its threshold and finds the largest leaf that is left, for the next
-        // threshold.
-        loop {
-            let (largest, full) = self.subdivide_above(threshold);
-            if full {
-                let refused = self.tree.indices().filter(|i| self.may_subdivide(*i).is_some_and(|n| n > limit)).count();
-                self.subdivisions_refused += refused as u64;
-                break;
-            }
-            if largest <= limit {
-                break;
-            }
-            threshold = (0.5 * largest).max(limit);
-        }
-        self.refresh();
-    }
-
-    /// Subdivides leaves of more than `threshold` samples. Samples of the largest leaf left that may be subdivided, and
-    /// whether one was refused.
-    fn subdivide_above(&mut self, threshold: f64) -> (f64, bool) {
-        let (mut largest, mut full) = (0.0f64, false);
-        for index in self.tree.indices() {
-            let Some(count) = self.may_subdivide(index) else { continue };
-            let rest = if count <= threshold {
-                count
-            } else if self.subdivide(index) {
-                count / 8.0
-            } else {
-                full = true;
-                count
-            };
-            largest = largest.max(rest);
-        }
-        (largest, full)
+        self.begin_freeze();
+        while !self.freeze_some(subdivide_count).1 {}
     }
 
     /// Number of samples of a leaf that is above the depth limit.
-    fn may_subdivide(&self, index: u32) -> Option<f64> {
+    pub(super) fn may_subdivide(&self, index: u32) -> Option<f64> {
         match self.tree.node(index) {
             OctreeNode::Leaf { number, depth } if depth < MAX_DEPTH => {
                 Some(self.leaf(number).iter().map(|b| b.count).sum())
@@ -244,60 +284,30 @@ impl<'m> Cache<'m> {
         let OctreeNode::Leaf { number, .. } = self.tree.node(index) else { return false };
         let Some(first) = self.tree.subdivide(index) else { return false };
         self.leaf_mut(number).iter_mut().for_each(|b| b.scale(0.125));
-        let from = number as usize * BINS;
+        let mut leaf = [BinSums::ZERO; BINS];
+        leaf.iter_mut().zip(self.leaf(number)).for_each(|(to, from)| *to = *from);
         for child in first..first + 7 {
-            self.sums.copy_within(from..from + BINS, child as usize * BINS);
+            self.leaf_mut(child).iter_mut().zip(&leaf).for_each(|(to, from)| *to = *from);
         }
         true
     }
 
-    /// Computes what look-ups read. Every node is shrunk towards its parent, so that rare bright samples of the
-    /// surroundings count in a cell that has not met one yet.
-    pub(super) fn refresh(&mut self) {
-        self.tree.refresh();
-        if let Some(leaves) = self.flat {
-            let prior = BinSums::ZERO;
-            (0..leaves).for_each(|number| self.freeze_one(number, &prior, 0.0));
-        } else {
-            (0..ROOTS).for_each(|root| self.freeze_below(root, &BinSums::ZERO));
-        }
-    }
-
-    fn freeze_below(&mut self, index: u32, prior: &BinSums) {
-        match self.tree.node(index) {
-            OctreeNode::Leaf { number, .. } => self.freeze_one(number, prior, PRIOR_SAMPLES),
-            OctreeNode::Inner { child } => {
-                let mut all = BinSums::ZERO;
-                self.tree.visit(index, &mut |n| {
-                    if let OctreeNode::Leaf { number, .. } = n {
-                        self.leaf(number).iter().for_each(|b| all.add(b, 1.0));
-                    }
-                });
-                all.shrink(prior, PRIOR_SAMPLES);
-                (child..child + 8).for_each(|c| self.freeze_below(c, &all));
-            }
-        }
-    }
-
-    fn freeze_one(&mut self, number: u32, prior: &BinSums, samples: f64) {
-        let bins = number as usize * BINS..(number as usize + 1) * BINS;
-        let (sums, frozen) = (self.sums.get(bins.clone()), self.frozen.get_mut(bins.clone()));
-        if let (Some(s), Some(f), Some(v)) = (sums, frozen, self.visibility.get_mut(bins)) {
-            freeze_leaf(s, f, v, prior, samples);
-        }
-    }
-
     /// As [`Self::reset`], refused subdivisions included.
     pub(crate) fn forget(&mut self) {
-        self.subdivisions_refused = 0;
+        self.scalars.subdivisions_refused = 0;
         self.reset();
     }
 
     /// Forgets all statistics and the tree.
     pub fn reset(&mut self) {
         self.tree.reset();
-        self.used_mut().fill(BinSums::ZERO);
-        self.refresh();
+        (self.scalars.unset, self.scalars.readable) = (1, 0);
+        if self.flat.is_none() {
+            // a few leaves; those without a tree may be many, and are set when the first iteration ends
+            self.used_mut().fill(BinSums::ZERO);
+            self.scalars.unset = 0;
+            self.refresh();
+        }
     }
 
     pub(super) fn leaf(&self, number: u32) -> &[BinSums] {
@@ -311,7 +321,8 @@ impl<'m> Cache<'m> {
     }
 
     fn used_mut(&mut self) -> &mut [BinSums] {
-        self.sums.get_mut(..self.leaves() as usize * BINS).unwrap_or(&mut [])
+        let used = self.leaves() as usize * BINS;
+        self.sums.get_mut(..used).unwrap_or(&mut [])
     }
 
     /// Number of bins in use, for [`Training::clear`]; look-ups give smaller numbers.
@@ -346,10 +357,10 @@ impl<'m> Cache<'m> {
 
     /// Number of subdivisions that found no room: leaves too large at a [`Self::freeze`], inner nodes of merged caches.
     pub fn subdivisions_refused(&self) -> u64 {
-        self.subdivisions_refused
+        self.scalars.subdivisions_refused
     }
 
     pub(super) fn refuse_subdivision(&mut self) {
-        self.subdivisions_refused += 1;
+        self.scalars.subdivisions_refused += 1;
     }
 }

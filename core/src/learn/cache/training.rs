@@ -11,7 +11,12 @@ pub struct Training<'m> {
     records: &'m mut [BinRecord],
     shadows: &'m mut [ShadowRecord],
     used: usize,
+    /// Number of bins in use that hold sums of this iteration.
+    clear: usize,
 }
+
+/// Bins that [`Training::clear_some`] clears.
+const BINS_AT_ONCE: usize = 32;
 
 impl<'m> Training<'m> {
     /// Size and alignment of the block that [`Self::new`] needs; `None` if it cannot be addressed.
@@ -31,14 +36,33 @@ impl<'m> Training<'m> {
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, size: CacheSize) -> Result<Self, MemoryError> {
-        Ok(Self { records: c.take_unset(size.bins())?, shadows: c.take_unset(size.bins())?, used: 0 })
+        Ok(Self { records: c.take_unset(size.bins())?, shadows: c.take_unset(size.bins())?, used: 0, clear: 0 })
     }
 
     /// Forgets all sums and takes samples of bins below `used_bins` ([`super::Cache::bins`]).
     pub fn clear(&mut self, used_bins: u32) {
+        self.begin(used_bins);
+        while !self.clear_some() {}
+    }
+
+    /// As [`Self::clear`], but the sums are to be forgotten by [`Self::clear_some`] first.
+    pub(crate) fn begin(&mut self, used_bins: u32) {
         self.used = (used_bins as usize).min(self.records.len());
-        self.used_mut().fill(bytemuck::Zeroable::zeroed());
-        self.shadows_mut().fill(bytemuck::Zeroable::zeroed());
+        self.clear = 0;
+    }
+
+    /// Forgets some of the sums; `true` when all are forgotten.
+    pub(crate) fn clear_some(&mut self) -> bool {
+        let (from, to) = (self.clear, (self.clear + BINS_AT_ONCE).min(self.used));
+        self.records.get_mut(from..to).unwrap_or(&mut []).fill(bytemuck::Zeroable::zeroed());
+        self.shadows.get_mut(from..to).unwrap_or(&mut []).fill(bytemuck::Zeroable::zeroed());
+        self.clear = to;
+        self.is_clear()
+    }
+
+    /// Are all sums those of this iteration?
+    pub(crate) fn is_clear(&self) -> bool {
+        self.clear >= self.used
     }
 
     /// Adds a sample. Negative values count as 0, values above [`MAX_VALUE`](super::MAX_VALUE) as that.

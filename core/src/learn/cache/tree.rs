@@ -127,22 +127,25 @@ impl<'m> Tree<'m> {
     pub(super) fn reset(&mut self) {
         self.nodes.iter_mut().zip(0..ROOTS).for_each(|(n, root)| *n = LEAF | root);
         (self.used, self.leaves) = (FIRST_CHILD, ROOTS);
-        self.refresh();
+        let _ = self.refresh(0, usize::MAX);
     }
 
-    /// Fills the grid. Until then look-ups give the old numbers of leaves, which are still theirs or a child's.
-    pub(super) fn refresh(&mut self) {
+    /// Fills the grid from cell `from` on, `limit` cells at most; the next cell, `None` after the last. Until then
+    /// look-ups give the old numbers of leaves, which are still theirs or a child's.
+    pub(super) fn refresh(&mut self, from: usize, limit: usize) -> Option<usize> {
         let bits = self.grid_bits;
-        for (i, word) in (0u32..).zip(self.grid.iter_mut()) {
+        let end = from.saturating_add(limit).min(self.grid.len());
+        for (i, word) in (from as u32..).zip(self.grid.get_mut(from..end).unwrap_or(&mut [])) {
             let at = |n: u32| self.nodes.get(n as usize).copied().unwrap_or(LEAF);
             let cell = [i, i >> bits, i >> (2 * bits)];
             *word = at(i >> (3 * bits));
             for bit in (0..bits).rev() {
                 if *word & LEAF == 0 {
-                    *word = at(*word + cell.iter().rev().fold(0, |o, c| o << 1 | (c >> bit & 1)));
+                    *word = at((*word).wrapping_add(cell.iter().rev().fold(0, |o, c| o << 1 | (c >> bit & 1))));
                 }
             }
         }
+        (end < self.grid.len()).then_some(end)
     }
 
     pub(super) fn leaves(&self) -> u32 {
@@ -154,17 +157,40 @@ impl<'m> Tree<'m> {
         self.used - FIRST_CHILD + ROOTS
     }
 
-    /// Indices of all nodes.
-    pub(super) fn indices(&self) -> impl Iterator<Item = u32> + use<> {
-        (0..ROOTS).chain(FIRST_CHILD..self.used)
+    /// Index of the first node behind the roots' and all groups of children.
+    pub(super) fn end(&self) -> u32 {
+        self.used
     }
 
+    /// Number of groups of eight children.
+    pub(super) fn groups(&self) -> u32 {
+        (self.used - FIRST_CHILD) / 8
+    }
+
+    /// Nodes of a group of children.
+    pub(super) fn group_nodes(group: u32) -> core::ops::Range<u32> {
+        let first = FIRST_CHILD + 8 * group;
+        first..first + 8
+    }
+
+    /// Group that begins with node `child`.
+    pub(super) fn group_of(child: u32) -> usize {
+        (child.saturating_sub(FIRST_CHILD) / 8) as usize
+    }
+
+    /// A node as memory has it. Memory that something else has written to has no inner nodes but those that lead to a
+    /// later group, and no leaves but those with sums.
     pub(super) fn node(&self, index: u32) -> OctreeNode {
         let word = self.nodes.get(index as usize).copied().unwrap_or(LEAF);
-        if word & LEAF == 0 {
+        if word & LEAF != 0 {
+            let number = word & NUMBER;
+            let number = if number < self.leaves { number } else { 0 };
+            return OctreeNode::Leaf { number, depth: (word & !LEAF) >> 26 };
+        }
+        if word > index && word % 8 == 0 && word >= FIRST_CHILD && word < self.used {
             OctreeNode::Inner { child: word }
         } else {
-            OctreeNode::Leaf { number: word & NUMBER, depth: (word & !LEAF) >> 26 }
+            OctreeNode::Leaf { number: 0, depth: MAX_DEPTH }
         }
     }
 
@@ -185,12 +211,23 @@ impl<'m> Tree<'m> {
         Some(first)
     }
 
-    /// Calls `f` with every node below and including `index`: parents first, children in order.
+    /// Calls `f` with every node below and including `index`: parents first, children in order. Ends after as many nodes
+    /// as there are, and above [`MAX_DEPTH`], whatever memory holds.
     pub(super) fn visit(&self, index: u32, f: &mut impl FnMut(OctreeNode)) {
+        self.visit_some(index, 0, &mut self.nodes(), f);
+    }
+
+    fn visit_some(&self, index: u32, depth: u32, left: &mut u32, f: &mut impl FnMut(OctreeNode)) {
+        if *left == 0 {
+            return;
+        }
+        *left -= 1;
         let node = self.node(index);
         f(node);
-        if let OctreeNode::Inner { child } = node {
-            (child..child + 8).for_each(|c| self.visit(c, f));
+        if let OctreeNode::Inner { child } = node
+            && depth < MAX_DEPTH
+        {
+            (child..child + 8).for_each(|c| self.visit_some(c, depth + 1, left, f));
         }
     }
 

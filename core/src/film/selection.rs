@@ -1,0 +1,150 @@
+//! Sums without the k largest values, by radix selection on the bits of floats: three visits of all values and one that
+//! sums, in fixed memory. Visits can be interrupted between any two values.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Number of counters that a selection needs.
+pub(crate) const DIGITS: usize = 1 << 11;
+
+/// Bits below each digit, and number of digits above: 11, 10 and 10 bits of a non-negative float.
+const SHIFTS: [[u32; 2]; 3] = [[20, 11], [10, 10], [0, 10]];
+
+/// Sums of the non-negative values that are shown, without the `k` largest in `f32`. Of equal values at the limit, as
+/// many are left out as make `k`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Selection {
+    /// Number of values in the sum.
+    pub count: u64,
+    /// Sum of those values.
+    pub sum: f64,
+    /// Sum of their squares.
+    pub sum_sqr: f64,
+    /// Sum of the largest values, which are left out of `sum`: nothing is ever subtracted (NUMERICS STA-4).
+    pub rest: f64,
+    /// Number of values that were shown in one visit.
+    pub shown: u64,
+    /// Values that are still to be left out: of those with the prefix, later of those that are equal to the limit.
+    left: u64,
+    /// Smallest value that is left out; infinite if there is none.
+    pub limit: f32,
+    /// Visit that is under way.
+    visit: u32,
+    /// Bits of the limit that are known.
+    prefix: u32,
+    reserved: u32,
+}
+
+impl Selection {
+    /// Is the first visit under way?
+    pub(crate) fn is_first_visit(&self) -> bool {
+        self.visit == 0
+    }
+
+    /// Begins; `counters` are as many as [`DIGITS`].
+    pub(crate) fn begin(&mut self, counters: &mut [u32]) {
+        *self = Self::default();
+        counters.fill(0);
+    }
+
+    /// Takes the next value of the visit that is under way.
+    #[inline(always)]
+    pub(crate) fn show(&mut self, x: f64, counters: &mut [u32]) {
+        let short = x as f32;
+        let bits = short.to_bits() & 0x7fff_ffff;
+        if let Some([shift, width]) = SHIFTS.get(self.visit as usize) {
+            self.shown += u64::from(self.visit == 0);
+            let above = shift + width;
+            if self.visit == 0 || bits >> above == self.prefix >> above {
+                let digit = (bits >> shift & ((1 << width) - 1)) as usize;
+                if let Some(n) = counters.get_mut(digit) {
+                    *n = n.saturating_add(1);
+                }
+            }
+            return;
+        }
+        let tied = short == self.limit && self.left > 0;
+        self.left -= u64::from(tied);
+        if short > self.limit || tied {
+            self.rest += x;
+        } else {
+            self.count += 1;
+            self.sum += x;
+            self.sum_sqr += x * x;
+        }
+    }
+
+    /// Ends a visit; `k` says of how many values how many are left out. `true` after the last.
+    pub(crate) fn end_visit(&mut self, k: impl Fn(u64) -> u64, counters: &mut [u32]) -> bool {
+        let Some([shift, _]) = SHIFTS.get(self.visit as usize) else { return true };
+        if self.visit == 0 {
+            self.left = k(self.shown);
+        }
+        if self.left == 0 && self.visit == 0 {
+            (self.limit, self.visit) = (f32::INFINITY, SHIFTS.len() as u32);
+        } else {
+            for (digit, n) in (0..counters.len() as u32).zip(&*counters).rev() {
+                if self.left <= u64::from(*n) {
+                    self.prefix |= digit << shift;
+                    break;
+                }
+                self.left -= u64::from(*n);
+            }
+            self.limit = f32::from_bits(self.prefix);
+            self.visit += 1;
+        }
+        counters.fill(0);
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{DIGITS, Selection};
+
+    fn of(k: u64, values: &[f64]) -> Selection {
+        let (mut s, mut counters) = (Selection::default(), [7; DIGITS]);
+        s.begin(&mut counters);
+        loop {
+            values.iter().for_each(|x| s.show(*x, &mut counters));
+            if s.end_visit(|_| k, &mut counters) {
+                return s;
+            }
+        }
+    }
+
+    /// Killed by: leaving out all that is equal to the limit, or none of it.
+    #[test]
+    fn the_largest_are_left_out_and_no_more() {
+        let of = |k: u64, values: &[f64]| {
+            let s = of(k, values);
+            (s.count, s.sum, s.rest)
+        };
+        assert_eq!(of(0, &[1.0, 3.0, 2.0]), (3, 6.0, 0.0));
+        assert_eq!(of(1, &[1.0, 3.0, 2.0]), (2, 3.0, 3.0));
+        assert_eq!(of(2, &[3.0, 3.0, 3.0, 1.0]), (2, 4.0, 6.0));
+        assert_eq!(of(3, &[9.0, 3.0, 3.0, 3.0, 1.0]), (2, 4.0, 15.0));
+        assert_eq!(of(1, &[0.0; 4]), (3, 0.0, 0.0));
+        assert_eq!(of(9, &[2.0, 1.0]), (0, 0.0, 3.0));
+    }
+
+    /// Values that differ in any digit, against sorting. Killed by: a digit that is masked or shifted wrongly, a limit
+    /// that is a neighbour.
+    #[test]
+    fn the_limit_is_the_kth_largest() {
+        let mut x = 1u32;
+        let mut values = [0.0f64; 300];
+        for v in &mut values {
+            x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            *v = f64::from(f32::from_bits(x >> 1 & 0x7eff_ffff));
+        }
+        for k in [1, 2, 17, 150, 299, 300] {
+            let mut sorted = values;
+            sorted.sort_by(|a, b| b.total_cmp(a));
+            let s = of(k, &values);
+            assert_eq!(f64::from(s.limit), sorted[k as usize - 1], "{k}");
+            assert_eq!(s.count, 300 - k);
+            assert_eq!(s.shown, 300);
+        }
+    }
+}

@@ -1,0 +1,284 @@
+//! The end of an iteration: stage by stage, in pieces of any size, with the same bits.
+//!
+//! | stage | reads | changes |
+//! |---|---|---|
+//! | measure | pixels of all shards, four times | variance and cost of the picture, against the estimate before |
+//! | merge | pixels of all shards | film |
+//! | refresh | film | estimate of the pixels: denoised row by row, or means of blocks |
+//! | measure first | pixels of all shards, four times | as `measure`, of the first iteration, against its own estimate |
+//! | discount, absorb, freeze | training of all shards | statistics of the scene, their tree, what look-ups read |
+//! | densities | film, estimate | where adaptive sampling wants samples |
+//! | error | film, four times | estimated error of the picture |
+//!
+//! Work is counted in units of a ray of the tracer, some 300 instructions ([`Budget::rays`]).
+
+use super::{Phase, Session, SessionError};
+use crate::accel::Intersector;
+use crate::counters::Counters;
+use crate::film::Film;
+use crate::learn::LearnedState;
+use crate::light::LightSelector;
+use crate::profile::Profile;
+use crate::record::Finishing;
+use crate::tracer::{Budget, Shard, ShardCursor, StepResult};
+use crate::world::World;
+
+// the stages in order; `START` between iterations
+const START: u32 = 0;
+const MEASURE: u32 = 1;
+const MERGE: u32 = 2;
+const REFRESH: u32 = 3;
+const MEASURE_FIRST: u32 = 4;
+const DISCOUNT: u32 = 5;
+const ABSORB: u32 = 6;
+const FREEZE: u32 = 7;
+const DENSITIES: u32 = 8;
+const ERROR: u32 = 9;
+const DONE: u32 = 10;
+
+/// Pixels whose errors are computed in the time of a ray.
+const MEASURED_PER_RAY: u64 = 3;
+/// Pixels that are merged in the time of a ray.
+const MERGED_PER_RAY: u64 = 1;
+/// Pixels of a denoised row in the time of a ray.
+const DENOISED_PER_RAY: u64 = 3;
+/// Bins that are discounted in the time of a ray.
+const DISCOUNTED_PER_RAY: u64 = 8;
+/// Bins that are absorbed in the time of a ray.
+const ABSORBED_PER_RAY: u64 = 4;
+/// Rays in the time of which the density of a tile is computed.
+const RAYS_PER_DENSITY: u64 = 24;
+/// Pixels whose contribution to the error is computed in the time of a ray.
+const ESTIMATED_PER_RAY: u64 = 2;
+
+/// Shards as callers give them.
+pub(super) trait Shards<'a, 'b: 'a>: IntoIterator<Item = &'a Shard<'b>> + Clone {}
+
+impl<'a, 'b: 'a, T: IntoIterator<Item = &'a Shard<'b>> + Clone> Shards<'a, 'b> for T {}
+
+impl<P: Profile, I: Intersector, L: LightSelector> Session<'_, '_, P, I, L> {
+    /// Goes on with the end of an iteration: merges what the shards gathered, in shard order, learns of it, estimates the
+    /// error. All shards must be there and have finished (or have been stopped and drained), and must be the same ones
+    /// until [`StepResult::Done`]; then the next iteration can begin.
+    ///
+    /// The budget is in units of a ray, as that of [`Shard::step`]; many small calls and one big call give the same
+    /// bits. It is exceeded by less than one piece of work, the largest of which are 17 rows of the picture (the first of
+    /// a level of the denoiser). A budget of 0 checks the shards and does nothing. Until the end the film has the
+    /// iteration in some pixels and not in others, and the estimates of before. [`Session::begin_iteration`] abandons
+    /// what is left to do: pixels that have been merged keep the iteration, others do not.
+    ///
+    /// # Errors
+    /// A shard that is missing, of another plan, or has not finished; the session is as before then.
+    pub fn finish_iteration<'a, 'b: 'a>(
+        &mut self,
+        shards: impl IntoIterator<Item = &'a Shard<'b>> + Clone,
+        budget: Budget,
+    ) -> Result<StepResult, SessionError> {
+        self.check(&shards)?;
+        let mut spent = 0;
+        while spent < budget.rays {
+            spent += self.finish_some(&shards, budget.rays - spent);
+            if self.finishing.stage == DONE {
+                self.finishing = Finishing::default();
+                self.running = false;
+                return Ok(StepResult::Done);
+            }
+        }
+        Ok(StepResult::More)
+    }
+
+    /// [`Self::finish_iteration`] in one call.
+    pub fn end_iteration<'a, 'b: 'a>(
+        &mut self,
+        shards: impl IntoIterator<Item = &'a Shard<'b>> + Clone,
+    ) -> Result<(), SessionError> {
+        self.end_iteration_in_phases(shards, |_| ())
+    }
+
+    /// [`Self::end_iteration`] for hosts with a clock: `passed` is called after each phase.
+    pub fn end_iteration_in_phases<'a, 'b: 'a>(
+        &mut self,
+        shards: impl IntoIterator<Item = &'a Shard<'b>> + Clone,
+        mut passed: impl FnMut(Phase),
+    ) -> Result<(), SessionError> {
+        loop {
+            let before = self.finishing.stage;
+            let done = self.finish_iteration(shards.clone(), Budget { rays: 1 << 14 })? == StepResult::Done;
+            let now = if done { DONE } else { self.finishing.stage };
+            for (end, phase) in [(MERGE, Phase::Merged), (MEASURE_FIRST, Phase::Estimated), (FREEZE, Phase::Learned)] {
+                if before <= end && now > end {
+                    passed(phase);
+                }
+            }
+            if done {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Are these the shards of the iteration, all done?
+    fn check<'a, 'b: 'a>(&self, shards: &impl Shards<'a, 'b>) -> Result<(), SessionError> {
+        if !self.running {
+            return Err(SessionError::NoIteration);
+        }
+        let (mut expected, identity) = (0, World::identity(self));
+        for s in shards.clone() {
+            if s.index() != expected {
+                return Err(SessionError::Shards { expected });
+            }
+            // its sums would go to the wrong pixels
+            if s.settings() != self.plan.settings() {
+                return Err(SessionError::Plan { shard: s.index() });
+            }
+            if !s.is_done(identity) {
+                return Err(SessionError::Unfinished { shard: s.index() });
+            }
+            expected += 1;
+        }
+        if expected != self.plan.settings().shards {
+            return Err(SessionError::Shards { expected });
+        }
+        Ok(())
+    }
+
+    /// Goes to the next stage.
+    fn next_stage(&mut self) {
+        let f = &mut self.finishing;
+        (f.stage, f.shard, f.at, f.cursor) = (f.stage + 1, 0, 0, ShardCursor::default());
+    }
+
+    /// A piece of the current stage, of about `rays` units at most; units done.
+    fn finish_some<'a, 'b: 'a>(&mut self, shards: &impl Shards<'a, 'b>, rays: u64) -> u64 {
+        match self.finishing.stage {
+            START => {
+                let mut counters = Counters::default();
+                shards.clone().into_iter().for_each(|s| counters.merge(s.counters()));
+                self.finishing = Finishing { counters, ..Finishing::default() };
+                self.finishing.selection.begin(self.digits);
+                self.next_stage();
+                1
+            }
+            MEASURE => self.measure(shards, rays, false),
+            MERGE => self.merge(shards, rays),
+            REFRESH => {
+                if self.learned.refresh_row(&self.film) {
+                    self.finishing.selection.begin(self.digits);
+                    self.next_stage();
+                }
+                1 + u64::from(self.film.size()[0]) / DENOISED_PER_RAY
+            }
+            MEASURE_FIRST => self.measure(shards, rays, true),
+            DISCOUNT => {
+                let limit = rays.saturating_mul(DISCOUNTED_PER_RAY) as usize;
+                let (n, done) = self.learned.discount(self.finishing.at as usize, limit);
+                self.finishing.at += n as u64;
+                if done {
+                    self.next_stage();
+                }
+                1 + n as u64 / DISCOUNTED_PER_RAY
+            }
+            ABSORB => self.absorb(shards, rays),
+            FREEZE => {
+                let (work, done) = self.learned.freeze_some();
+                if done {
+                    self.next_stage();
+                }
+                work.max(1)
+            }
+            DENSITIES => {
+                if self.learned.density_of_next(&self.film) {
+                    self.finishing.selection.begin(self.digits);
+                    self.next_stage();
+                }
+                RAYS_PER_DENSITY
+            }
+            ERROR => self.estimate_error(rays),
+            _ => {
+                self.finishing.stage = DONE;
+                1
+            }
+        }
+    }
+
+    /// Measures the picture of the iteration; `first` if it is the first one, and the estimate its own.
+    fn measure<'a, 'b: 'a>(&mut self, shards: &impl Shards<'a, 'b>, rays: u64, first: bool) -> u64 {
+        if !self.learned.measures(first) {
+            self.next_stage();
+            return 1;
+        }
+        let Finishing { selection, cursor, shard, counters, .. } = &mut self.finishing;
+        let (learned, digits) = (&mut self.learned, &mut *self.digits);
+        if let Some(s) = shards.clone().into_iter().nth(*shard as usize) {
+            let first_visit = selection.is_first_visit();
+            let limit = rays.saturating_mul(MEASURED_PER_RAY);
+            let (n, done) = s.visit(cursor, limit, |film, sums, _, _| {
+                learned.show_error(film, sums, selection, digits, first_visit);
+            });
+            if done {
+                (*shard, *cursor) = (*shard + 1, ShardCursor::default());
+            }
+            return 1 + n / MEASURED_PER_RAY;
+        }
+        (*shard, *cursor) = (0, ShardCursor::default());
+        if selection.end_visit(LearnedState::outliers, digits) {
+            learned.picture_measured(selection, counters);
+            self.next_stage();
+        }
+        8
+    }
+
+    /// Merges pixels into the film.
+    fn merge<'a, 'b: 'a>(&mut self, shards: &impl Shards<'a, 'b>, rays: u64) -> u64 {
+        let Finishing { cursor, shard, counters, .. } = &mut self.finishing;
+        let (film, learned) = (&mut self.film, &self.learned);
+        if let Some(s) = shards.clone().into_iter().nth(*shard as usize) {
+            let limit = rays.saturating_mul(MERGED_PER_RAY);
+            let (n, done) = s.visit(cursor, limit, |i, sums, rays, aov| {
+                film.merge(i, sums, rays, aov, learned.weight_of(i));
+            });
+            if done {
+                (*shard, *cursor) = (*shard + 1, ShardCursor::default());
+            }
+            return 1 + n / MERGED_PER_RAY;
+        }
+        film.end_merge();
+        self.counters.merge(counters);
+        self.learned.begin_refresh();
+        self.next_stage();
+        1
+    }
+
+    /// Adds what the shards learned of the scene.
+    fn absorb<'a, 'b: 'a>(&mut self, shards: &impl Shards<'a, 'b>, rays: u64) -> u64 {
+        let f = &mut self.finishing;
+        let Some(s) = shards.clone().into_iter().nth(f.shard as usize) else {
+            self.learned.begin_freeze();
+            self.next_stage();
+            return 1;
+        };
+        let limit = rays.saturating_mul(ABSORBED_PER_RAY) as usize;
+        let (n, done) = s.training().map_or((0, true), |t| self.learned.absorb(t, f.at as usize, limit));
+        f.at += n as u64;
+        if done {
+            (f.shard, f.at) = (f.shard + 1, 0);
+        }
+        1 + n as u64 / ABSORBED_PER_RAY
+    }
+
+    /// Estimates the error of the film.
+    fn estimate_error(&mut self, rays: u64) -> u64 {
+        let Finishing { selection, at, .. } = &mut self.finishing;
+        let limit = rays.saturating_mul(ESTIMATED_PER_RAY).min(1 << 30) as usize;
+        let n = self.film.show_errors(*at as usize, limit, selection, self.digits);
+        *at += n as u64;
+        if *at < self.film.len() as u64 {
+            return 1 + n as u64 / ESTIMATED_PER_RAY;
+        }
+        *at = 0;
+        if selection.end_visit(Film::outliers, self.digits) {
+            self.film.estimate_error(selection);
+            self.next_stage();
+        }
+        8 + n as u64 / ESTIMATED_PER_RAY
+    }
+}

@@ -1,0 +1,230 @@
+//! Every call is bounded: the end of an iteration in pieces, sessions that start without touching memory, unfinished
+//! pixels.
+
+use croupier::unstable::World;
+use croupier::unstable::learn::{Learning, PixelEstimator};
+use croupier::{Budget, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
+use croupier_host::blob::AlignedBytes;
+use croupier_tests::runner::{finish, settings};
+use croupier_tests::scenes::*;
+use croupier_tests::stats::SplitMix;
+
+fn memory(bytes: usize, byte: u8) -> AlignedBytes {
+    let mut block = AlignedBytes::zeroed(bytes);
+    block.as_mut().fill(byte);
+    block
+}
+
+fn cases(bytes: &[u8]) -> Vec<Settings> {
+    let learning = Learning { cache_bytes: 1 << 20, subdivide_count: 300.0, ..Learning::default() };
+    let blocks = Learning { pixel_estimator: PixelEstimator::Blocks, ..learning };
+    let of = |strategy: &str, aovs, adaptive, learning| Settings {
+        aovs,
+        adaptive,
+        learning,
+        shards: 3,
+        ..settings(bytes, strategy)
+    };
+    vec![
+        of("classic", false, false, learning),
+        of("ears", true, false, learning),
+        of("ears", false, true, blocks),
+        of("bolin-meyer", true, true, learning),
+    ]
+}
+
+/// All that a session shows.
+fn everything(session: &Session<'_, '_>) -> Vec<u8> {
+    let film = session.film();
+    let mut all = format!("{:?} {:?} {:?}", session.counters(), film.error_estimate(), session.picture_statistics());
+    all += &format!("{:?}", session.estimate());
+    let mut all = all.into_bytes();
+    all.extend_from_slice(bytemuck::cast_slice(&film.pixels().collect::<Vec<_>>()));
+    all.extend_from_slice(bytemuck::cast_slice(film.aovs()));
+    if let Some(cache) = session.cache() {
+        let mut saved = vec![0; cache.saved_len()];
+        cache.save(&mut saved).unwrap();
+        all.extend(saved);
+    }
+    all
+}
+
+/// Renders four iterations, whose ends are divided by `budget`; `resume` suspends and resumes the session before every
+/// piece. What the session shows, and the most pieces of an end.
+fn render(scene: Scene<'_>, s: &Settings, resume: bool, budget: &mut dyn FnMut() -> u64) -> (Vec<u8>, u32) {
+    let plan = Plan::new(s).unwrap();
+    let mut block = memory(plan.session().size, 0xff);
+    let mut own: Vec<_> = (0..s.shards).map(|i| memory(plan.shard_of(i).size, 0xff)).collect();
+    let mut shards: Vec<_> =
+        own.iter_mut().enumerate().map(|(i, b)| Shard::new(&plan, i as u32, b.as_mut()).unwrap()).collect();
+    let mut most = 0;
+    Session::new(scene, &plan, block.as_mut()).unwrap().suspend();
+    for samples in [4, 8, 3, 8] {
+        let mut session = Session::resume(scene, &plan, block.as_mut()).unwrap();
+        session.begin_iteration(samples);
+        shards.iter_mut().for_each(|s| finish(&session, s, 1000));
+        let mut pieces = 1;
+        while session.finish_iteration(&shards, Budget { rays: budget() }).unwrap() == StepResult::More {
+            pieces += 1;
+            if resume {
+                session.suspend();
+                session = Session::resume(scene, &plan, block.as_mut()).unwrap();
+            }
+        }
+        most = most.max(pieces);
+        assert_eq!(session.finish_iteration(&shards, Budget { rays: 1 }), Err(SessionError::NoIteration));
+        session.suspend();
+    }
+    let session = Session::resume(scene, &plan, block.as_mut()).unwrap();
+    (everything(&session), most)
+}
+
+/// Killed by: state that lives in a local variable of a piece, a cursor that skips or repeats, a stage without an end, a
+/// scalar that is not suspended.
+#[test]
+fn pieces_of_any_size_give_the_same_bits() {
+    let bytes = blob(&cornell([37, 21]));
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    for s in cases(&bytes) {
+        let (whole, one) = render(scene, &s, false, &mut || u64::MAX);
+        assert_eq!(one, 1);
+        for (resume, seed) in [(false, 1), (true, 2)] {
+            let mut rng = SplitMix(seed);
+            let (pieces, most) = render(scene, &s, resume, &mut || rng.bits() % 200);
+            assert!(most > 10, "{}: {most} pieces", s.strategy);
+            assert!(pieces == whole, "{}, resume {resume}", s.strategy);
+        }
+        let (pieces, most) = render(scene, &s, false, &mut || 1);
+        assert!(most > 300, "{}: {most} pieces", s.strategy);
+        assert!(pieces == whole, "{}, the smallest pieces", s.strategy);
+    }
+}
+
+/// Killed by: pieces that do not look whether the shards are those of the iteration, a budget of 0 that works.
+#[test]
+fn shards_are_checked_at_every_piece() {
+    let bytes = blob(&cornell([37, 21]));
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    let s = Settings { shards: 2, ..cases(&bytes)[1] };
+    let plan = Plan::new(&s).unwrap();
+    let mut block = memory(plan.session().size, 0);
+    let mut own: Vec<_> = (0..s.shards).map(|i| memory(plan.shard_of(i).size, 0)).collect();
+    let mut shards: Vec<_> =
+        own.iter_mut().enumerate().map(|(i, b)| Shard::new(&plan, i as u32, b.as_mut()).unwrap()).collect();
+    let mut session = Session::new(scene, &plan, block.as_mut()).unwrap();
+    session.begin_iteration(2);
+    shards.iter_mut().for_each(|s| finish(&session, s, 1000));
+    let some = Budget { rays: 10 };
+    for _ in 0..1000 {
+        assert_eq!(session.finish_iteration(&shards, Budget { rays: 0 }), Ok(StepResult::More));
+    }
+    assert_eq!(session.finish_iteration(&shards, some), Ok(StepResult::More));
+    assert_eq!(session.finish_iteration(&shards[..1], some), Err(SessionError::Shards { expected: 1 }));
+    assert_eq!(session.finish_iteration(&shards, some), Ok(StepResult::More));
+    let mut other = memory(plan.shard_of(1).size, 0);
+    shards[1] = Shard::new(&plan, 1, other.as_mut()).unwrap();
+    assert_eq!(session.finish_iteration(&shards, some), Err(SessionError::Unfinished { shard: 1 }));
+    // the shard can be rendered again: the same sums
+    finish(&session, &mut shards[1], 1 << 20);
+    while session.finish_iteration(&shards, some).unwrap() == StepResult::More {}
+    assert!(session.film().pixels().all(|p| p.samples == 2));
+}
+
+/// Starting a session and shards, beginning an iteration and joining it write to no memory that grows with the picture.
+/// Killed by: a slab that is cleared at the start (its bytes are no longer those that the block came with).
+#[test]
+fn the_start_touches_no_memory_of_pixels() {
+    let bytes = blob(&cornell([8, 8]));
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    for s in cases(&bytes) {
+        let changed = |size: [u32; 2]| {
+            let s = Settings { size, shards: 1, ..s };
+            let plan = Plan::new(&s).unwrap();
+            let (mut block, mut own) = (memory(plan.session().size, 0xa5), memory(plan.shard().size, 0xa5));
+            let mut session = Session::new(scene, &plan, block.as_mut()).unwrap();
+            let mut shard = Shard::new(&plan, 0, own.as_mut()).unwrap();
+            session.begin_iteration(3);
+            let _ = shard.step(&session, Budget { rays: 1 });
+            session.restart(false);
+            session.begin_iteration(3);
+            let _ = shard.step(&session, Budget { rays: 1 });
+            drop(session);
+            drop(shard);
+            let count = |b: &AlignedBytes| b.as_ref().iter().filter(|b| **b != 0xa5).count();
+            count(&block) + count(&own)
+        };
+        let (small, large) = (changed([64, 64]), changed([512, 512]));
+        assert!(large < small + 20_000, "{}: {small} and {large} bytes written", s.strategy);
+    }
+}
+
+/// Pixels of an iteration that runs: their samples are those of the finished ones, and at the end the film's. Killed by:
+/// sums of an iteration before, pixels that have not begun, means over the samples that were begun.
+#[test]
+fn pixels_of_an_unfinished_iteration_can_be_read() {
+    let bytes = blob(&cornell([37, 21]));
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    let s = Settings { shards: 2, ..settings(&bytes, "classic") };
+    let plan = Plan::new(&s).unwrap();
+    let mut block = memory(plan.session().size, 0xff);
+    let mut own: Vec<_> = (0..s.shards).map(|i| memory(plan.shard_of(i).size, 0xff)).collect();
+    let mut shards: Vec<_> =
+        own.iter_mut().enumerate().map(|(i, b)| Shard::new(&plan, i as u32, b.as_mut()).unwrap()).collect();
+    let mut session = Session::new(scene, &plan, block.as_mut()).unwrap();
+    for round in 0..2 {
+        session.begin_iteration(4);
+        let mut before = 0;
+        for steps in 0..4 {
+            let mut samples = 0;
+            for shard in &mut shards {
+                let _ = shard.step(&session, Budget { rays: 500 });
+                shard.for_each_pixel(|film, mean, n| {
+                    assert!(film < 37 * 21 && n <= 4 && mean.iter().all(|x| x.is_finite()));
+                    samples += u64::from(n);
+                });
+                samples -= shard.counters().camera_samples;
+            }
+            assert_eq!(samples, 0, "round {round}, step {steps}");
+            let begun: u64 = shards.iter().map(|s| s.counters().camera_samples).sum();
+            assert!(begun > before && begun < 4 * 37 * 21);
+            before = begun;
+        }
+        shards.iter_mut().for_each(|s| finish(&session, s, 1 << 20));
+        let mut seen = vec![[0.0; 3]; 37 * 21];
+        shards.iter().for_each(|s| s.for_each_pixel(|film, mean, _| seen[film] = mean));
+        session.end_iteration(&shards).unwrap();
+        if round == 0 {
+            let film: Vec<_> = session.film().pixels().map(|p| p.mean()).collect();
+            assert_eq!(film, seen);
+        }
+    }
+    assert_eq!(session.identity().epoch, 0);
+}
+
+/// Bytes per pixel at 1920x1080, blocks of the session and of all shards. Killed by: another plane, a slot for pixels
+/// that a shard does not have.
+#[test]
+fn memory_per_pixel_is_as_stated() {
+    let bytes = blob(&cornell([8, 8]));
+    let per_pixel = |s: Settings| {
+        let plan = Plan::new(&s).unwrap();
+        let shards: usize = (0..s.shards).map(|i| plan.shard_of(i).size).sum();
+        (plan.session().size + shards) as f64 / (f64::from(s.size[0]) * f64::from(s.size[1]))
+    };
+    for shards in [1, 16] {
+        let of = |strategy: &str, aovs: bool| {
+            per_pixel(Settings { size: [1920, 1080], shards, aovs, ..settings(&bytes, strategy) })
+        };
+        println!("{shards} shards: classic {:.1}, ears {:.1} bytes", of("classic", false), of("ears", true));
+        assert!(of("classic", false) < 82.0, "{}", of("classic", false));
+    }
+    // pictures of one row or column cost what their pixels do, besides the fixed part of each shard
+    let fixed =
+        Plan::new(&Settings { size: [1, 1], shards: 2, ..settings(&bytes, "classic") }).unwrap().shard_of(1).size;
+    for size in [[1, 65_536], [65_536, 1]] {
+        let plan = Plan::new(&Settings { size, shards: 256, ..settings(&bytes, "classic") }).unwrap();
+        let pixels: usize = (0..256).map(|i| plan.shard_of(i).size - fixed).sum();
+        assert!(pixels <= 65_536 * 40 + 256 * 64, "{size:?}: {pixels} bytes");
+        assert!(plan.shard().size - fixed <= 3 * 40 * 256, "{size:?}: {} bytes", plan.shard().size - fixed);
+    }
+}
