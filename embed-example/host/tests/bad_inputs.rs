@@ -471,7 +471,7 @@ fn inputs_are_never_written() {
 fn endless_files_are_refused() {
     use std::os::unix::fs::symlink;
     let dir = tempfile::tempdir().unwrap();
-    assert!(std::process::Command::new("mkfifo").arg(dir.path().join("pipe.obj")).status().unwrap().success());
+    assert!(Command::new("mkfifo").arg(dir.path().join("pipe.obj")).status().unwrap().success());
     symlink("pipe.obj", dir.path().join("pipe.crp")).unwrap();
     symlink("/dev/zero", dir.path().join("zero.obj")).unwrap();
     symlink("/dev/zero", dir.path().join("zero.png")).unwrap();
