@@ -253,6 +253,17 @@ fn jpeg_textures_are_read() {
     near(191, [255, 255, 255, 255]);
     let grey = read(&jpeg(&[&[200], &[7]]), "grey.png").unwrap();
     assert_eq!((grey.texels[0], grey.texels[15]), ([200, 200, 200, 255], [7, 7, 7, 255]));
+    // padding, a preview
+    for behind in [&[0; 100][..], &colours] {
+        let folder = folder(&[("a.obj", TRIANGLE), ("a.mtl", "newmtl m\nmap_Kd wood.jpg\n")]);
+        fs::write(folder.path().join("wood.jpg"), [&colours, behind].concat()).unwrap();
+        let (scene, report) = load(&folder.path().join("a.obj")).unwrap();
+        assert_eq!(scene.textures[0].texels, t.texels);
+        assert!(report.notes.iter().any(|n| n.contains("a.mtl:2") && n.contains("behind the end")), "{report:?}");
+        let strict = LoadOptions { strict: true, ..LoadOptions::default() };
+        let error = load_with(&folder.path().join("a.obj"), &strict).unwrap_err().to_string();
+        assert!(error.contains("wood.jpg") && error.contains("behind the end"), "{error}");
+    }
     let mut rng = SplitMix(1);
     let noise: Vec<[u8; 3]> = (0..30).map(|_| [(); 3].map(|()| rng.word() as u8)).collect();
     let noise = jpeg(&noise.iter().map(|b| b.as_slice()).collect::<Vec<_>>());

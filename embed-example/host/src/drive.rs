@@ -13,6 +13,7 @@ pub use observe::{Observer, Progress, Target, Unobserved};
 pub use result::{CacheRecord, IterationRecord, Rendered};
 
 use crate::blob::AlignedBytes;
+use crate::checkpoint::{self, Schedule};
 use croupier::unstable::Phase;
 use croupier::unstable::accel::Intersector;
 use croupier::unstable::learn::cache::{Cache, CacheError};
@@ -21,8 +22,9 @@ use croupier::unstable::rrs::Space;
 use croupier::{Budget, Counters, ErrorEstimate, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
 use rayon::prelude::*;
 use schedule::Work;
+use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Rays of a shard between two calls of [`Observer::progress`] and [`Observer::stop`].
 const STEP_RAYS: u64 = 1 << 16;
@@ -45,12 +47,26 @@ pub struct Options<'a> {
     pub save_cache: bool,
     /// Measurement, in the end, of look-ups and of recording samples.
     pub calibrate: bool,
+    /// Checkpoints to write while the render runs.
+    pub checkpoint: Option<&'a Schedule>,
+    /// Checkpoint of a render of the same scene and settings to go on from.
+    pub resume: Option<&'a Path>,
 }
 
 impl Options<'_> {
     /// Defaults: one thread per processor, the built-in pixel estimate, an empty cache that is not saved.
     pub fn new(settings: Settings, target: Target) -> Self {
-        Self { settings, target, threads: 0, pixel_estimate: None, cache: None, save_cache: false, calibrate: false }
+        Self {
+            settings,
+            target,
+            threads: 0,
+            pixel_estimate: None,
+            cache: None,
+            save_cache: false,
+            calibrate: false,
+            checkpoint: None,
+            resume: None,
+        }
     }
 }
 
@@ -93,7 +109,12 @@ pub fn drive_with<P: Profile + Send + Sync>(
     let block = |size: usize| AlignedBytes::try_zeroed(size).ok_or(DriveError::Memory(size));
     let mut shared = block(plan.session().size)?;
     let mut blocks = (0..settings.shards).map(|_| block(plan.shard().size)).collect::<Result<Vec<_>, _>>()?;
-    let mut session = Session::builder(scene).profile::<P>().build(&plan, shared.as_mut())?;
+    let saved = options.resume.map(|path| checkpoint::read(path, scene.hash, settings, shared.as_mut())).transpose()?;
+    let builder = || Session::builder(scene).profile::<P>();
+    let mut session = match &saved {
+        Some(_) => builder().resume(&plan, shared.as_mut())?,
+        None => builder().build(&plan, shared.as_mut())?,
+    };
     let mut shards = Vec::with_capacity(blocks.len());
     for (i, b) in blocks.iter_mut().enumerate() {
         shards.push(Shard::new(&plan, i as u32, b.as_mut())?);
@@ -104,30 +125,48 @@ pub fn drive_with<P: Profile + Send + Sync>(
     if let Some((bytes, cache)) = options.cache.zip(session.cache_mut()) {
         cache.load(bytes)?;
     }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build()?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads(options.threads, shards.len())).build()?;
 
-    // later by every pause for the observer
+    let checkpoint::Progress { work: mut all, mut begun, mut iterations } = saved.unwrap_or_default();
+    // later by every pause for the observer, earlier by the work before a break
     let mut start = Instant::now();
-    let mut iterations: Vec<IterationRecord> = Vec::new();
-    let mut all = Work::default();
+    let before = Duration::try_from_secs_f64(all.seconds).unwrap_or_default();
+    start = start.checked_sub(before).unwrap_or(start);
+    let mut saver = Saver { options, scene: scene.hash, last: Instant::now(), saved: 0, error: None };
     let mut stopped_early = false;
     while !stopped_early {
         let (last, error) = iterations.last().map_or((Work::default(), None), |i| (i.work, Some(i.error)));
         let now = Work { seconds: observer.seconds().unwrap_or_else(|| start.elapsed().as_secs_f64()), ..all };
-        let samples = schedule::next(options.target, learns(settings), &now, &last, error);
-        if samples == 0 {
-            break;
-        }
+        let next = begun.unwrap_or_else(|| schedule::next(options.target, learns(settings), &now, &last, error));
         // shards of a small picture finish in a single step and never ask the observer
-        if all.samples > 0 && observer.stop() {
-            stopped_early = true;
+        stopped_early = next > 0 && all.samples > 0 && observer.stop();
+        let done = next == 0 || stopped_early;
+        if begun.is_none() && saver.due(all.samples, done) {
+            let pause = Instant::now();
+            session.suspend();
+            let progress = checkpoint::Progress { work: now, begun, iterations: iterations.clone() };
+            saver.save(&progress, &shared);
+            session = builder().resume(&plan, shared.as_mut())?;
+            start += pause.elapsed();
+        }
+        if done {
             break;
         }
-        let begun = Instant::now();
-        session.begin_iteration(samples);
+        let iteration_start = Instant::now();
+        let samples = next;
+        if begun.take().is_none() {
+            session.begin_iteration(samples);
+        }
         let run = Run { session: &session, observer, start, all, last, samples, error, rays: AtomicU64::new(0) };
         stopped_early = pool.install(|| run.all(&mut shards));
-        let mut record = end_iteration(&mut session, &shards, begun)?;
+        if stopped_early && saver.wanted() {
+            // The iteration under way, as it was before anything of it was merged: resumed, it is traced anew.
+            session.suspend();
+            let progress = checkpoint::Progress { work: now, begun: Some(samples), iterations: iterations.clone() };
+            saver.save(&progress, &shared);
+            session = builder().resume(&plan, shared.as_mut())?;
+        }
+        let mut record = end_iteration(&mut session, &shards, iteration_start)?;
         record.work.samples = samples;
         if let Some(seconds) = observer.seconds() {
             record.work.seconds = seconds - now.seconds;
@@ -138,7 +177,7 @@ pub fn drive_with<P: Profile + Send + Sync>(
             break;
         }
         all.samples = all.samples.saturating_add(samples);
-        all.rays += record.work.rays;
+        all.rays = all.rays.saturating_add(record.work.rays);
         let pause = Instant::now();
         observer.iteration(session.film(), (pause - start).as_secs_f64());
         start += pause.elapsed();
@@ -157,6 +196,7 @@ pub fn drive_with<P: Profile + Send + Sync>(
         profile: P::NAME,
         memory: [plan.session().size, plan.shard().size * shards.len()],
         stopped_early,
+        checkpoint_error: saver.error,
         threads: pool.current_num_threads().min(shards.len()),
         iterations,
         cache: used.filter(|_| options.save_cache).map(save).transpose()?,
@@ -164,10 +204,48 @@ pub fn drive_with<P: Profile + Send + Sync>(
     })
 }
 
+/// Threads of a render with so many shards: more would have nothing to do.
+fn threads(wanted: usize, shards: usize) -> usize {
+    let wanted = if wanted == 0 { std::thread::available_parallelism().map_or(1, usize::from) } else { wanted };
+    wanted.min(shards).max(1)
+}
+
 /// Fails unless the settings keep statistics of the scene, which a cache holds.
 pub(crate) fn needs_cache(settings: &Settings) -> Result<(), DriveError> {
     let strategy = settings.strategy;
     if strategy.space() == Some(Space::Scene) { Ok(()) } else { Err(DriveError::NoCache(strategy.name())) }
+}
+
+/// Checkpoints of a render.
+struct Saver<'a> {
+    options: &'a Options<'a>,
+    /// Content hash of the scene.
+    scene: u64,
+    last: Instant,
+    /// Samples per pixel of the last checkpoint.
+    saved: u32,
+    /// First error of writing one. The render goes on.
+    error: Option<String>,
+}
+
+impl Saver<'_> {
+    fn wanted(&self) -> bool {
+        self.options.checkpoint.is_some() && self.error.is_none()
+    }
+
+    /// Is it time for one, with so many samples per pixel? At the end if anything is new.
+    fn due(&self, samples: u32, done: bool) -> bool {
+        let every = self.options.checkpoint.map_or(f64::INFINITY, |c| c.every);
+        self.wanted() && samples > self.saved && (done || self.last.elapsed().as_secs_f64() >= every)
+    }
+
+    fn save(&mut self, progress: &checkpoint::Progress, block: &AlignedBytes) {
+        let Some(schedule) = self.options.checkpoint else { return };
+        let written = checkpoint::write(&schedule.path, self.scene, &self.options.settings, progress, block);
+        self.error = written.err().map(|e| e.to_string());
+        self.last = Instant::now();
+        self.saved = progress.work.samples;
+    }
 }
 
 /// Does anything learn between iterations, so that the cost of a camera sample changes?

@@ -8,11 +8,13 @@
 //! Values are linear Rec. 709, 32-bit float, compressed without loss: what is read is bit for bit what was written,
 //! NaN and infinities included.
 
+use crate::text;
 use exr::prelude as openexr;
 use exr::prelude::{ReadChannels, ReadLayers, WritableImage};
 use std::fs::{self, File};
 use std::io::{self, BufReader, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::{error, fmt};
 
 /// One named plane of a [`Layer`].
@@ -85,11 +87,11 @@ pub enum ImageError {
 impl fmt::Display for ImageError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Read(path, e) => write!(f, "cannot read {}: {e}", path.display()),
-            Self::Write(path, e) => write!(f, "cannot write {}: {e}", path.display()),
-            Self::Decode(path, e) => write!(f, "{} is not a readable EXR image: {e}", path.display()),
-            Self::Encode(path, e) => write!(f, "cannot write {}: {e}", path.display()),
-            Self::NoRgb(path) => write!(f, "{} has no layer with channels R, G and B", path.display()),
+            Self::Read(path, e) => write!(f, "cannot read {}: {e}", text::path(path)),
+            Self::Write(path, e) => write!(f, "cannot write {}: {e}", text::path(path)),
+            Self::Decode(path, e) => write!(f, "{} is not a readable EXR image: {e}", text::path(path)),
+            Self::Encode(path, e) => write!(f, "cannot write {}: {e}", text::path(path)),
+            Self::NoRgb(path) => write!(f, "{} has no layer with channels R, G and B", text::path(path)),
             Self::Size { path, channel, pixels, values } => {
                 write!(f, "{}: channel {channel} has {values} values for {pixels} pixels", path.display())
             }
@@ -284,6 +286,59 @@ pub fn part_name(path: &Path) -> PathBuf {
     part.into()
 }
 
+/// Temporary files of writes under way.
+static PARTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn parts() -> MutexGuard<'static, Vec<PathBuf>> {
+    PARTS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the temporary files of all writes under way, and lets no other begin, for good: what begins to write waits.
+/// For a program that ends at once, because of a signal perhaps.
+pub fn remove_parts() {
+    let parts = parts();
+    for part in parts.iter() {
+        // Best effort: there is nobody left to tell.
+        let _ = fs::remove_file(part);
+    }
+    std::mem::forget(parts);
+}
+
+/// A temporary file that disappears unless it is renamed.
+struct Part(PathBuf);
+
+impl Part {
+    fn create(path: &Path) -> io::Result<(Self, File)> {
+        let part = part_name(path);
+        // Known before it exists.
+        let mut parts = parts();
+        let file = File::create(&part)?;
+        parts.push(part.clone());
+        Ok((Self(part), file))
+    }
+
+    fn rename(self, path: &Path) -> io::Result<()> {
+        fs::rename(&self.0, path)
+    }
+}
+
+impl Drop for Part {
+    fn drop(&mut self) {
+        let mut parts = parts();
+        parts.retain(|p| *p != self.0);
+        // Best effort: the error that matters is the first one. After a renaming there is no such file.
+        let _ = fs::remove_file(&self.0);
+    }
+}
+
+/// Whether a file of this name could be written: makes and removes its temporary file.
+///
+/// # Errors
+/// That of making it.
+pub fn try_write(path: &Path) -> io::Result<()> {
+    Part::create(path).map(drop)
+}
+
 /// Writes a file under a temporary name beside it and renames it, so that nobody ever reads half a file and an older
 /// file of that name, mapped into memory perhaps, stays as it was.
 pub fn write_whole(
@@ -291,14 +346,10 @@ pub fn write_whole(
     write: impl FnOnce(&mut BufWriter<File>) -> Result<(), ImageError>,
 ) -> Result<(), ImageError> {
     let failed = |e: io::Error| ImageError::Write(path.into(), e);
-    let part = part_name(path);
-    let mut out = BufWriter::new(File::create(&part).map_err(failed)?);
-    let done = write(&mut out).and_then(|()| out.flush().map_err(failed));
+    let (part, file) = Part::create(path).map_err(failed)?;
+    let mut out = BufWriter::new(file);
+    write(&mut out)?;
+    out.flush().map_err(failed)?;
     drop(out);
-    let done = done.and_then(|()| fs::rename(&part, path).map_err(failed));
-    if done.is_err() {
-        // Best effort: the error that matters is the first one.
-        let _ = fs::remove_file(&part);
-    }
-    done
+    part.rename(path).map_err(failed)
 }

@@ -9,7 +9,9 @@
 //! | [`blob`] | the blob's layout on disk and in memory | what sections mean |
 //! | [`effects`] | reasons for a scene's effects | files |
 //! | [`drive`] | memory, threads, iterations around the core | files |
+//! | [`checkpoint`] | files that a render goes on from | how light is transported |
 //! | [`render`] | options in, pictures with layers out | how light is transported |
+//! | [`memory`] | bytes of a render against those of the machine | files of scenes |
 //! | [`statistics`] | figures of a render as tables | files |
 //! | [`image`], [`tonemap`], [`false_color`] | EXR and PNG | scenes |
 //! | [`compare`], [`flip`] | how far two pictures differ | scenes |
@@ -20,6 +22,7 @@ pub mod bake;
 pub mod blob;
 pub mod builtin;
 pub mod bvh;
+pub mod checkpoint;
 pub mod compare;
 pub mod compensation;
 pub mod description;
@@ -30,6 +33,7 @@ pub mod false_color;
 pub mod flip;
 pub mod image;
 pub mod load;
+pub mod memory;
 pub mod microfacet;
 pub mod principled;
 pub mod render;

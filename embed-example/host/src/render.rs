@@ -2,6 +2,7 @@
 
 pub use crate::drive::{DriveError as RenderError, Observer, Progress, Target};
 
+use crate::checkpoint::Schedule;
 use crate::drive::{self, Options, Rendered, drive_scene};
 use crate::image::Picture;
 use crate::statistics::Statistics;
@@ -16,6 +17,7 @@ use croupier::{Plan, Scene, Settings, SettingsError, Strategy};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
+use std::path::PathBuf;
 
 /// Options of a render, besides the scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +36,10 @@ pub struct RenderOptions {
     pub denoise: bool,
     /// Measurement of look-ups and of recording samples, for [`Statistics::time`].
     pub calibrate: bool,
+    /// Checkpoints to write while the render runs.
+    pub checkpoint: Option<Schedule>,
+    /// Checkpoint of a render of the same scene and settings to go on from.
+    pub resume: Option<PathBuf>,
 }
 
 impl RenderOptions {
@@ -55,6 +61,8 @@ impl RenderOptions {
             save_cache: false,
             denoise: false,
             calibrate: false,
+            checkpoint: None,
+            resume: None,
         }
     }
 
@@ -117,6 +125,8 @@ pub struct RenderResult {
     pub cache: Option<Vec<u8>>,
     /// Whether the observer ended the render before its target.
     pub stopped_early: bool,
+    /// Error of the first checkpoint that could not be written.
+    pub checkpoint_error: Option<String>,
 }
 
 /// Memory that a render of a scene takes.
@@ -201,6 +211,8 @@ pub fn render_scene(
         cache: options.cache.as_deref(),
         save_cache: options.save_cache,
         calibrate: options.calibrate,
+        checkpoint: options.checkpoint.as_ref(),
+        resume: options.resume.as_deref(),
         ..Options::new(settings, options.target)
     };
     let rendered = drive_scene(scene, &o, observer)?;
@@ -215,6 +227,7 @@ pub fn render_scene(
         plan,
         cache: rendered.cache,
         stopped_early: rendered.stopped_early,
+        checkpoint_error: rendered.checkpoint_error,
     })
 }
 

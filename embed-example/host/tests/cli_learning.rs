@@ -180,7 +180,10 @@ fn wrong_files_are_named_before_rendering() {
         let out = render(dir, &[&["--spp", "1"], arguments].concat());
         let error = text(&out.stderr);
         assert_eq!(out.status.code(), Some(1), "{arguments:?}: {error}");
-        assert!(error.lines().count() == 1 && out.stdout.is_empty(), "{arguments:?}: {error}");
+        assert!(
+            error.lines().count() == 1 && !text(&out.stdout).contains("samples per pixel"),
+            "{arguments:?}: {error}"
+        );
         assert!(parts.iter().all(|p| error.contains(p)), "{arguments:?}: {error}");
     };
     let ears = |more: &[&str], parts: &[&str]| fails(&[&["--rrs", "ears"], more].concat(), parts);
@@ -201,7 +204,7 @@ fn wrong_files_are_named_before_rendering() {
     fails(&["-o", "b.exr"], &["cannot write b.png", "it is a folder"]);
     fails(&["-o", "c.exr", "--false-color"], &["cannot write c.cost.png", "it is a folder"]);
     let long = format!("{}.exr", "x".repeat(250));
-    fails(&["-o", &long], &["cannot write xxx", "too long"]);
+    fails(&["-o", &long], &["cannot write ...xxx", "too long"]);
     ears(&["-o", "d.exr", "--cache-out", "d.png"], &["cannot write d.png", "share"]);
     beside.iter().for_each(|name| std::fs::remove_dir(name).unwrap());
     fails(&["--rrs", "classic", "--cache-out", "x.cache"], &["`classic`", "no cache"]);
@@ -380,46 +383,10 @@ fn all_that_is_learned_fits_in_256_kib() {
         bytes("shard_bytes"),
         bytes("learning_bytes")
     );
-    for out in [run("info", &[]), run("render", &["--spp", "1"])] {
+    for out in [run("info", &[]), run("render", &["--spp", "1", "--stats"])] {
         assert!(text(&out.stdout).contains(&said), "{said}: {}", text(&out.stdout));
     }
     // nothing is learned
     let plain = json(&croupier(dir.path(), &["info", "--rrs", "classic", "--json"]));
     assert_eq!(plain["plan"]["learning_bytes"], 0);
-}
-
-/// Killed by: a Ctrl-C after which the statistics or the pictures are lost.
-#[cfg(target_os = "linux")]
-#[test]
-fn everything_is_saved_after_ctrl_c() {
-    let dir = tempfile::tempdir().unwrap();
-    let arguments = ["render", "--size", "16x16", "--threads", "1", "--rrs", "ears", "--seconds", "1000000", "--json"];
-    let mut child = Command::new(env!("CARGO_BIN_EXE_croupier"))
-        .args(arguments)
-        .args(["--cache-out", "a.cache"])
-        .current_dir(dir.path())
-        .stdout(std::process::Stdio::piped())
-        .spawn()
-        .unwrap();
-    // until the program catches SIGINT (number 2)
-    let id = child.id();
-    let catches = || {
-        let status = std::fs::read_to_string(format!("/proc/{id}/status")).unwrap();
-        let caught = status.lines().find_map(|l| l.strip_prefix("SigCgt:")).unwrap().trim();
-        u64::from_str_radix(caught, 16).unwrap() >> 1 & 1 == 1
-    };
-    while !catches() {
-        assert!(child.try_wait().unwrap().is_none(), "ended before Ctrl-C");
-        std::thread::sleep(std::time::Duration::from_millis(20));
-    }
-    assert!(Command::new("kill").args(["-INT", &id.to_string()]).status().unwrap().success());
-    assert!(child.wait().unwrap().success());
-    let mut said = String::new();
-    std::io::Read::read_to_string(&mut child.stdout.take().unwrap(), &mut said).unwrap();
-    let said: serde_json::Value = serde_json::from_str(&said).unwrap();
-    assert_eq!(said["stopped_early"], true);
-    assert!(std::fs::read(dir.path().join("a.cache")).unwrap().starts_with(b"CRPCACHE"));
-    let exr = Picture::read_exr(&dir.path().join("croupier.exr")).unwrap();
-    assert!((exr.width, exr.height) == (16, 16) && exr.rgb("").unwrap().pixels.iter().any(|c| c[0] > 0.0));
-    assert_eq!(png_size(&dir.path().join("croupier.png")), (16, 16));
 }

@@ -9,33 +9,37 @@ use glam::DVec3;
 /// Right and down reach from the image centre to the edges: `tan(vfov / 2)` downwards at distance 1, or half the height
 /// of an orthographic image, times width / height to the right (pixels are square); unit vectors for a panorama.
 pub(super) fn bake(c: &Camera) -> Result<blob::Camera, BakeError> {
-    let bad = |what, found| BakeError::Camera { what, found };
+    let bad = |what, found, range| BakeError::Camera { what, found, range };
     for (what, v) in [("origin", c.origin), ("target", c.target), ("up", c.up)] {
         let limit = f64::from(MAX_COORDINATE);
         if let Some(x) = v.iter().find(|x| x.is_nan() || x.abs() > limit) {
-            return Err(bad(what, *x));
+            return Err(bad(what, *x, "from -1e9 to 1e9"));
         }
     }
     for (what, n) in [("width", c.size[0]), ("height", c.size[1])] {
         if n == 0 || n > MAX_SIDE {
-            return Err(bad(what, f64::from(n)));
+            return Err(bad(what, f64::from(n), "from 1 to 65536"));
         }
     }
     let half_height = match c.projection {
         Projection::Perspective if c.vfov_deg > 1e-3 && c.vfov_deg < 179.9 => (c.vfov_deg.to_radians() / 2.0).tan(),
-        Projection::Perspective => return Err(bad("vertical field of view in degrees", c.vfov_deg)),
+        Projection::Perspective => {
+            return Err(bad("vertical field of view in degrees", c.vfov_deg, "above 0.001 and below 179.9"));
+        }
         Projection::Orthographic { height } if (1e-12..=MAX_COORDINATE).contains(&height) => f64::from(height) / 2.0,
-        Projection::Orthographic { height } => return Err(bad("orthographic height", height.into())),
+        Projection::Orthographic { height } => {
+            return Err(bad("orthographic height", height.into(), "from 1e-12 to 1e9"));
+        }
         Projection::Panoramic => 1.0,
     };
     let [origin, target, up] = [c.origin, c.target, c.up].map(DVec3::from_array);
     let axis = target - origin;
-    let forward = axis.try_normalize().ok_or(bad("distance from origin to target", axis.length()))?;
+    let forward = axis.try_normalize().ok_or(bad("distance from origin to target", axis.length(), "above 0"))?;
     let side = forward.cross(up.normalize_or_zero());
     let right = if side.length() > 1e-6 {
         side.normalize()
     } else {
-        return Err(bad("sine of angle between axis and up", side.length()));
+        return Err(bad("sine of angle between axis and up", side.length(), "above 1e-6"));
     };
     let (kind, aspect) = match c.projection {
         Projection::Perspective => (CameraKind::Perspective, f64::from(c.size[0]) / f64::from(c.size[1])),
@@ -45,13 +49,13 @@ pub(super) fn bake(c: &Camera) -> Result<blob::Camera, BakeError> {
     let half_width = half_height * aspect;
     let (lens_radius, focus_distance) = c.lens.map_or((0.0, 0.0), |l| (l.radius, l.focus_distance));
     if !(0.0..=MAX_COORDINATE).contains(&lens_radius) {
-        return Err(bad("lens radius", lens_radius.into()));
+        return Err(bad("lens radius", lens_radius.into(), "from 0 to 1e9"));
     }
     if lens_radius > 0.0 && c.projection != Projection::Perspective {
-        return Err(bad("lens radius of a camera that is not perspective", lens_radius.into()));
+        return Err(bad("lens radius of a camera that is not perspective", lens_radius.into(), "0"));
     }
     if lens_radius > 0.0 && !(f32::MIN_POSITIVE..=MAX_COORDINATE).contains(&focus_distance) {
-        return Err(bad("focus distance", focus_distance.into()));
+        return Err(bad("focus distance", focus_distance.into(), "above 0, up to 1e9"));
     }
     Ok(blob::Camera {
         kind: kind as u32,

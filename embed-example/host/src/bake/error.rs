@@ -1,5 +1,6 @@
 //! Errors of baking.
 
+use crate::text::{excerpt, number};
 use std::{error, fmt};
 
 /// Error in a [`crate::description::SceneDescription`]; every text names the object.
@@ -92,6 +93,8 @@ pub enum BakeError {
         what: &'static str,
         /// Value found.
         found: f64,
+        /// What it must be, in words.
+        range: &'static str,
     },
     /// A material that refers to a medium that is not there.
     MediumIndex {
@@ -181,25 +184,30 @@ impl fmt::Display for BakeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Vertex { object, vertex, what, found } => {
-                write!(f, "object `{object}`: {what} of vertex {vertex} is {found}")
+                write!(f, "object `{}`: {what} of vertex {vertex} is {}", excerpt(object), number((*found).into()))
             }
             Self::Index { object, triangle, what, found, count } => {
-                write!(f, "object `{object}`: triangle {triangle} refers to {what} {found}, there are {count}")
+                write!(
+                    f,
+                    "object `{}`: triangle {triangle} refers to {what} {found}, there are {count}",
+                    excerpt(object)
+                )
             }
             Self::Material { material, what, found, range: [lo, hi] } => {
-                write!(f, "material `{material}`: {what} is {found}, it must be from {lo} to {hi}")
+                let [found, lo, hi] = [*found, *lo, *hi].map(|x| number(x.into()));
+                write!(f, "material `{}`: {what} is {found}, it must be from {lo} to {hi}", excerpt(material))
             }
             Self::TextureIndex { material, found, count } => {
-                write!(f, "material `{material}` refers to texture {found}, there are {count}")
+                write!(f, "material `{}` refers to texture {found}, there are {count}", excerpt(material))
             }
             Self::TextureUse { material, texture } => write!(
                 f,
                 "material `{material}` is not principled: it cannot use texture `{texture}`, which is linear or not repeated"
             ),
             Self::Image { image, size: [w, h], texels } => {
-                write!(f, "image `{image}` of {w} x {h} pixels with {texels} texels cannot be used")
+                write!(f, "image `{}` of {w} x {h} pixels with {texels} texels cannot be used", excerpt(image))
             }
-            Self::Emitter { emitter, what, found } => write!(f, "{emitter}: {what} is {found}"),
+            Self::Emitter { emitter, what, found } => write!(f, "{emitter}: {what} is {}", number((*found).into())),
             Self::EmitterMaterial { emitter, found, repeated: true } => {
                 write!(f, "{emitter}: material {found} already emits")
             }
@@ -207,25 +215,39 @@ impl fmt::Display for BakeError {
                 write!(f, "{emitter}: there is no material {found}")
             }
             Self::Rotation => write!(f, "environment: `to_world` is not a rotation"),
-            Self::Camera { what, found } => write!(f, "camera: {what} is {found}"),
+            Self::Camera { what, found, range } => {
+                write!(f, "camera: {what} is {}, it must be {range}", number(*found))
+            }
             Self::MediumIndex { material, found, count } => {
-                write!(f, "material `{material}` refers to medium {found}, there are {count}")
+                write!(f, "material `{}` refers to medium {found}, there are {count}", excerpt(material))
             }
             Self::Medium { medium, what, found, range: [lo, hi] } => {
-                write!(f, "medium `{medium}`: {what} is {found}, it must be from {lo} to {hi}")
+                let [found, lo, hi] = [*found, *lo, *hi].map(|x| number(x.into()));
+                write!(f, "medium `{}`: {what} is {found}, it must be from {lo} to {hi}", excerpt(medium))
             }
             Self::Grid { medium, cells: [x, y, z], values } => {
-                write!(f, "medium `{medium}`: a grid of {x} x {y} x {z} cells with {values} values cannot be used")
+                write!(
+                    f,
+                    "medium `{}`: a grid of {x} x {y} x {z} cells with {values} values cannot be used",
+                    excerpt(medium)
+                )
             }
             Self::Media { count, most } => write!(f, "{count} media are too many, there may be {most}"),
-            Self::NoBoundary { medium } => write!(f, "medium `{medium}`: no triangle bounds it"),
+            Self::NoBoundary { medium } => write!(f, "medium `{}`: no triangle bounds it", excerpt(medium)),
             Self::Leak { medium, object, edge: [a, b], times: [there, back] } => write!(
                 f,
-                "medium `{medium}`: its boundary is not closed: object `{object}` has an edge from {a:?} to {b:?} \
-                 (triangles that way: {there}, the other way: {back})"
+                "medium `{}`: its boundary is not closed: object `{}` has an edge from {a:?} to {b:?} \
+                 (triangles that way: {there}, the other way: {back})",
+                excerpt(medium),
+                excerpt(object)
             ),
             Self::InsideOut { medium, object } => {
-                write!(f, "medium `{medium}`: the front sides of its boundary (object `{object}`) face inwards")
+                write!(
+                    f,
+                    "medium `{}`: the front sides of its boundary (object `{}`) face inwards",
+                    excerpt(medium),
+                    excerpt(object)
+                )
             }
             Self::Instance { name, prototype, what } => write!(f, "instance `{name}` of `{prototype}`: {what}"),
             Self::Prototype { name, what } => write!(f, "prototype `{name}`: {what}"),

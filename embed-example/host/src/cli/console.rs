@@ -1,5 +1,6 @@
 //! Output of commands, and how they end.
 
+use croupier_host::text::escaped;
 use std::error::Error;
 use std::io::{self, Write};
 
@@ -9,7 +10,7 @@ pub(crate) type Outcome = Result<(), Box<dyn Error>>;
 /// Prints one line on stderr, whatever the text holds.
 pub(crate) fn complain(text: &str) {
     let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    let _ = writeln!(io::stderr(), "croupier: {text}");
+    let _ = writeln!(io::stderr(), "croupier: {}", escaped(&text));
 }
 
 /// Prints a note: no error, but perhaps not what the user expects.

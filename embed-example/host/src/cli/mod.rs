@@ -1,10 +1,11 @@
 //! Command line: arguments, exit status, and one file per command.
 //!
-//! Exit status 0: done (also when stopped by Ctrl-C with the picture so far written); 1: the last line on stderr says
-//! what went wrong; 2: the arguments make no sense. Results go to stdout, progress, notes and errors to stderr.
+//! Exit status 0: done; 1: the last line on stderr says what went wrong; 2: the arguments make no sense; 130 (Ctrl-C), 143
+//! (SIGTERM), 129 (SIGHUP): ended by a signal, a render with its partial picture written. Results go to stdout, progress, notes and errors to stderr.
 
 mod bake;
 mod cache;
+mod checkpoint;
 mod compare;
 mod console;
 mod info;
@@ -14,6 +15,7 @@ mod progress;
 mod render;
 mod scene;
 mod settings;
+mod signals;
 mod values;
 
 use clap::{Parser, Subcommand};
@@ -44,15 +46,17 @@ enum Command {
 /// The whole program.
 pub(crate) fn run() -> ExitCode {
     let cli = Cli::parse();
+    signals::install();
+    let done = |()| ExitCode::SUCCESS;
     let outcome = match cli.command {
         None => render::run(None, &cli.render),
         Some(Command::Render(args)) => render::run(args.scene.as_deref(), &args.flags),
-        Some(Command::Bake(args)) => bake::run(&args),
-        Some(Command::Info(args)) => info::run(&args),
-        Some(Command::Compare(args)) => compare::run(&args),
+        Some(Command::Bake(args)) => bake::run(&args).map(done),
+        Some(Command::Info(args)) => info::run(&args).map(done),
+        Some(Command::Compare(args)) => compare::run(&args).map(done),
     };
     match outcome {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(status) => status,
         Err(e) => {
             console::complain(&e.to_string());
             ExitCode::FAILURE

@@ -4,6 +4,7 @@
 use super::console::note;
 use croupier_host::bake::BakeReport;
 use croupier_host::load::LoadReport;
+use croupier_host::text;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -57,7 +58,7 @@ impl Notes {
 /// Puts the scene's name in front of an error or a note about its content.
 pub(crate) fn about<'a>(path: Option<&'a Path>) -> impl Fn(&dyn Display) -> String + 'a {
     move |e| match path {
-        Some(path) => format!("{}: {e}", path.display()),
+        Some(path) => format!("{}: {e}", text::path(path)),
         None => format!("built-in scene: {e}"),
     }
 }

@@ -2,9 +2,10 @@
 //! the others. An hour of rendering must not be lost to a full disk or a mistyped name.
 
 use croupier_host::false_color::{Scale, draw};
-use croupier_host::image::{ImageError, Picture, part_name, write_png, write_whole};
+use croupier_host::image::{ImageError, Picture, try_write, write_png, write_whole};
+use croupier_host::text;
 use croupier_host::tonemap::{Curve, tonemap};
-use std::fs::{self, File};
+use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -27,6 +28,8 @@ pub(crate) struct Outputs<'a> {
     pub(crate) png: PathBuf,
     /// Saved cache, if asked for.
     pub(crate) cache: Option<&'a Path>,
+    /// Checkpoint, if asked for.
+    pub(crate) checkpoint: Option<&'a Path>,
     /// Pictures of the layers in [`FALSE_COLOR`], if asked for.
     pub(crate) false_color: Vec<PathBuf>,
 }
@@ -51,19 +54,35 @@ impl Written {
 
 impl<'a> Outputs<'a> {
     /// Names of all files.
-    pub(crate) fn new(exr: &'a Path, cache: Option<&'a Path>, false_color: bool) -> Self {
+    pub(crate) fn new(exr: &'a Path, cache: Option<&'a Path>, checkpoint: Option<&'a Path>, false_color: bool) -> Self {
         let drawings = FALSE_COLOR.iter().filter(|_| false_color);
         let false_color = drawings.map(|(layer, _)| exr.with_extension(format!("{layer}.png"))).collect();
-        Self { exr, png: exr.with_extension("png"), cache, false_color }
+        Self { exr, png: exr.with_extension("png"), cache, checkpoint, false_color }
+    }
+
+    /// Every file.
+    fn all(&self) -> Vec<&Path> {
+        let pictures = [self.exr, &self.png].into_iter().chain(self.false_color.iter().map(PathBuf::as_path));
+        pictures.chain(self.cache).chain(self.checkpoint).collect()
     }
 
     /// Checks that all files can be written, none over another.
     pub(crate) fn check(&self) -> Result<(), String> {
-        let pictures = [self.exr, &self.png].into_iter().chain(self.false_color.iter().map(PathBuf::as_path));
-        if let Some(cache) = self.cache.filter(|c| pictures.clone().any(|p| p == *c)) {
-            return Err(format!("cannot write {}: a picture and the statistics cannot share it", cache.display()));
+        let all = self.all();
+        for (i, path) in all.iter().enumerate() {
+            if all[..i].iter().any(|other| same(path, other)) {
+                return Err(format!("cannot write {}: two outputs cannot share it", text::path(path)));
+            }
         }
-        pictures.chain(self.cache).try_for_each(writable)
+        all.into_iter().try_for_each(writable)
+    }
+
+    /// Checks that none of the files was read. A checkpoint may be written over the one that the render resumes.
+    pub(crate) fn spare(&self, read: &[PathBuf], resumed: Option<&Path>) -> Result<(), String> {
+        let all = self.all();
+        spares(&all, read)?;
+        let others: Vec<&Path> = all.into_iter().filter(|p| Some(*p) != self.checkpoint).collect();
+        spares(&others, &resumed.map(Path::to_path_buf).into_iter().collect::<Vec<_>>())
     }
 
     /// Writes everything: the PNG and the false colours are made from `picture`. `image` names the layer of the PNG.
@@ -93,15 +112,55 @@ impl<'a> Outputs<'a> {
 
 /// Checks that a file of this name can be written: makes and removes the temporary file that is written first.
 pub(crate) fn writable(path: &Path) -> Result<(), String> {
-    let failed = |why: &dyn std::fmt::Display| format!("cannot write {}: {why}", path.display());
-    if path.is_dir() {
-        return Err(failed(&"it is a folder"));
+    let failed = |why: &dyn std::fmt::Display| format!("cannot write {}: {why}", text::path(path));
+    // What is not there yet can be made.
+    if let Ok(found) = fs::metadata(path)
+        && !found.is_file()
+    {
+        let what = if found.is_dir() { "it is a folder" } else { "it is not a regular file" };
+        return Err(failed(&what));
     }
     if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty() && !f.is_dir()) {
-        return Err(failed(&format!("{} is not a folder", folder.display())));
+        return Err(failed(&format!("{} is not a folder", text::path(folder))));
     }
-    let part = part_name(path);
-    File::create(&part).and_then(|_| fs::remove_file(&part)).map_err(|e| failed(&e))
+    try_write(path).map_err(|e| failed(&e))
+}
+
+/// Checks that no output is one of the files that were read, by its name, or by a link.
+pub(crate) fn spares(outputs: &[&Path], read: &[PathBuf]) -> Result<(), String> {
+    let clash = |out: &&Path| read.iter().find(|input| same(out, input)).map(|input| (out.to_path_buf(), input));
+    match outputs.iter().find_map(clash) {
+        None => Ok(()),
+        Some((out, input)) => {
+            let (out, input) = (text::path(&out), text::path(input));
+            Err(format!("cannot write {out}: it is {input}, which was read; give the output another name"))
+        }
+    }
+}
+
+/// Whether both names lead to one file, or would if it were made.
+fn same(a: &Path, b: &Path) -> bool {
+    let place = |path: &Path| {
+        fs::canonicalize(path).ok().or_else(|| {
+            let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            Some(fs::canonicalize(folder).ok()?.join(path.file_name()?))
+        })
+    };
+    let (place_a, place_b) = (place(a), place(b));
+    place_a.is_some() && place_a == place_b || hard_link(a, b)
+}
+
+/// Whether both names are entries of one file.
+#[cfg(unix)]
+fn hard_link(a: &Path, b: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |path| fs::metadata(path).map(|m| (m.dev(), m.ino())).ok();
+    identity(a).is_some_and(|a| Some(a) == identity(b))
+}
+
+#[cfg(not(unix))]
+fn hard_link(_: &Path, _: &Path) -> bool {
+    false
 }
 
 #[cfg(test)]
@@ -118,14 +177,14 @@ mod tests {
         picture.add3("", ["R", "G", "B"], &[[0.5; 3]; 2]);
         FALSE_COLOR.iter().for_each(|(layer, _)| picture.add1(layer, "s", &[1.0; 2]));
         let [exr, cache, lost] = ["a.exr", "a.cache", "no/where"].map(at);
-        let whole = Outputs::new(&exr, Some(&cache), true);
+        let whole = Outputs::new(&exr, Some(&cache), None, true);
         assert_eq!(whole.write(&picture, Some(&[7]), "", 0.0).files.len(), 9);
         for i in 0..9 {
             let dir = tempfile::tempdir().unwrap();
             let mut names: Vec<PathBuf> = (0..9).map(|n| dir.path().join(n.to_string())).collect();
             names[i] = lost.join(i.to_string());
             let (png, false_color) = (names[2].clone(), names[3..].to_vec());
-            let outputs = Outputs { exr: &names[0], png, cache: Some(&names[1]), false_color };
+            let outputs = Outputs { exr: &names[0], png, cache: Some(&names[1]), checkpoint: None, false_color };
             assert!(outputs.check().unwrap_err().contains("not a folder"));
             assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
             let written = outputs.write(&picture, Some(&[7]), "", 0.0);

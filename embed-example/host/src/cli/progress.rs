@@ -1,9 +1,9 @@
 //! Progress on stderr; nothing is shown where stderr is no terminal.
 
+use super::signals;
 use croupier_host::bake::Stage;
 use croupier_host::render::{Observer, Progress, Target};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Steps of the bar of a render.
@@ -36,24 +36,14 @@ impl Drop for Baking {
     }
 }
 
-/// Progress bar of a render with its error estimate and the time left. Ends the render on Ctrl-C.
+/// Progress bar of a render with its error estimate and the time left. Ends the render on a signal.
 pub(crate) struct Rendering {
     bar: ProgressBar,
     target: Target,
 }
 
-/// Whether Ctrl-C was pressed. A second one ends the program at once.
-static STOP: AtomicBool = AtomicBool::new(false);
-
 impl Rendering {
     pub(crate) fn start(target: Target) -> Self {
-        // Fails only if a handler is there already; then that one decides.
-        #[expect(clippy::disallowed_methods, reason = "the user asked twice for the end, whatever is written")]
-        let _ = ctrlc::set_handler(|| {
-            if STOP.swap(true, Ordering::Relaxed) {
-                std::process::exit(130);
-            }
-        });
         Self { bar: styled(ProgressBar::new(STEPS), "rendering [{bar:30}] {percent:>3} %  {msg}"), target }
     }
 }
@@ -68,7 +58,7 @@ impl Observer for Rendering {
     }
 
     fn stop(&self) -> bool {
-        STOP.load(Ordering::Relaxed)
+        signals::received().is_some()
     }
 }
 

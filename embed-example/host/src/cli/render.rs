@@ -1,20 +1,24 @@
 //! `croupier render`
 
 use super::cache::CacheFlags;
-use super::console::{Outcome, say, say_json};
+use super::checkpoint::CheckpointFlags;
+use super::console::{Outcome, note, say, say_json};
 use super::notes::{Notes, about};
 use super::output::Outputs;
 use super::progress::Rendering;
-use super::scene;
 use super::settings::SettingsFlags;
 use super::values::{exr_path, positive, stops};
+use super::{scene, signals};
 use croupier::Scene;
 use croupier::unstable::MAX_PATH_LENGTH;
-use croupier_host::render::{PlanSummary, RenderOptions, RenderResult, RenderStats, Target, check, render_scene};
+use croupier_host::memory::{Demand, machine};
+use croupier_host::render::{PlanSummary, RenderOptions, RenderResult, RenderStats, Target, check, plan, render_scene};
 use croupier_host::statistics::Statistics;
+use croupier_host::text;
 use serde::Serialize;
 use std::error::Error;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -36,9 +40,9 @@ pub(crate) struct Flags {
     until: Until,
     #[command(flatten)]
     scene: scene::SceneFlags,
-    /// Threads, 0 for one per processor; the image does not depend on their number
-    #[arg(long, value_name = "N", default_value_t = RenderOptions::default().threads)]
-    threads: usize,
+    /// Threads, up to 4096, 0 for one per processor, at most one per shard; the image does not depend on their number
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=4096))]
+    threads: u16,
     /// Exposure of the PNG in stops, -100 to 100; 0 if absent, 1 for the built-in scene
     #[arg(long, value_name = "STOPS", value_parser = stops, allow_negative_numbers = true)]
     exposure: Option<f32>,
@@ -49,7 +53,7 @@ pub(crate) struct Flags {
     /// NAME.factor1.png to NAME.factor4.png, NAME.cost.png, NAME.paths.png
     #[arg(long)]
     false_color: bool,
-    /// Print statistics of paths, iterations and time
+    /// Print counters, and statistics of paths, iterations and time
     #[arg(long)]
     stats: bool,
     /// Print the figures as one line of JSON
@@ -58,6 +62,8 @@ pub(crate) struct Flags {
     // The heading of the last flags would hold for any after them.
     #[command(flatten)]
     cache: CacheFlags,
+    #[command(flatten)]
+    checkpoint: CheckpointFlags,
 }
 
 /// Stop condition; 64 samples per pixel if none is given.
@@ -95,12 +101,13 @@ impl Flags {
     fn options(&self) -> Result<RenderOptions, Box<dyn Error>> {
         let mut options = RenderOptions {
             target: self.until.target(),
-            threads: self.threads,
+            threads: self.threads.into(),
             denoise: self.denoise,
             calibrate: self.stats,
             ..self.settings.options()?
         };
         self.cache.apply(&mut options)?;
+        self.checkpoint.apply(&mut options);
         // Said before the scene is loaded.
         check(&options)?;
         Ok(options)
@@ -127,26 +134,53 @@ struct Report<'a> {
     false_color: &'a [PathBuf],
     #[serde(skip_serializing_if = "Option::is_none")]
     cache_out: Option<&'a Path>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    checkpoint: Option<&'a Path>,
     /// Complete files.
     written: &'a [PathBuf],
 }
 
 /// Runs the command.
-pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
-    let outputs = Outputs::new(&flags.output, flags.cache.cache_out.as_deref(), flags.false_color);
+pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Result<ExitCode, Box<dyn Error>> {
+    let checkpoint = flags.checkpoint.output();
+    let outputs = Outputs::new(&flags.output, flags.cache.cache_out.as_deref(), checkpoint, flags.false_color);
     // Said now, not after an hour of rendering.
     outputs.check()?;
     let options = flags.options()?;
-    let (bytes, mut notes) = scene::open(path, flags.scene)?;
+    let scene::Opened { bytes, mut notes, mut files } = scene::open(path, flags.scene)?;
+    files.extend(flags.cache.cache_in.clone());
+    outputs.spare(&files, flags.checkpoint.input())?;
     let validated = Scene::from_bytes(&bytes).map_err(|e| about(path)(&e))?;
     if let Some(text) = shortened(&validated, options.settings.max_depth) {
         notes.add(path, text);
     }
+    let settings = options.settings.with_scene(&validated);
+    let memory = plan(&validated, &options)?;
+    let demand = Demand::new(bytes.len() as u64, &memory, settings.size, settings.aovs);
+    if let Some(text) = demand.judge(machine()).map_err(|e| about(path)(&e))? {
+        notes.add(path, text);
+    }
+    // From here on there is something to save.
+    signals::save_at_first();
+    if !flags.json {
+        let name = path.map_or("built-in scene".into(), text::path);
+        let [width, height] = settings.size;
+        let (triangles, lights) = (validated.triangles.len(), validated.lights.len());
+        say(&format!("{name}: {triangles} triangles, {lights} lights, {width}x{height} pixels"))?;
+        let learning = text::bytes(memory.learning_bytes);
+        let total = text::bytes(demand.total());
+        say(&format!(
+            "{}, {} shards: {total} of memory, {learning} of it for learning",
+            settings.strategy, memory.shards
+        ))?;
+    }
     let watch = Rendering::start(options.target);
-    let result = render_scene(validated, &options, &watch)
-        .map_err(|e| flags.cache.about(&e).unwrap_or_else(|| about(path)(&e)))?;
+    let result = render_scene(validated, &options, &watch).map_err(|e| {
+        let about_file = flags.cache.about(&e).or_else(|| flags.checkpoint.about(&e));
+        about_file.unwrap_or_else(|| about(path)(&e))
+    })?;
     drop(watch);
-    let RenderResult { picture, stats, statistics, plan, cache, stopped_early } = &result;
+    let RenderResult { picture, stats, statistics, plan, cache, stopped_early, checkpoint_error } = &result;
     if let Some([x, y]) = stats.first_non_finite {
         let count = stats.counters.get("non_finite").unwrap_or(&1);
         notes.add(path, format!("{count} contributions were not finite and left out, the first in pixel ({x}, {y})"));
@@ -154,7 +188,10 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     // Its area light brings the walls to about a fifth of white.
     let exposure = flags.exposure.unwrap_or(if path.is_none() { 1.0 } else { 0.0 });
     let image = if flags.denoise { "denoised" } else { "" };
-    let written = outputs.write(picture, cache.as_deref(), image, exposure);
+    let mut written = outputs.write(picture, cache.as_deref(), image, exposure);
+    if checkpoint_error.is_none() {
+        written.files.extend(checkpoint.filter(|c| c.is_file()).map(Path::to_path_buf));
+    }
     let report = Report {
         stats,
         notes: &notes,
@@ -169,6 +206,7 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
         png: &outputs.png,
         false_color: &outputs.false_color,
         cache_out: outputs.cache,
+        checkpoint,
         written: &written.files,
     };
     // The figures are worth having even if a file is missing.
@@ -177,7 +215,17 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     } else {
         print(&report)?
     }
-    written.error.map_or(Ok(()), |e| Err(e.into()))
+    if let Some(e) = written.error {
+        return Err(e.into());
+    }
+    if let Some(e) = checkpoint_error {
+        return Err(e.clone().into());
+    }
+    let status = signals::exit_status().filter(|_| *stopped_early);
+    if let Some(signal) = signals::received().filter(|_| *stopped_early) {
+        note(&format!("{} ended the render: the picture is partial", signals::name(signal)));
+    }
+    Ok(status.map_or(ExitCode::SUCCESS, ExitCode::from))
 }
 
 /// Note that paths end earlier than the scene asks for, if no flag asked for it.
@@ -187,26 +235,25 @@ fn shortened(scene: &Scene<'_>, given: u32) -> Option<String> {
     (given == 0 && wanted > MAX_PATH_LENGTH).then(text)
 }
 
+/// Result and files, a line each; with the statistics also counters and tables.
 fn print(r: &Report<'_>) -> Outcome {
-    let early = if r.stopped_early { "stopped early: " } else { "" };
+    let partial = if r.stopped_early { "partial picture: " } else { "" };
     let RenderStats { spp, rays, seconds, mrays_per_s, .. } = *r.stats;
-    say(&format!(
-        "{early}{}x{} pixels, {spp:.1} samples per pixel, {:.1} million rays in {seconds:.1} s, {mrays_per_s:.2} Mrays/s",
-        r.width,
-        r.height,
-        rays as f64 * 1e-6
-    ))?;
-    if let Some(e) = r.stats.relmse_estimate {
+    let error = r.stats.relmse_estimate.map_or(String::new(), |e| {
         let interval = r.stats.relmse_interval.map_or(String::new(), |[a, b]| format!(" ({a:.3e} to {b:.3e})"));
-        say(&format!("estimated relMSE {e:.3e}{interval}"))?;
-    }
-    for (name, count) in r.stats.counters.iter().filter(|(_, count)| **count > 0) {
-        say(&format!("{name}: {count}"))?;
-    }
-    say(&format!("memory: {}", r.plan))?;
+        format!(", estimated relMSE {e:.3e}{interval}")
+    });
+    let millions = rays as f64 * 1e-6;
+    say(&format!(
+        "{partial}{spp:.1} samples per pixel, {millions:.1} million rays in {seconds:.1} s, {mrays_per_s:.2} Mrays/s{error}"
+    ))?;
     if let Some(statistics) = r.statistics {
+        for (name, count) in r.stats.counters.iter().filter(|(_, count)| **count > 0) {
+            say(&format!("{name}: {count}"))?;
+        }
+        say(&format!("memory: {}", r.plan))?;
         say(&format!("\n{statistics}"))?;
     }
-    let names: Vec<_> = r.written.iter().map(|p| p.display().to_string()).collect();
+    let names: Vec<_> = r.written.iter().map(|p| text::path(p)).collect();
     if names.is_empty() { Ok(()) } else { say(&format!("wrote {}", names.join(", "))) }
 }

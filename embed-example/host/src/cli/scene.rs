@@ -2,15 +2,17 @@
 
 use super::notes::{Notes, about};
 use super::progress;
+use super::values::bytes;
 use croupier_host::bake::{self, BakeError};
 use croupier_host::builtin;
 use croupier_host::description::SceneDescription;
-use croupier_host::load::{self, LoadReport};
+use croupier_host::load::{self, LoadOptions, LoadReport};
+use croupier_host::text;
 use memmap2::Mmap;
 use std::error::Error;
-use std::fs::File;
+use std::fs::{self, File};
 use std::ops::Deref;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A scene blob, in memory or on disk.
 pub(crate) enum SceneBytes {
@@ -32,17 +34,34 @@ impl Deref for SceneBytes {
 }
 
 /// Flags of commands that bake.
-#[derive(Clone, Copy, Debug, Default, clap::Args)]
+#[derive(Clone, Copy, Debug, clap::Args)]
 pub(crate) struct SceneFlags {
     /// Compensate no material for the energy that single scattering between microfacets loses: darker rough surfaces, as
     /// in renderers without this effect. Baked files stay as they are
     #[arg(long)]
     single_scattering: bool,
+    /// Refuse what is otherwise replaced with a note: missing or differently written files, unknown materials and
+    /// colours, faces with some texture coordinates only, bytes behind the end of an image
+    #[arg(long)]
+    strict: bool,
+    /// Most bytes that textures and environment maps may take in all while they are decoded, such as 512MiB
+    #[arg(long, value_name = "SIZE", default_value = "2GiB", value_parser = bytes)]
+    texture_memory: u64,
+}
+
+/// A scene that was opened.
+pub(crate) struct Opened {
+    pub(crate) bytes: SceneBytes,
+    /// What had to be assumed, ignored or left out.
+    pub(crate) notes: Notes,
+    /// Files that were read.
+    pub(crate) files: Vec<PathBuf>,
 }
 
 /// Opens a scene: a baked `.crp` file, anything that loads and bakes (a folder with `scene.json`, an `.obj`), or,
 /// without a path, the built-in one. What had to be assumed, ignored or left out is printed and returned.
-pub(crate) fn open(path: Option<&Path>, flags: SceneFlags) -> Result<(SceneBytes, Notes), Box<dyn Error>> {
+pub(crate) fn open(path: Option<&Path>, flags: SceneFlags) -> Result<Opened, Box<dyn Error>> {
+    let options = LoadOptions { strict: flags.strict, texture_memory: flags.texture_memory };
     let (mut description, loaded) = match path {
         Some(path) if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")) => {
             if flags.single_scattering {
@@ -50,18 +69,25 @@ pub(crate) fn open(path: Option<&Path>, flags: SceneFlags) -> Result<(SceneBytes
                     format!("{}: `--single-scattering` is for baking, not for baked files", path.display()).into()
                 );
             }
-            return Ok((map(path)?, Notes::default()));
+            return Ok(Opened { bytes: map(path)?, notes: Notes::default(), files: vec![path.into()] });
         }
-        Some(path) => load::load(path)?,
+        Some(path) => load::load_with(path, &options)?,
         None => (builtin::cornell_box(), LoadReport::default()),
     };
     if flags.single_scattering {
         description.materials.iter_mut().for_each(|m| m.compensated = false);
     }
-    let baked = bake(&description).map_err(|e| about(path)(&e))?;
+    // of a folder: its scene.json
+    let file = loaded.files.first().map(PathBuf::as_path).or(path);
+    let baked = bake(&description).map_err(|e| about(file)(&e))?;
+    if path.is_some() && baked.report.triangles == 0 {
+        let count = baked.report.dropped_degenerate;
+        return Err(about(file)(&format!("none of the {count} triangles has an area: there is nothing to see")).into());
+    }
+    drop(description);
     let notes = Notes::of(&loaded, &baked.report);
     notes.print(path);
-    Ok((SceneBytes::Baked(baked), notes))
+    Ok(Opened { bytes: SceneBytes::Baked(baked), notes, files: loaded.files })
 }
 
 fn bake(description: &SceneDescription) -> Result<bake::Baked, BakeError> {
@@ -70,15 +96,16 @@ fn bake(description: &SceneDescription) -> Result<bake::Baked, BakeError> {
 }
 
 fn map(path: &Path) -> Result<SceneBytes, Box<dyn Error>> {
-    let failed = |e| format!("cannot read {}: {e}", path.display());
-    let file = File::open(path).map_err(failed)?;
-    let data = file.metadata().map_err(failed)?;
+    let failed = |e| format!("cannot read {}: {e}", text::path(path));
+    // Opening a pipe waits for its other end: look first.
+    let data = fs::metadata(path).map_err(failed)?;
     if !data.is_file() {
-        return Err(format!("cannot read {}: it is not a file", path.display()).into());
+        return Err(format!("cannot read {}: it is not a file", text::path(path)).into());
     }
     if data.len() == 0 {
-        return Err(format!("{}: the file is empty", path.display()).into());
+        return Err(format!("{}: the file is empty", text::path(path)).into());
     }
+    let file = File::open(path).map_err(failed)?;
     // SAFETY: the bytes must not change while they are mapped. This program never writes into an existing file
     // (`image::write_whole` renames a new one over it, which leaves the mapped one as it is); that no other program
     // does is asked of the user in the help text of `bake`.

@@ -38,3 +38,18 @@ pub(crate) fn stops(text: &str) -> Result<f32, String> {
         Err(e) => Err(e.to_string()),
     }
 }
+
+/// A size in bytes, such as `512MiB`.
+pub(crate) fn bytes(text: &str) -> Result<u64, String> {
+    let digits = text.trim_end_matches(|c: char| !c.is_ascii_digit());
+    let unit: Option<u64> = match text.get(digits.len()..) {
+        Some("") => Some(1),
+        Some("KiB") => Some(1 << 10),
+        Some("MiB") => Some(1 << 20),
+        Some("GiB") => Some(1 << 30),
+        Some("TiB") => Some(1 << 40),
+        _ => None,
+    };
+    let n = digits.parse::<u64>().ok().zip(unit).and_then(|(n, unit)| n.checked_mul(unit));
+    n.ok_or_else(|| "need a number of bytes, such as 512MiB or 2GiB".into())
+}

@@ -1,5 +1,7 @@
 //! Errors of a render.
 
+use crate::checkpoint::CheckpointError;
+use crate::text;
 use croupier::unstable::learn::cache::CacheError;
 use croupier::{SceneError, SessionError, SettingsError, ShardError};
 use std::fmt;
@@ -20,6 +22,8 @@ pub enum DriveError {
     Cache(CacheError),
     /// A cache is to be loaded or saved, but this strategy learns nothing from the scene.
     NoCache(&'static str),
+    /// The checkpoint cannot be resumed.
+    Checkpoint(CheckpointError),
     /// No memory for a block of so many bytes.
     Memory(usize),
     /// The thread pool cannot start.
@@ -30,6 +34,11 @@ impl DriveError {
     /// Whether the error is about a saved cache.
     pub fn is_about_cache(&self) -> bool {
         matches!(self, Self::Cache(_))
+    }
+
+    /// Whether the error is about the checkpoint that was to be resumed.
+    pub fn is_about_checkpoint(&self) -> bool {
+        matches!(self, Self::Checkpoint(_) | Self::Session(SessionError::Resume(_)))
     }
 
     /// Whether more memory for the cache would avoid the error.
@@ -53,7 +62,8 @@ impl fmt::Display for DriveError {
                     "roulette strategy `{strategy}` learns nothing from the scene: there is no cache to load or save"
                 )
             }
-            Self::Memory(bytes) => write!(f, "no memory for a block of {bytes} bytes"),
+            Self::Checkpoint(e) => e.fmt(f),
+            Self::Memory(bytes) => write!(f, "no memory for a block of {}", text::bytes(*bytes as u64)),
             Self::Threads(e) => write!(f, "cannot start threads: {e}"),
         }
     }
@@ -71,4 +81,5 @@ macro_rules! from {
     )*};
 }
 from!(SceneError => Scene, SettingsError => Settings, SessionError => Session, ShardError => Shard, CacheError => Cache,
+      CheckpointError => Checkpoint,
       rayon::ThreadPoolBuildError => Threads);

@@ -62,6 +62,8 @@ pub struct Rendered {
     pub memory: [usize; 2],
     /// Whether the observer ended the render before its target.
     pub stopped_early: bool,
+    /// Error of the first checkpoint that could not be written; the render went on without further ones.
+    pub checkpoint_error: Option<String>,
     /// Threads that traced.
     pub threads: usize,
     /// Records of all iterations, the one that was stopped included.

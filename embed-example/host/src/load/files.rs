@@ -13,7 +13,7 @@ pub const MAX_FILE_BYTES: u64 = 4 << 30;
 
 /// Reads a regular file of up to [`MAX_FILE_BYTES`]. Folders, devices, pipes and sockets are refused before a byte is
 /// read: they may be endless, or wait for ever.
-pub(super) fn read(path: &Path) -> io::Result<Vec<u8>> {
+pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     // Opening a pipe waits for its other end: look first.
     let found = fs::metadata(path)?;
     if !found.is_file() {

@@ -48,6 +48,8 @@ pub struct LoadReport {
 pub(super) struct Loader {
     pub(super) options: LoadOptions,
     pub(super) report: LoadReport,
+    /// Folder of the scene: other machines' folders are not here, but their files may lie beside the scene.
+    folder: PathBuf,
     /// Textures by path and decoding: a file that several materials use is decoded once. `None`: it is missing.
     textures: HashMap<(PathBuf, Decoding), Option<u32>>,
     /// Bytes of decoded images so far.
@@ -62,8 +64,8 @@ pub(super) struct Decoding {
 }
 
 impl Loader {
-    pub(super) fn new(options: LoadOptions) -> Self {
-        Self { options, ..Self::default() }
+    pub(super) fn new(options: LoadOptions, folder: &Path) -> Self {
+        Self { options, folder: folder.into(), ..Self::default() }
     }
 
     /// Reads a whole file; `referrer` is the place that names it. If it is not there, one is taken that differs in case
@@ -76,9 +78,7 @@ impl Loader {
         if !error.is_missing() {
             return Err(error);
         }
-        // a file is named relative to the one that names it, so that its name alone is searched for there as well
-        let beside = path.parent().unwrap_or(Path::new(""));
-        let Some(found) = files::nearest(path, beside) else { return Err(error) };
+        let Some(found) = files::nearest(path, &self.folder) else { return Err(error) };
         self.replace(error, &format!("{} was taken", text::path(&found)))?;
         let bytes = files::read(&found).map_err(|source| LoadError::Read {
             path: found.clone(),

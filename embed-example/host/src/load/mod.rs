@@ -27,7 +27,7 @@ mod principled;
 mod scene_json;
 
 pub use error::LoadError;
-pub use files::MAX_FILE_BYTES;
+pub use files::{MAX_FILE_BYTES, read as read_file};
 pub use loader::{LoadOptions, LoadReport};
 
 use crate::description::SceneDescription;
@@ -44,7 +44,8 @@ pub fn load(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
 /// # Errors
 /// Files that cannot be read or are no scene, also those without a triangle.
 pub fn load_with(path: &Path, options: &LoadOptions) -> Result<(SceneDescription, LoadReport), LoadError> {
-    let mut loader = Loader::new(*options);
+    let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) };
+    let mut loader = Loader::new(*options, folder);
     let extension = path.extension().map(|e| e.to_ascii_lowercase());
     let scene = if path.is_dir() {
         scene_json::load(&mut loader, &path.join("scene.json"))?
