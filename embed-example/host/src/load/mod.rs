@@ -9,6 +9,7 @@
 //! | `presets` | nothing: media by name |
 //! | `images` | PNG and JPEG textures, EXR environment maps |
 //! | `loader` | the files that all of them ask for, each once |
+//! | `polygon` | nothing: polygons as triangles |
 //! | `json` | values of a JSON document with their paths |
 
 mod error;
@@ -18,6 +19,7 @@ mod loader;
 mod media;
 mod mtl;
 mod obj;
+mod polygon;
 mod presets;
 mod scene_json;
 
