@@ -26,7 +26,7 @@ pub fn camera(origin: [f64; 3], target: [f64; 3], vfov_deg: f64, size: [u32; 2])
     // the axis may be vertical
     let vertical = origin[0] == target[0] && origin[2] == target[2];
     let up = if vertical { [0.0, 0.0, -1.0] } else { [0.0, 1.0, 0.0] };
-    Camera { origin, target, up, vfov_deg, size, lens: None }
+    Camera { origin, target, up, vfov_deg, size, ..Camera::default() }
 }
 
 /// A scene that only the constant environment of radiance 1 lights.

@@ -159,6 +159,7 @@ fn camera_axes_reach_the_edges_of_the_picture() {
         vfov_deg: 60.0,
         size: [200, 100],
         lens: Some(ThinLens { radius: 0.5, focus_distance: 4.0 }),
+        ..Camera::default()
     };
     let baked = baked(&scene);
     let view = Scene::from_bytes(&baked.bytes).unwrap();

@@ -42,8 +42,10 @@ pub struct SceneDescription {
     pub emitters: Vec<Emitter>,
     /// Environment of the scene; `None` is black.
     pub environment: Option<Environment>,
-    /// Camera.
+    /// Camera that renders.
     pub camera: Camera,
+    /// Further cameras of the file, to be chosen by name; the blob holds `camera` alone.
+    pub cameras: Vec<NamedCamera>,
     /// Path segments from the camera: 1 sees emitters only, 2 adds direct light.
     pub max_depth: u32,
 }
@@ -277,6 +279,21 @@ pub enum Emitter {
         /// Irradiance of a surface that faces the light.
         irradiance: [f32; 3],
     },
+    /// Point that shines into a cone. At the angle t from the axis it has `intensity * f^2`, with
+    /// `f = (cos t - cos outer) / (cos inner - cos outer)` clamped to 0..=1: full inside the inner cone, nothing
+    /// outside the outer one (the falloff of glTF's KHR_lights_punctual).
+    Spot {
+        /// World space.
+        position: [f32; 3],
+        /// Axis, along which the light travels, of any length but 0.
+        direction: [f32; 3],
+        /// Radiant intensity on the axis, power per steradian.
+        intensity: [f32; 3],
+        /// Half angle of the inner cone, degrees, from 0 to `outer_deg`.
+        inner_deg: f32,
+        /// Half angle of the outer cone, degrees, above 0, at most 180.
+        outer_deg: f32,
+    },
 }
 
 /// Light from infinity, all around.
@@ -303,20 +320,47 @@ pub enum Environment {
     },
 }
 
-/// Pinhole or thin-lens camera; image right is cross(target - origin, up).
+/// How a camera maps directions and places to the image.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Projection {
+    /// Pinhole or thin lens, with [`Camera::vfov_deg`].
+    #[default]
+    Perspective,
+    /// Parallel rays along the viewing axis.
+    Orthographic {
+        /// Height of the image, world units.
+        height: f32,
+    },
+    /// Every direction around `origin`, latitude by longitude: the image's middle is the viewing axis, its left and
+    /// right edges lie behind, its rows are equal steps from `up` to down.
+    Panoramic,
+}
+
+/// A camera by its name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedCamera {
+    /// Name in the file.
+    pub name: String,
+    /// Camera.
+    pub camera: Camera,
+}
+
+/// Camera; image right is cross(target - origin, up).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
+    /// Projection to the image.
+    pub projection: Projection,
     /// World space. `f64` here and in `target`, so that their difference is precise far from the origin.
     pub origin: [f64; 3],
     /// A point on the viewing axis.
     pub target: [f64; 3],
     /// Upwards, not parallel to the axis.
     pub up: [f64; 3],
-    /// Full vertical field of view, degrees, between 0 and 180.
+    /// Full vertical field of view, degrees, between 0 and 180; read by the perspective projection alone.
     pub vfov_deg: f64,
     /// Columns and rows.
     pub size: [u32; 2],
-    /// `None` is a pinhole.
+    /// `None` is a pinhole; `None` for other projections than perspective.
     pub lens: Option<ThinLens>,
 }
 
@@ -333,6 +377,7 @@ impl Default for Camera {
     /// At (0, 0, 5), looking at the origin, 45 degrees, 512 x 512 pixels.
     fn default() -> Self {
         Self {
+            projection: Projection::Perspective,
             origin: [0.0, 0.0, 5.0],
             target: [0.0; 3],
             up: [0.0, 1.0, 0.0],
@@ -363,6 +408,7 @@ impl Default for SceneDescription {
             emitters: Vec::new(),
             environment: None,
             camera: Camera::default(),
+            cameras: Vec::new(),
             max_depth: 40,
         }
     }

@@ -1,7 +1,7 @@
 //! Viewing axis and image plane.
 
 use super::BakeError;
-use crate::description::Camera;
+use crate::description::{Camera, Projection};
 use croupier::unstable::scene::blob;
 use croupier::unstable::scene::blob::{MAX_COORDINATE, MAX_SIDE};
 use glam::DVec3;
@@ -10,6 +10,9 @@ use glam::DVec3;
 /// width / height to the right (pixels are square).
 pub(super) fn bake(c: &Camera) -> Result<blob::Camera, BakeError> {
     let bad = |what, found| BakeError::Camera { what, found };
+    if c.projection != Projection::Perspective {
+        return Err(bad("projections that the renderer lacks", 1.0));
+    }
     for (what, v) in [("origin", c.origin), ("target", c.target), ("up", c.up)] {
         let limit = f64::from(MAX_COORDINATE);
         if let Some(x) = v.iter().find(|x| x.is_nan() || x.abs() > limit) {

@@ -90,6 +90,10 @@ fn delta_light(index: usize, e: &Emitter) -> Result<Option<Light>, BakeError> {
             };
             (LightKind::Directional, (-travels).as_vec3().to_array(), irradiance)
         }
+        Emitter::Spot { .. } => {
+            let emitter = format!("emitter {index} (spot)");
+            return Err(BakeError::Emitter { emitter, what: "support by the renderer", found: 0.0 });
+        }
     };
     let light = Light { kind: kind as u32, vector, emission, ..Zeroable::zeroed() };
     Ok((emission != [0.0; 3]).then_some(light))

@@ -51,6 +51,7 @@ fn camera(c: &Place<'_>) -> Result<Camera, LoadError> {
         vfov_deg: c.get("vfov_deg")?.number()?,
         size: [c.get("width")?.count(1)?, c.get("height")?.count(1)?],
         lens: lens.transpose()?,
+        ..Camera::default()
     })
 }
 
