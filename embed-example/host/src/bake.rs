@@ -113,6 +113,9 @@ pub fn bake(
     };
     let done = |stage| progress(stage, 1.0);
 
+    if let Some(name) = scene.instances.first().map(|i| &i.name).or(scene.prototypes.first().map(|p| &p.name)) {
+        return Err(BakeError::Instance { name: name.clone(), what: "instances cannot be baked yet".into() });
+    }
     let stage = staged(Stage::Geometry);
     let camera = camera::bake(&scene.camera)?;
     let emission = lights::emission_of_materials(scene)?;

@@ -48,6 +48,44 @@ pub struct SceneDescription {
     pub cameras: Vec<NamedCamera>,
     /// Path segments from the camera: 1 sees emitters only, 2 adds direct light.
     pub max_depth: u32,
+    /// Groups of triangles and instances that are in the world through instances only.
+    pub prototypes: Vec<Prototype>,
+    /// Instances in the world.
+    pub instances: Vec<Instance>,
+}
+
+/// A group that instances place in the world as often as they like. Its vertices are in its own space.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Prototype {
+    /// Name in messages and scene files.
+    pub name: String,
+    /// Its triangles, which are not in the world themselves; runs of different prototypes share no triangle.
+    pub triangles: std::ops::Range<u32>,
+    /// Instances of other prototypes, relative to its own space. Those may have triangles, but no instances in turn.
+    pub instances: Vec<Instance>,
+}
+
+/// A placement of a prototype.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Instance {
+    /// Name in messages and scene files.
+    pub name: String,
+    /// Index of the prototype.
+    pub prototype: u32,
+    /// Rows of the affine map from the prototype's space to the space around the instance, when the shutter opens.
+    /// Mirrored and sheared maps will do, singular ones not.
+    pub to_world: [[f32; 4]; 3],
+    /// The map when the shutter closes; entries change linearly in between. `None`: it does not move.
+    pub to_world_end: Option<[[f32; 4]; 3]>,
+    /// Rays meet it. An invisible one is as good as absent until an edit of the blob shows it.
+    pub visible: bool,
+}
+
+impl Instance {
+    /// A visible instance that does not move.
+    pub fn new(name: &str, prototype: u32, to_world: [[f32; 4]; 3]) -> Self {
+        Self { name: name.into(), prototype, to_world, to_world_end: None, visible: true }
+    }
 }
 
 /// One corner.
@@ -410,6 +448,8 @@ impl Default for SceneDescription {
             camera: Camera::default(),
             cameras: Vec::new(),
             max_depth: 40,
+            prototypes: Vec::new(),
+            instances: Vec::new(),
         }
     }
 }

@@ -145,6 +145,13 @@ pub enum BakeError {
         /// Object with the first triangle.
         object: String,
     },
+    /// Instances and prototypes, which cannot be baked.
+    Instance {
+        /// Name of the instance or prototype.
+        name: String,
+        /// Fault.
+        what: String,
+    },
     /// More of something than indices of 31 bits can tell apart.
     TooMany {
         /// Plural of the thing.
@@ -200,6 +207,7 @@ impl fmt::Display for BakeError {
             Self::InsideOut { medium, object } => {
                 write!(f, "medium `{medium}`: the front sides of its boundary (object `{object}`) face inwards")
             }
+            Self::Instance { name, what } => write!(f, "instance `{name}`: {what}"),
             Self::TooMany { what, count } => write!(f, "{count} {what} are too many"),
         }
     }
