@@ -120,8 +120,9 @@ profiles! {
         .with(Effects::CONSTANT)
         .with(Effects::SMOOTH_NORMALS)
         .with(Effects::TEXTURES);
-    /// Every material and light, textures, lens: light that travels straight from one surface to the next.
+    /// Every material but the principled one, every light, textures, lens: light that travels straight from one surface to the next.
     Surfaces = "surfaces", Effects::ALL_MATERIALS
+        .without(Effects::PRINCIPLED)
         .with(Effects::TEXTURES)
         .with(Effects::AREA_LIGHTS)
         .with(Effects::ENVIRONMENT)

@@ -171,7 +171,7 @@ impl Case {
     pub fn two_sided(&self) -> bool {
         use MaterialKind::*;
         match self.kind {
-            Dielectric | RoughDielectric | ThinDielectric | Null => true,
+            Dielectric | RoughDielectric | ThinDielectric | Null | Principled => true,
             Diffuse | Mirror | Conductor | RoughConductor | Plastic | RoughPlastic => false,
         }
     }
@@ -261,7 +261,9 @@ impl Case {
         use MaterialKind::*;
         match self.kind {
             RoughConductor | RoughDielectric | RoughPlastic => {}
-            Diffuse | Mirror | Conductor | Dielectric | ThinDielectric | Plastic | Null => return Value::default(),
+            Diffuse | Mirror | Conductor | Dielectric | ThinDielectric | Plastic | Null | Principled => {
+                return Value::default();
+            }
         }
         if wo[2] == 0.0 || wi[2] == 0.0 {
             return Value::default();
@@ -314,7 +316,7 @@ impl Case {
                 let scale = self.coat(wo[2]) * self.coat(wi[2]) / self.eta().powi(2) * pdf;
                 Value { f: self.base().map(|r| r * scale), pdf }
             }
-            Mirror | Conductor | RoughConductor | Dielectric | RoughDielectric | ThinDielectric | Null => {
+            Mirror | Conductor | RoughConductor | Dielectric | RoughDielectric | ThinDielectric | Null | Principled => {
                 Value::default()
             }
         }
@@ -362,7 +364,7 @@ impl Case {
                 }
                 lobes
             }
-            Diffuse | RoughConductor | RoughDielectric | RoughPlastic => vec![],
+            Diffuse | RoughConductor | RoughDielectric | RoughPlastic | Principled => vec![],
         }
     }
 
@@ -485,10 +487,12 @@ fn all_cases() -> Vec<Case> {
     all
 }
 
-/// Panics unless `tried` has every kind that `wanted` asks for: a row of the table without a case in this test.
+/// Panics unless `tried` has every kind that `wanted` asks for: a row of the table without a case in this test. The
+/// principled material has an oracle and tests of its own (`tests/bsdf_principled.rs`).
 #[track_caller]
 pub fn assert_every_kind(tried: &[MaterialKind], wanted: impl Fn(&MaterialKind) -> bool) {
     let missing: Vec<_> = MaterialKind::ALL.iter().filter(|k| wanted(k) && !tried.contains(k)).collect();
+    let missing: Vec<_> = missing.into_iter().filter(|k| **k != MaterialKind::Principled).collect();
     assert!(missing.is_empty(), "no case of {missing:?}");
 }
 

@@ -37,7 +37,7 @@ pub fn misty(size: [u32; 2]) -> SceneDescription {
         ..SceneDescription::default()
     };
     let texels = (0..16u8).map(|i| [40 + 12 * i, 200 - 9 * i, 90, 17 * (i * 7 % 16)]).collect();
-    s.textures.push(Texture { name: "holes".into(), width: 4, height: 4, texels });
+    s.textures.push(Texture { name: "holes".into(), width: 4, height: 4, texels, ..Texture::default() });
     let values = (0..7 * 6 * 5).map(|i| (i * 37 % 101) as f32 / 50.0 * f32::from(i % 3 != 0)).collect();
     let smoke = Medium { emission: [0.2, 0.05, 0.0], ..homogeneous([0.5, 0.8, 1.5], [4.0, 3.0, 2.0], 0.5) };
     let bounds = [[-0.7, 0.1, -0.7], [0.6, 1.2, 0.5]];

@@ -178,6 +178,7 @@ pub fn everything(size: [u32; 2]) -> SceneDescription {
         width: 8,
         height: 8,
         texels: (0..64).map(|i| texel(i % 8, i / 8)).collect(),
+        ..Texture::default()
     });
     let floor = s.add_material("floor", Model::Diffuse { reflectance: Reflectance::Texture(0) });
     let emitter = s.add_material("emitter", grey(0.3));

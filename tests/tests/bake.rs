@@ -259,7 +259,13 @@ fn rough_plastics_share_tables() {
 fn textures_are_packed_row_by_row() {
     let mut scene = one_triangle();
     for (name, texel) in [("a", [1, 2, 3, 4]), ("b", [5, 6, 7, 8])] {
-        scene.textures.push(Texture { name: name.into(), width: 3, height: 2, texels: vec![texel; 6] });
+        scene.textures.push(Texture {
+            name: name.into(),
+            width: 3,
+            height: 2,
+            texels: vec![texel; 6],
+            ..Texture::default()
+        });
     }
     scene.materials[0].model = Model::Mirror { reflectance: Reflectance::Texture(1) };
     let baked = baked(&scene);
@@ -316,11 +322,27 @@ fn what_cannot_be_baked_is_named() {
             &["material `grey`", "texture 2", "there are 0"],
         ),
         (
-            |s| s.textures.push(Texture { name: "t.png".into(), width: 2, height: 2, texels: vec![[0; 4]; 3] }),
+            |s| {
+                s.textures.push(Texture {
+                    name: "t.png".into(),
+                    width: 2,
+                    height: 2,
+                    texels: vec![[0; 4]; 3],
+                    ..Texture::default()
+                })
+            },
             &["`t.png`", "2 x 2", "3 texels"],
         ),
         (
-            |s| s.textures.push(Texture { name: "t.png".into(), width: 0, height: 2, texels: vec![] }),
+            |s| {
+                s.textures.push(Texture {
+                    name: "t.png".into(),
+                    width: 0,
+                    height: 2,
+                    texels: vec![],
+                    ..Texture::default()
+                })
+            },
             &["`t.png`", "0 x 2"],
         ),
         (|s| s.emitters.push(Emitter::Area { material: 4, radiance: [1.0; 3] }), &["emitter 0 (area)", "material 4"]),

@@ -253,7 +253,7 @@ fn flags_are_set_where_they_change_something() {
         let mut scene = SceneDescription::default();
         for (name, alpha) in [("opaque", 255), ("holes", 254)] {
             let texels = vec![[9, 9, 9, 255], [9, 9, 9, alpha]];
-            scene.textures.push(Texture { name: name.into(), width: 2, height: 1, texels });
+            scene.textures.push(Texture { name: name.into(), width: 2, height: 1, texels, ..Texture::default() });
         }
         scene.add_material("m", model);
         let m = &mut scene.materials[0];

@@ -35,6 +35,7 @@ fn fields(parameter: Parameter) -> (&'static [&'static str], &'static str, [f32;
         Parameter::TransmittanceTable => (&["table"], "REFLECTANCE_RANGE", REFLECTANCE_RANGE),
         Parameter::CompensationTable => (&["table"], "COMPENSATION_RANGE", COMPENSATION_RANGE),
         Parameter::EnergyTable => (&["table"], "ENERGY_RANGE", ENERGY_RANGE),
+        Parameter::Principled => (&["table"], "REFLECTANCE_RANGE", REFLECTANCE_RANGE),
     }
 }
 
@@ -150,6 +151,10 @@ impl ParameterSource for Source {
 
     fn alpha(&mut self) -> Result<f32, Infallible> {
         self.give("alpha", 0.2)
+    }
+
+    fn principled(&mut self) -> Result<Principled, Infallible> {
+        Ok(Principled::default())
     }
 }
 

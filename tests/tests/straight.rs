@@ -114,7 +114,7 @@ fn panes_before_area_lights_follow_quadrature() {
 /// A black texture of 2 x 2 texels with those alphas, row 0 at the top.
 fn cutout(s: &mut SceneDescription, alpha: [u8; 4]) -> u32 {
     let texels = alpha.map(|a| [0, 0, 0, a]).to_vec();
-    s.textures.push(Texture { name: "holes".into(), width: 2, height: 2, texels });
+    s.textures.push(Texture { name: "holes".into(), width: 2, height: 2, texels, ..Texture::default() });
     let material = s.add_material("cut-out", Model::Diffuse { reflectance: Reflectance::Texture(0) });
     s.materials[material as usize].cutout = true;
     material

@@ -17,6 +17,7 @@ mod lobes;
 mod mirror;
 mod null;
 mod plastic;
+mod principled;
 mod roughconductor;
 mod roughdielectric;
 mod roughplastic;
@@ -31,6 +32,7 @@ pub use lobes::{CacheDirection, Lobes, MIRROR_SHININESS, ModelFacts};
 pub use mirror::Mirror;
 pub use null::Null;
 pub use plastic::Plastic;
+pub use principled::Principled;
 pub use roughconductor::RoughConductor;
 pub use roughdielectric::RoughDielectric;
 pub use roughplastic::RoughPlastic;
@@ -204,6 +206,7 @@ models! {
     Plastic => Plastic;
     RoughPlastic => RoughPlastic<'s>, RoughPlastic<'s, false>;
     Null => Null;
+    Principled => Principled;
 }
 
 /// A set of material kinds, a bit each, from a table of one entry per kind.

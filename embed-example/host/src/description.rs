@@ -21,6 +21,10 @@
 //! # Ok::<(), croupier_host::bake::BakeError>(())
 //! ```
 
+mod principled;
+
+pub use principled::{Principled, TextureRef};
+
 use croupier::unstable::scene::blob::MaterialKind;
 
 /// A whole scene. Indices are positions in the `Vec`s here.
@@ -206,6 +210,8 @@ pub struct ModelParameters {
     pub ext_ior: Option<f32>,
     /// GGX width.
     pub alpha: Option<f32>,
+    /// Everything of a principled material.
+    pub principled: Option<Principled>,
 }
 
 /// Source of a model's parameters, such as an object of a scene file.
@@ -224,14 +230,16 @@ pub trait ParameterSource {
     fn ext_ior(&mut self) -> Result<f32, Self::Error>;
     /// `alpha`.
     fn alpha(&mut self) -> Result<f32, Self::Error>;
+    /// The keys of a principled material, each with a default.
+    fn principled(&mut self) -> Result<Principled, Self::Error>;
 }
 
 macro_rules! models {
-    ($($(#[$doc:meta])* $kind:ident $({ $($parameter:ident: $type:ty),* })?;)*) => {
+    ($($(#[$doc:meta])* $kind:ident $({ $($parameter:ident: $type:ty),* })? $(($whole:ident: $all:ty))?;)*) => {
         /// Scattering models; their parameters are those of [`ModelParameters`], present.
         #[derive(Clone, Copy, Debug, PartialEq)]
         #[expect(missing_docs, reason = "the fields are described at `ModelParameters`, their formulas in the core")]
-        pub enum Model { $($(#[$doc])* $kind $({ $($parameter: $type),* })?),* }
+        pub enum Model { $($(#[$doc])* $kind $({ $($parameter: $type),* })? $(($all))?),* }
 
         impl Model {
             /// Kind of material in the blob.
@@ -242,15 +250,18 @@ macro_rules! models {
             /// Parameters of the model.
             pub fn parameters(&self) -> ModelParameters {
                 match *self {
-                    $(Self::$kind $({ $($parameter),* })? =>
-                        ModelParameters { $($($parameter: Some($parameter),)*)? ..ModelParameters::default() }),*
+                    $(Self::$kind $({ $($parameter),* })? $(($whole))? => ModelParameters {
+                        $($($parameter: Some($parameter),)*)? $($whole: Some($whole),)?
+                        ..ModelParameters::default()
+                    }),*
                 }
             }
 
             /// The model of a kind with the parameters that `source` gives.
             pub fn from_source<S: ParameterSource>(kind: MaterialKind, source: &mut S) -> Result<Self, S::Error> {
                 match kind {
-                    $(MaterialKind::$kind => Ok(Self::$kind $({ $($parameter: source.$parameter()?),* })?)),*
+                    $(MaterialKind::$kind =>
+                        Ok(Self::$kind $({ $($parameter: source.$parameter()?),* })? $((source.$whole()?))?)),*
                 }
             }
         }
@@ -278,10 +289,34 @@ models! {
     RoughPlastic { reflectance: Reflectance, int_ior: f32, ext_ior: f32, alpha: f32 };
     /// Index-matched boundary: light passes unchanged.
     Null;
+    /// Layers of sheen, coat, metal, dielectric, transmission and a diffuse base.
+    Principled(principled: Principled);
 }
 
-/// An 8-bit image, sRGB-encoded; bilinear, repeated.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// What the texels of a texture stand for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Encoding {
+    /// Colours, sRGB-encoded.
+    #[default]
+    Srgb,
+    /// Numbers from 0 to 1.
+    Linear,
+}
+
+/// Texels beyond the edges of a texture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// The texture again.
+    #[default]
+    Repeat,
+    /// Those at the edge.
+    Clamp,
+    /// The texture, mirrored at the edge.
+    Mirror,
+}
+
+/// An 8-bit image; bilinear.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Texture {
     /// Name or path, for messages.
     pub name: String,
@@ -291,6 +326,10 @@ pub struct Texture {
     pub height: u32,
     /// `width * height` texels r, g, b, a; row 0 is the top (v = 1). Alpha is read by cut-outs only.
     pub texels: Vec<[u8; 4]>,
+    /// Encoding of red, green and blue; alpha is linear.
+    pub encoding: Encoding,
+    /// Along u and v.
+    pub wrap: [Wrap; 2],
 }
 
 /// A light of the scene.
@@ -429,7 +468,10 @@ impl Default for Camera {
 impl Model {
     /// Whether light passes the surface.
     pub const fn is_transmissive(&self) -> bool {
-        self.kind().facts().transmissive
+        match self {
+            Self::Principled(p) => p.transmission > 0.0,
+            _ => self.kind().facts().transmissive,
+        }
     }
 }
 

@@ -209,7 +209,13 @@ fn every_effect_has_a_reason() {
 #[test]
 fn reasons_count_what_triangles_use() {
     let mut scene = everything([8, 8]);
-    scene.textures.push(Texture { name: "unused".into(), width: 1, height: 1, texels: vec![[0; 4]] });
+    scene.textures.push(Texture {
+        name: "unused".into(),
+        width: 1,
+        height: 1,
+        texels: vec![[0; 4]],
+        ..Texture::default()
+    });
     scene.add_material("unused", Model::Diffuse { reflectance: Reflectance::Texture(1) });
     scene.add_material("unused", Model::Mirror { reflectance: Reflectance::Constant([1.0; 3]) });
     let bytes = blob(&scene);

@@ -72,7 +72,7 @@ scenes! {
     "texture", [DIFFUSE, AREA_LIGHTS, TEXTURES], || {
         changed(|s| {
             let texels = (0..16).map(|i| [10 * i, 255 - 9 * i, 40, 255]).collect();
-            s.textures.push(Texture { name: "ramp".into(), width: 4, height: 4, texels });
+            s.textures.push(Texture { name: "ramp".into(), width: 4, height: 4, texels, ..Texture::default() });
             s.materials[0].model = Model::Diffuse { reflectance: Reflectance::Texture(0) };
         })
     };
@@ -101,7 +101,7 @@ scenes! {
     "cut-outs", [DIFFUSE, AREA_LIGHTS, TEXTURES, ALPHA], || {
         changed(|s| {
             let texels = (0..16).map(|i| [200, 180, 160, 17 * i]).collect();
-            s.textures.push(Texture { name: "leaves".into(), width: 4, height: 4, texels });
+            s.textures.push(Texture { name: "leaves".into(), width: 4, height: 4, texels, ..Texture::default() });
             let m = s.add_material("leaves", Model::Diffuse { reflectance: Reflectance::Texture(0) });
             s.materials[m as usize].cutout = true;
             add_quad(s, "leaves", m, facing_z(0.6, 0.3, 1.0).map(|[x, y, z]| [x, y - 0.4, z]));

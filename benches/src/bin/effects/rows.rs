@@ -132,7 +132,13 @@ fn sphere(scene: &mut SceneDescription, model: Model) {
 fn textured(scene: &mut SceneDescription) {
     let texels =
         (0..64 * 64u32).map(|i| if (i / 8 + i / 512) % 2 == 0 { [200, 190, 180, 255] } else { [60, 60, 90, 0] });
-    scene.textures.push(Texture { name: "checks".into(), width: 64, height: 64, texels: texels.collect() });
+    scene.textures.push(Texture {
+        name: "checks".into(),
+        width: 64,
+        height: 64,
+        texels: texels.collect(),
+        ..Texture::default()
+    });
     scene.vertices.iter_mut().for_each(|v| v.uv = [v.position[0], v.position[1] + v.position[2]]);
     scene.materials[0].model = Model::Diffuse { reflectance: Reflectance::Texture(0) };
 }

@@ -58,6 +58,8 @@ macro_rules! material_table {
                 [Reflectance, RelativeEta, Alpha, InternalReflectance, TransmittanceTable, CompensationTable];
             /// Index-matched boundary.
             Null = 9, "null", NULL, transmissive: true, delta: true, [];
+            /// Layers of sheen, coat, metal, dielectric, transmission and a diffuse base.
+            Principled = 10, "principled", PRINCIPLED, transmissive: true, delta: false, [Principled];
         }
     };
 }
@@ -126,6 +128,8 @@ pub enum Parameter {
     /// `table`, derived from `eta[0]` and `alpha`, with [`MATERIAL_COMPENSATED`] only: energy scattered to both sides,
     /// from outside and then from inside.
     EnergyTable,
+    /// `table`: a record of numbers, texture references and tables.
+    Principled,
 }
 
 impl Parameter {
@@ -139,12 +143,13 @@ impl Parameter {
         Self::TransmittanceTable,
         Self::CompensationTable,
         Self::EnergyTable,
+        Self::Principled,
     ];
 
     /// Smallest and largest value allowed of each number.
     pub const fn range(self) -> [f32; 2] {
         match self {
-            Self::Reflectance | Self::TransmittanceTable => REFLECTANCE_RANGE,
+            Self::Reflectance | Self::TransmittanceTable | Self::Principled => REFLECTANCE_RANGE,
             Self::Alpha => ALPHA_RANGE,
             Self::RelativeEta => ETA_RANGE,
             Self::ComplexEta => CONDUCTOR_RANGE,
@@ -161,7 +166,12 @@ impl Parameter {
             Self::Alpha => &["alpha"],
             Self::RelativeEta => &["int_ior", "ext_ior"],
             Self::ComplexEta => &["eta", "k"],
-            Self::InternalReflectance | Self::TransmittanceTable | Self::CompensationTable | Self::EnergyTable => &[],
+            // each key of a principled material has a default
+            Self::InternalReflectance
+            | Self::TransmittanceTable
+            | Self::CompensationTable
+            | Self::EnergyTable
+            | Self::Principled => &[],
         }
     }
 
@@ -171,7 +181,12 @@ impl Parameter {
             Self::TransmittanceTable => TRANSMITTANCE_ENTRIES,
             Self::CompensationTable => COMPENSATION_ENTRIES,
             Self::EnergyTable => 2 * COMPENSATION_ENTRIES,
-            Self::Reflectance | Self::Alpha | Self::RelativeEta | Self::ComplexEta | Self::InternalReflectance => 0,
+            Self::Reflectance
+            | Self::Alpha
+            | Self::RelativeEta
+            | Self::ComplexEta
+            | Self::InternalReflectance
+            | Self::Principled => 0,
         }
     }
 

@@ -74,7 +74,10 @@ fn parameter(at: Record, m: &Material, parameter: Parameter) -> Result<(), Scene
         }
         Parameter::InternalReflectance => at.within(Field::InternalReflectance, m.fdr, lo, hi),
         // `tables` checks them
-        Parameter::TransmittanceTable | Parameter::CompensationTable | Parameter::EnergyTable => Ok(()),
+        Parameter::TransmittanceTable
+        | Parameter::CompensationTable
+        | Parameter::EnergyTable
+        | Parameter::Principled => Ok(()),
     }
 }
 

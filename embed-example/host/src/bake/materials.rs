@@ -51,7 +51,8 @@ impl Draft<'_> {
             Parameter::ComplexEta => {
                 self.complex_eta(from.eta.unwrap_or([f32::NAN; 3]), from.k.unwrap_or([f32::NAN; 3]), range)
             }
-            Parameter::InternalReflectance
+            Parameter::Principled
+            | Parameter::InternalReflectance
             | Parameter::TransmittanceTable
             | Parameter::CompensationTable
             | Parameter::EnergyTable => Ok(()),
@@ -150,6 +151,7 @@ impl Tables {
                 | Parameter::Alpha
                 | Parameter::RelativeEta
                 | Parameter::ComplexEta
+                | Parameter::Principled
                 | Parameter::InternalReflectance => {}
             }
         }

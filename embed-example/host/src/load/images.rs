@@ -37,7 +37,7 @@ fn png(bytes: &[u8]) -> Result<Texture, String> {
         ColorType::Rgba => data.chunks_exact(4).map(|t| [t[0], t[1], t[2], t[3]]).collect(),
         ColorType::Indexed => return Err("its palette was not expanded".into()),
     };
-    Ok(Texture { name: String::new(), width: info.width, height: info.height, texels })
+    Ok(Texture { name: String::new(), width: info.width, height: info.height, texels, ..Texture::default() })
 }
 
 /// Any JPEG of 8 bits a channel, up to 16384 pixels a side; grey, RGB, YCbCr or CMYK, sRGB is assumed. Files that end
@@ -52,7 +52,7 @@ fn jpeg(bytes: &[u8]) -> Result<Texture, String> {
     if texels.is_empty() || texels.len() != usize::from(size[0]) * usize::from(size[1]) {
         return Err(format!("a JPEG of {} texels for {} x {} pixels", texels.len(), size[0], size[1]));
     }
-    Ok(Texture { name: String::new(), width: size[0].into(), height: size[1].into(), texels })
+    Ok(Texture { name: String::new(), width: size[0].into(), height: size[1].into(), texels, ..Texture::default() })
 }
 
 /// The RGB picture of an EXR as an unscaled, unrotated environment map, and how many negative or NaN numbers (filters

@@ -4,7 +4,7 @@ use super::json::{self, Place};
 use super::loader::Loader;
 use super::{LoadError, media, obj};
 use crate::description::{
-    Camera, Emitter, Environment, Material, Model, ParameterSource, Reflectance, SceneDescription, ThinLens,
+    Camera, Emitter, Environment, Material, Model, ParameterSource, Principled, Reflectance, SceneDescription, ThinLens,
 };
 use croupier::unstable::scene::blob::{EnvironmentKind, LightKind, MaterialKind};
 use std::path::Path;
@@ -121,6 +121,10 @@ impl ParameterSource for Parameters<'_, '_> {
 
     fn alpha(&mut self) -> Result<f32, LoadError> {
         self.m.get("alpha")?.float()
+    }
+
+    fn principled(&mut self) -> Result<Principled, LoadError> {
+        Ok(Principled::default())
     }
 }
 
