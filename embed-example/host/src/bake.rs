@@ -20,6 +20,7 @@ mod lights;
 mod materials;
 mod media;
 
+pub(crate) use boundary::is_closed as boundary_is_closed;
 pub use error::BakeError;
 
 use crate::blob::{AlignedBytes, BlobWriter};

@@ -3,6 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::{error, fmt, io};
 
+/// Files that scenes come in.
+const KINDS: &str = ".gltf, .glb, .obj, .ply, .stl";
+
 /// Error in the files of a scene; every text names the file, and where in it.
 #[derive(Debug)]
 #[non_exhaustive]
@@ -20,6 +23,22 @@ pub enum LoadError {
     Unknown {
         /// File.
         path: PathBuf,
+    },
+    /// A whole file.
+    File {
+        /// File.
+        path: PathBuf,
+        /// Fault, in words.
+        what: String,
+    },
+    /// A place in a binary file.
+    Binary {
+        /// File.
+        path: PathBuf,
+        /// Bytes before the place.
+        offset: u64,
+        /// Fault, in words.
+        what: String,
     },
     /// A line of a text file.
     Line {
@@ -64,6 +83,19 @@ impl LoadError {
         Self::Line { path: path.into(), line, what: what.into() }
     }
 
+    pub(super) fn file(path: &Path, what: impl Into<String>) -> Self {
+        Self::File { path: path.into(), what: what.into() }
+    }
+
+    pub(super) fn binary(path: &Path, offset: u64, what: impl Into<String>) -> Self {
+        Self::Binary { path: path.into(), offset, what: what.into() }
+    }
+
+    /// A value of a JSON file, by its path in the document.
+    pub(super) fn json(path: &Path, at: impl Into<String>, what: impl Into<String>) -> Self {
+        Self::Json { path: path.into(), at: at.into(), what: what.into() }
+    }
+
     pub(super) fn image(path: &Path, referrer: &str, what: String) -> Self {
         Self::Image { path: path.into(), referrer: referrer.into(), what }
     }
@@ -83,6 +115,13 @@ impl LoadError {
     }
 }
 
+/// Text of a file for a message: in quotes, cut after 60 characters, without control characters.
+pub(super) fn quoted(text: &str) -> String {
+    let shown = text.chars().take(60).map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c });
+    let more = if text.chars().nth(60).is_some() { "..." } else { "" };
+    format!("`{}{more}`", shown.collect::<String>())
+}
+
 impl fmt::Display for LoadError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -91,8 +130,14 @@ impl fmt::Display for LoadError {
                 write!(f, "cannot read {}, which {by} names: {source}", path.display())
             }
             Self::Unknown { path } => {
-                write!(f, "{} is neither a folder with a scene.json nor an .obj file", path.display())
+                write!(
+                    f,
+                    "{} is neither a folder with a scene.json nor a file of a known kind ({KINDS})",
+                    path.display()
+                )
             }
+            Self::File { path, what } => write!(f, "{}: {what}", path.display()),
+            Self::Binary { path, offset, what } => write!(f, "{}: byte {offset}: {what}", path.display()),
             Self::Line { path, line, what } => write!(f, "{}:{line}: {what}", path.display()),
             Self::Json { path, at, what } => write!(f, "{}: {at}: {what}", path.display()),
             Self::Image { path, referrer, what } => {

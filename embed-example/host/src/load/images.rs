@@ -1,5 +1,6 @@
-//! Decoders: PNG and JPEG textures, EXR environment maps. Errors are texts; the caller knows the file.
+//! Decoders: PNG and JPEG textures, EXR and Radiance environment maps. Errors are texts; the caller knows the file.
 
+use super::hdr;
 use crate::description::{Environment, Texture};
 use crate::image::{Picture, Rgb};
 use png::{BitDepth, ColorType, Transformations};
@@ -55,11 +56,16 @@ fn jpeg(bytes: &[u8]) -> Result<Texture, String> {
     Ok(Texture { name: String::new(), width: size[0].into(), height: size[1].into(), texels, ..Texture::default() })
 }
 
-/// The RGB picture of an EXR as an unscaled, unrotated environment map, and how many negative or NaN numbers (filters
+/// The RGB picture of an EXR or a Radiance file, told by its first bytes, as an unscaled, unrotated environment map, and how many negative or NaN numbers (filters
 /// leave them behind) became 0.
-pub(super) fn exr(bytes: &[u8]) -> Result<(Environment, usize), String> {
-    let picture = Picture::decode_exr(Cursor::new(bytes)).map_err(|e| format!("not a readable EXR: {e}"))?;
-    let Rgb { width, height, pixels: mut texels } = picture.main().ok_or("no layer with channels R, G and B")?;
+pub(super) fn environment(bytes: &[u8]) -> Result<(Environment, usize), String> {
+    let picture = if hdr::is_hdr(bytes) {
+        hdr::decode(bytes)?
+    } else {
+        let picture = Picture::decode_exr(Cursor::new(bytes)).map_err(|e| format!("not a readable EXR: {e}"))?;
+        picture.main().ok_or("no layer with channels R, G and B")?
+    };
+    let Rgb { width, height, pixels: mut texels } = picture;
     let mut clamped = 0;
     for x in texels.iter_mut().flatten() {
         if x.is_nan() || *x < 0.0 {

@@ -57,17 +57,22 @@ impl Loader {
             return Ok(*index);
         }
         let bytes = self.read(path, Some(referrer))?;
-        let image = images::texture(&bytes).map_err(|what| LoadError::image(path, referrer, what))?;
+        let image = self.decode(&bytes).map_err(|what| LoadError::image(path, referrer, what))?;
         let index = scene.textures.len() as u32;
         scene.textures.push(Texture { name: path.display().to_string(), ..image });
         self.textures.insert(path.into(), index);
         Ok(index)
     }
 
+    /// A PNG or JPEG that is in memory; the error is a text.
+    pub(super) fn decode(&mut self, bytes: &[u8]) -> Result<Texture, String> {
+        images::texture(bytes)
+    }
+
     /// The environment map in `path`, unscaled and unrotated.
     pub(super) fn environment(&mut self, path: &Path, referrer: &str) -> Result<Environment, LoadError> {
         let bytes = self.read(path, Some(referrer))?;
-        let (map, clamped) = images::exr(&bytes).map_err(|what| LoadError::image(path, referrer, what))?;
+        let (map, clamped) = images::environment(&bytes).map_err(|what| LoadError::image(path, referrer, what))?;
         if clamped > 0 {
             self.note(format!("{}: {clamped} negative or NaN numbers were taken as 0", path.display()));
         }

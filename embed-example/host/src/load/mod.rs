@@ -4,33 +4,45 @@
 //! |---|---|
 //! | `scene_json` | a folder with `scene.json` (the format of docs/SCENES.md) |
 //! | `obj` | geometry: Wavefront OBJ |
+//! | `gltf` | glTF 2.0, with materials and textures of its own |
+//! | `ply`, `stl` | geometry: PLY, STL; `bare` makes a scene of it |
 //! | `mtl` | materials of a bare OBJ |
 //! | `media` | participating media of a `scene.json`, density grids |
 //! | `presets` | nothing: media by name |
-//! | `images` | PNG and JPEG textures, EXR environment maps |
+//! | `images` | PNG and JPEG textures, environment maps: EXR, and Radiance through `hdr` |
+//! | `colors` | nothing: colours of vertices as textures |
 //! | `loader` | the files that all of them ask for, each once |
 //! | `polygon` | nothing: polygons as triangles |
 //! | `json` | values of a JSON document with their paths |
 
+mod bare;
+mod colors;
 mod error;
+mod gltf;
+mod hdr;
 mod images;
 mod json;
 mod loader;
 mod media;
 mod mtl;
 mod obj;
+mod ply;
 mod polygon;
 mod presets;
 mod scene_json;
+mod stl;
 
 pub use error::LoadError;
 pub use loader::LoadReport;
 
 use crate::description::SceneDescription;
 use loader::Loader;
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
-/// Loads a folder with a `scene.json`, that `scene.json` itself, or a bare `.obj` file.
+/// Loads a folder with a `scene.json`, that `scene.json` itself, or a file of another kind by its extension: `.gltf`,
+/// `.glb`, `.obj`, `.ply`, `.stl`. A file that begins like `.glb` or PLY is one, whatever its name is.
 pub fn load(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
     let mut loader = Loader::default();
     let extension = path.extension().map(|e| e.to_ascii_lowercase());
@@ -39,6 +51,11 @@ pub fn load(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
     } else {
         match extension.as_ref().and_then(|e| e.to_str()) {
             Some("json") => scene_json::load(&mut loader, path)?,
+            Some("gltf" | "glb") => gltf::load(&mut loader, path)?,
+            _ if starts(path, gltf::is_glb) => gltf::load(&mut loader, path)?,
+            _ if starts(path, ply::is_ply) => ply::load(&mut loader, path)?,
+            Some("ply") => ply::load(&mut loader, path)?,
+            Some("stl") => stl::load(&mut loader, path)?,
             Some("obj") => obj::load_bare(&mut loader, path)?,
             // Whether it is there is the better message.
             _ if !path.exists() => scene_json::load(&mut loader, path)?,
@@ -46,4 +63,11 @@ pub fn load(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
         }
     };
     Ok((scene, loader.report))
+}
+
+/// Whether the first bytes of a file are what `is` knows. False if it cannot be read, which its loader says better.
+fn starts(path: &Path, is: fn(&[u8]) -> bool) -> bool {
+    let mut head = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(64).read_to_end(&mut head));
+    read.is_ok() && is(&head)
 }

@@ -10,13 +10,13 @@ use super::json::Place;
 use super::loader::Loader;
 use super::{LoadError, mtl};
 use crate::builtin;
-use crate::description::{Camera, Emitter, Object, SceneDescription, Triangle, Vertex};
+use crate::description::{Camera, Emitter, Material, Model, Object, SceneDescription, Triangle, Vertex};
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// Name under which faces without `usemtl` appear.
-const NO_MATERIAL: &str = "default";
+pub(super) const NO_MATERIAL: &str = "default";
 
 /// The text for `tobj`, and what the check found.
 struct Prepared {
@@ -346,13 +346,25 @@ pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescrip
         materials.push(index);
     }
     append(path, &mut scene, prepared, &materials)?;
-    scene.camera = frame(&scene);
-    loader.note("the file has no camera: it was framed to show everything".into());
-    if scene.emitters.is_empty() {
+    complete(loader, &mut scene, None);
+    Ok(scene)
+}
+
+/// Adds what a file lacks: without a `camera`, one that sees the whole scene; without lights, the sky of
+/// [`builtin::sky`]. Emission that a texture modulates is no light: displays and eyes have it.
+pub(super) fn complete(loader: &mut Loader, scene: &mut SceneDescription, camera: Option<Camera>) {
+    scene.camera = camera.unwrap_or_else(|| {
+        loader.note("the file has no camera: it was framed to show everything".into());
+        frame(scene)
+    });
+    let lamp = |m: &Material| match &m.model {
+        Model::Principled(p) => p.emission != [0.0; 3] && p.emission_texture.is_none(),
+        _ => false,
+    };
+    if scene.emitters.is_empty() && !scene.materials.iter().any(lamp) {
         scene.environment = Some(builtin::sky());
         loader.note("the file has no light: an environment was added".into());
     }
-    Ok(scene)
 }
 
 /// A camera that sees the bounding sphere whole, from the front, the right and above.
