@@ -1,4 +1,5 @@
-//! Rays through pixels: pinhole and thin lens.
+//! Rays through pixels: perspective (pinhole and thin lens), orthographic and panoramic projection. The formulas of all
+//! three are at [`Camera`].
 //!
 //! A pixel sample is a point (x, y) of the image in pixels, x to the right and y down from the upper left corner; the
 //! box filter is a sample uniform in the pixel's square, which the caller chooses. With x and y scaled to [-1, 1] the
@@ -7,23 +8,20 @@
 //! A thin lens (Kolb, Mitchell, Hanrahan, SIGGRAPH 1995, section 2) spreads the origins over a disk of radius
 //! `lens_radius` across the axis; all rays of an image point meet in the plane at `focus_distance` along the axis.
 
-use crate::scene::blob::Camera;
+use crate::scene::blob::{Camera, CameraKind};
 use croupier_simd::{F32x8, Vec3x8};
 
-/// Eight camera rays: origins and unit directions, world space.
+/// Eight rays of a perspective camera: origins and unit directions, world space.
 ///
 /// `size` is the image in pixels, (x, y) points of it, `u_lens` uniform in [0, 1)^2 (unused by a pinhole). An image of
 /// another shape than the camera's own `size` keeps the vertical field of view: `right` is scaled by the ratio of the
 /// two aspects, so pixels stay square if they were.
 #[inline(always)]
 pub fn generate(camera: &Camera, size: [u32; 2], x: F32x8, y: F32x8, u_lens: [F32x8; 2]) -> (Vec3x8, Vec3x8) {
-    let [width, height] = size.map(|s| s.max(1) as f32);
-    let [own_width, own_height] = camera.size.map(|s| s.max(1) as f32);
-    // Exactly 1 for the camera's own size.
-    let stretch = (width * own_height) / (height * own_width);
     let v = |a: [f32; 3]| Vec3x8::splat(a[0], a[1], a[2]);
     let (right, down) = (v(camera.right), v(camera.down));
-    let (sx, sy) = ((x * 2.0 / F32x8::splat(width) - 1.0) * stretch, y * 2.0 / F32x8::splat(height) - 1.0);
+    let ([sx, sy], stretch) = scaled(camera, size, x, y);
+    let sx = sx * stretch;
     // Reaches the plane at distance 1 along the axis.
     let through = v(camera.forward) + right * sx + down * sy;
     let origin = v(camera.origin);
@@ -33,6 +31,34 @@ pub fn generate(camera: &Camera, size: [u32; 2], x: F32x8, y: F32x8, u_lens: [F3
     let [a, b] = concentric_disk(u_lens).map(|c| c * camera.lens_radius);
     let offset = right.normalize() * a + down.normalize() * b;
     (origin + offset, (through * camera.focus_distance - offset).normalize_fast())
+}
+
+/// Points of the image scaled to [-1, 1], and what `right` is scaled by for an image of another shape than the camera's
+/// own: exactly 1 for its own size.
+#[inline(always)]
+fn scaled(camera: &Camera, size: [u32; 2], x: F32x8, y: F32x8) -> ([F32x8; 2], f32) {
+    let [width, height] = size.map(|s| s.max(1) as f32);
+    let [own_width, own_height] = camera.size.map(|s| s.max(1) as f32);
+    let stretch = (width * own_height) / (height * own_width);
+    ([x * 2.0 / F32x8::splat(width) - 1.0, y * 2.0 / F32x8::splat(height) - 1.0], stretch)
+}
+
+/// As [`generate`], for a camera of any projection. An orthographic image of another shape keeps its height, a
+/// panoramic one always shows the whole sphere.
+#[inline(never)]
+pub fn project(camera: &Camera, size: [u32; 2], x: F32x8, y: F32x8, u_lens: [F32x8; 2]) -> (Vec3x8, Vec3x8) {
+    let v = |a: [f32; 3]| Vec3x8::splat(a[0], a[1], a[2]);
+    let (origin, forward, right, down) = (v(camera.origin), v(camera.forward), v(camera.right), v(camera.down));
+    let ([sx, sy], stretch) = scaled(camera, size, x, y);
+    match CameraKind::from_u32(camera.kind) {
+        Some(CameraKind::Orthographic) => (origin + right * (sx * stretch) + down * sy, forward.normalize_fast()),
+        Some(CameraKind::Panoramic) => {
+            let ((sin, cos), (below, level)) = ((sx * 0.5).sin_cos_2pi(), (sy * 0.25).sin_cos_2pi());
+            let through = (forward * cos + right * sin) * level + down * below;
+            (origin, through.normalize_fast())
+        }
+        Some(CameraKind::Perspective) | None => generate(camera, size, x, y, u_lens),
+    }
 }
 
 /// Area-preserving map of the unit square to the unit disk (Shirley and Chiu, JGT 2(3) 1997): squares around the centre

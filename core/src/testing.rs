@@ -75,6 +75,7 @@ pub(crate) fn scene<R>(f: impl FnOnce(&Scene<'_>) -> R) -> R {
     let environment =
         Environment { kind: EnvironmentKind::Constant as u32, light: 1, radiance: ENVIRONMENT, ..Zeroable::zeroed() };
     let camera = Camera {
+        kind: 0,
         origin: [0.25, 0.25, 0.5],
         forward: [0.0, 0.0, -1.0],
         right: [0.125, 0.0, 0.0],

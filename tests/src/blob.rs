@@ -209,6 +209,7 @@ impl Parts {
             env_texels: (0..16).map(|i| [if i < 8 { 0.0 } else { i as f32 }; 3]).collect(),
             env_alias: [alias(&[0, 3, 5]), alias(&[1, 1, 1, 1]), alias(&[1, 2, 3, 4]), alias(&[9, 0, 0, 1])].concat(),
             cameras: vec![Camera {
+                kind: CameraKind::Perspective as u32,
                 origin: [0.0, 1.0, 6.0],
                 forward: [0.0, 0.0, -1.0],
                 right: [0.5, 0.0, 0.0],

@@ -77,6 +77,20 @@ impl LightScene {
         self
     }
 
+    /// Gives the last light a cone: axis, 1 - cos of the outer and of the inner half angle.
+    pub fn cone(mut self, axis: [f64; 3], [outer, inner]: [f64; 2]) -> Self {
+        let [x, y, z] = axis;
+        let params = [x, y, z, outer, inner, 0.0].map(|x| x as f32);
+        self.lights.iter_mut().last().expect("a light").params = params;
+        self
+    }
+
+    /// Gives the last light an angular radius, radians.
+    pub fn disk(mut self, radius: f64) -> Self {
+        self.lights.iter_mut().last().expect("a light").params[0] = (1.0 - radius.cos()) as f32;
+        self
+    }
+
     fn environment(mut self, e: Environment) -> Self {
         self.environment = Some(Environment { light: self.lights.len() as u32, ..e });
         self.lights.push(Light { kind: LightKind::Environment as u32, triangle: NONE, ..Light::zeroed() });

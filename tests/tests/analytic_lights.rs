@@ -309,6 +309,51 @@ fn environment_maps_light_by_their_integral() {
     }
 }
 
+/// A floor under a spot: I f^2 cos / r^2, from the cone's middle to its edge. Killed by: an axis that is turned round, a
+/// falloff in the angle instead of its cosine or not squared, full angles for half ones, light outside the cone.
+#[test]
+fn spots_follow_their_falloff() {
+    let height = 2.0;
+    for tilt in [0.0f64, 5.0, 20.0, 29.0, 31.0] {
+        for (inner_deg, outer_deg) in [(0.0f32, 30.0f32), (10.0, 30.0), (30.0, 30.0), (0.0, 0.25)] {
+            let mut s = spot(0.8, [4, 4]);
+            let (sin, cos) = tilt.to_radians().sin_cos();
+            let direction = [3.0 * sin as f32, -3.0 * cos as f32, 0.0];
+            let position = [0.0, height, 0.0];
+            s.emitters.push(Emitter::Spot { position, direction, intensity: [3.0; 3], inner_deg, outer_deg });
+            let [inner, outer] = [inner_deg, outer_deg].map(|t| f64::from(t).to_radians().cos());
+            let f = if cos > inner { 1.0 } else { ((cos - outer) / (inner - outer)).max(0.0) };
+            let expected = 0.8 / PI * 3.0 * f * f / f64::from(height).powi(2);
+            let mean = render_depth(&s, 2, 64).mean();
+            // 1e-3: the pixels see a spot of 7e-5 around the origin, whose light comes from other angles
+            let off = (mean - expected).abs();
+            assert!(off <= 1e-3 * expected + 1e-6, "{tilt}, {inner_deg} to {outer_deg}: {mean}, expected {expected}");
+        }
+    }
+}
+
+/// A floor under a sun: E times the cosine of its middle, whatever its size, where all of it is above the horizon; half
+/// of that where a wall hides half of the disk. Killed by: a sun that is a direction, a disk that is not uniform over
+/// its sides, an irradiance that depends on the angle.
+#[test]
+fn suns_light_like_their_disk() {
+    for angle_deg in [0.53f32, 20.0] {
+        for covered in [false, true] {
+            let mut s = spot(0.8, [4, 4]);
+            s.emitters.push(Emitter::Sun { direction: [0.0, -4.0, -3.0], irradiance: [2.0; 3], angle_deg });
+            if covered {
+                // its edge runs through the disk's middle
+                let wall = s.add_material("wall", grey(0.0));
+                let corners = [[0.0, 1.0, 0.0], [0.0, 1.0, 90.0], [90.0, 1.0, 90.0], [90.0, 1.0, 0.0]];
+                add_quad(&mut s, "wall", wall, corners);
+            }
+            let share = if covered { 0.5 } else { 1.0 };
+            let expected = 0.8 / PI * 2.0 * 0.8 * share;
+            assert_mean("sun", &render_depth(&s, 2, 16_384), expected, 0.004);
+        }
+    }
+}
+
 /// All kinds together: the sum, with the environment behind the emitter hidden by it. Killed by: one light chosen for
 /// another's probability.
 #[test]

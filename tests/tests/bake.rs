@@ -362,6 +362,37 @@ fn what_cannot_be_baked_is_named() {
             |s| s.emitters.push(Emitter::Directional { direction: [0.0; 3], irradiance: [1.0; 3] }),
             &["emitter 0 (directional)", "length of the direction is 0"],
         ),
+        (
+            |s| {
+                let (position, direction) = ([0.0; 3], [1.0, 0.0, 0.0]);
+                let (inner_deg, outer_deg) = (31.0, 30.0);
+                s.emitters.push(Emitter::Spot { position, direction, intensity: [1.0; 3], inner_deg, outer_deg });
+            },
+            &["emitter 0 (spot)", "inner half angle in degrees is 31"],
+        ),
+        (
+            |s| {
+                let (position, direction) = ([0.0; 3], [1.0, 0.0, 0.0]);
+                let (inner_deg, outer_deg) = (0.0, 181.0);
+                s.emitters.push(Emitter::Spot { position, direction, intensity: [1.0; 3], inner_deg, outer_deg });
+            },
+            &["emitter 0 (spot)", "outer half angle in degrees is 181"],
+        ),
+        (
+            |s| {
+                let (direction, irradiance) = ([0.0, -1.0, 0.0], [1.0; 3]);
+                s.emitters.push(Emitter::Sun { direction, irradiance, angle_deg: 91.0 });
+            },
+            &["emitter 0 (sun)", "angular diameter in degrees is 91"],
+        ),
+        (|s| s.camera.projection = Projection::Orthographic { height: 0.0 }, &["camera", "orthographic height is 0"]),
+        (
+            |s| {
+                s.camera.projection = Projection::Panoramic;
+                s.camera.lens = Some(ThinLens { radius: 0.5, focus_distance: 4.0 });
+            },
+            &["camera", "lens radius of a camera that is not perspective is 0.5"],
+        ),
         (|s| s.environment = Some(Environment::Constant { radiance: [f32::INFINITY; 3] }), &["environment", "inf"]),
         (
             |s| {

@@ -1,7 +1,7 @@
 //! Camera rays against f64 geometry.
 
-use croupier::unstable::camera::{concentric_disk, generate};
-use croupier::unstable::scene::blob::Camera;
+use croupier::unstable::camera::{concentric_disk, generate, project};
+use croupier::unstable::scene::blob::{Camera, CameraKind};
 use croupier::unstable::simd::F32x8;
 use croupier_tests::light_oracle::{cross, dot, length, sub, unit, wide};
 use croupier_tests::stats::{SplitMix, chi_square_in_order};
@@ -17,6 +17,7 @@ fn camera(vfov_deg: f64, lens_radius: f32, focus_distance: f32) -> (Camera, [[f6
     let half = (vfov_deg.to_radians() / 2.0).tan();
     let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
     let camera = Camera {
+        kind: 0,
         origin,
         forward: forward.map(|x| x as f32),
         right: right.map(|x| (x * half * aspect) as f32),
@@ -91,6 +92,49 @@ fn lens_rays_meet_in_the_plane_in_focus() {
             }
         }
     }
+}
+
+/// Orthographic rays are parallel and start on the image; panoramic ones follow longitude and latitude. Killed by: axes
+/// swapped or mirrored, full for half angles, a panorama that stretches with the image's shape, an orthographic one that
+/// does not.
+#[test]
+fn other_projections_follow_their_formulas() {
+    let (base, [forward, right, down]) = camera(44.0, 0.0, 0.0);
+    let unit_axes = [right, down].map(|a| a.map(|x| x as f32));
+    let panoramic = Camera { kind: CameraKind::Panoramic as u32, right: unit_axes[0], down: unit_axes[1], ..base };
+    let [wide_right, half_down] = [(right, 4.0), (down, 2.25)].map(|(a, k)| a.map(|x| (x * k) as f32));
+    let parallel = Camera { kind: CameraKind::Orthographic as u32, right: wide_right, down: half_down, ..base };
+    let mut rng = SplitMix(6);
+    for size in [SIZE, [180, 320], [64, 64], [1, 1]] {
+        let [w, h] = size.map(f64::from);
+        for _ in 0..1000 {
+            let x = F32x8::from_fn(|_| (rng.f64() * w) as f32);
+            let y = F32x8::from_fn(|_| (rng.f64() * h) as f32);
+            let nan = [F32x8::splat(f32::NAN); 2];
+            let (po, pd) = project(&panoramic, size, x, y, nan);
+            let (oo, od) = project(&parallel, size, x, y, nan);
+            for i in 0..8 {
+                let (x, y) = (f64::from(x.lane(i)) / w, f64::from(y.lane(i)) / h);
+                let (longitude, polar) = ((2.0 * x - 1.0) * std::f64::consts::PI, y * std::f64::consts::PI);
+                let flat = |k: usize| forward[k] * longitude.cos() + right[k] * longitude.sin();
+                let want = [0, 1, 2].map(|k| flat(k) * polar.sin() - down[k] * polar.cos());
+                assert_eq!(po.lane(i), base.origin);
+                assert!(length(sub(wide(pd.lane(i)), want)) < 2e-6, "{size:?}: {:?} for {want:?}", pd.lane(i));
+                // 4.5 units high in any shape, with square pixels
+                let (across, below) = (4.5 * (x - 0.5) * w / h, 4.5 * (y - 0.5));
+                let from = sub(wide(oo.lane(i)), wide(base.origin));
+                let scale = 10.0 + 4.5 * w / h;
+                for (axis, want) in [(forward, 0.0), (right, across), (down, below)] {
+                    assert!((dot(from, axis) - want).abs() < 1e-6 * scale, "{size:?}: {from:?}");
+                }
+                assert!(length(sub(wide(od.lane(i)), forward)) < 1e-6);
+            }
+        }
+    }
+    // A perspective camera is what it was, bit for bit.
+    let (x, y) = (F32x8::from_fn(|i| i as f32 * 31.7), F32x8::from_fn(|i| i as f32 * 19.3));
+    let (a, b) = (generate(&base, SIZE, x, y, [F32x8::ZERO; 2]), project(&base, SIZE, x, y, [F32x8::ZERO; 2]));
+    assert_eq!((0..8).map(|i| a.1.lane(i)).collect::<Vec<_>>(), (0..8).map(|i| b.1.lane(i)).collect::<Vec<_>>());
 }
 
 /// Uniform over the disk: 8 rings of equal area x 16 sectors. Killed by: radius not equal to the larger coordinate

@@ -198,6 +198,7 @@ fn lights() {
 #[test]
 fn camera_and_lens() {
     let camera = Camera {
+        kind: 0,
         origin: [1.0, 2.0, 3.0],
         forward: [0.0, 0.0, -1.0],
         right: [0.8, 0.0, 0.0],

@@ -6,7 +6,7 @@ use croupier::unstable::scene::Effects;
 use croupier::unstable::scene::blob::{EnvironmentKind, LightKind};
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_tests::hit::sample;
-use croupier_tests::light_oracle::{V, cross, dot, length, sub, wide};
+use croupier_tests::light_oracle::{V, cross, dot, length, sub, unit, wide};
 use croupier_tests::light_scene::{IDENTITY, LightScene};
 use croupier_tests::stats::{Mean, SplitMix};
 use std::f64::consts::PI;
@@ -26,6 +26,23 @@ fn example(kind: LightKind, s: LightScene) -> (LightScene, f64) {
             let p = [0.5f32, 2.0, -1.0];
             let r = length(wide(p));
             (s.delta(kind, p, RGB), f64::from(p[1]) / r.powi(3))
+        }
+        LightKind::Sun => {
+            // above the horizon as a whole: the mean of the cosine is that of the middle times (1 + cos t) / 2
+            let s = s.delta(kind, [0.0, 0.8, 0.6], RGB);
+            (s.disk(0.1), f64::from(0.8f32))
+        }
+        LightKind::Spot => {
+            // the origin lies 20 degrees off the axis of a cone of 10 to 40 degrees
+            let p = [0.5f32, 2.0, -1.0];
+            let r = length(wide(p));
+            let side = unit(cross(wide(p), [0.0, 1.0, 0.0]));
+            let (sin, cos) = 20f64.to_radians().sin_cos();
+            let axis: V = std::array::from_fn(|i| -wide(p)[i] / r * cos + side[i] * sin);
+            let [inner, outer] = [10f64, 40.0].map(|t| t.to_radians().cos());
+            let f = (cos - outer) / (inner - outer);
+            let s = s.delta(kind, p, RGB);
+            (s.cone(axis, [1.0 - outer, 1.0 - inner]), f * f * f64::from(p[1]) / r.powi(3))
         }
         LightKind::Directional => (s.delta(kind, [0.0, 0.8, 0.6], RGB), f64::from(0.8f32)),
     }

@@ -169,9 +169,23 @@ fn lights_weigh_their_power() {
             LightKind::Area => PI * 0.75 * y,
             LightKind::Environment => disk * 2.5 * integral,
             LightKind::Point => 4.0 * PI * y,
-            LightKind::Directional => disk * y,
+            LightKind::Directional | LightKind::Sun => disk * y,
+            // without a cone: nothing
+            LightKind::Spot => continue,
         };
         assert!((got / want - 1.0).abs() < 1e-5, "{}: {got} for {want}", kind.name());
+    }
+    // A spot's falloff squared, integrated over the sphere by the midpoint rule.
+    for (outer, inner) in [(2.0f32, 0.0f32), (0.5, 0.125), (0.01, 0.01)] {
+        let spot = Light { params: [0.0, 0.0, 1.0, outer, inner, 0.0], ..light(&LightKind::Spot) };
+        let got = environment::light_weights(&[spot], None, &[], radius)[0];
+        let (steps, [outer, inner]) = (100_000, [outer, inner].map(f64::from));
+        let falloff = |k: i32| {
+            let x = (f64::from(k) + 0.5) / f64::from(steps) * outer;
+            if x < inner { 1.0 } else { ((outer - x) / (outer - inner)).powi(2) }
+        };
+        let want = 2.0 * PI * y * outer / f64::from(steps) * (0..steps).map(falloff).sum::<f64>();
+        assert!((got / want - 1.0).abs() < 1e-4, "spot {outer} {inner}: {got} for {want}");
     }
     let constant = Environment { kind: EnvironmentKind::Constant as u32, radiance: c, ..e };
     let got = environment::light_weights(&[light(&LightKind::Environment)], Some(&constant), &[], radius)[0];

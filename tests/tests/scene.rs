@@ -80,6 +80,11 @@ fn effects_are_those_in_use() {
     let mut pinhole = Parts::empty();
     pinhole.cameras[0].lens_radius = 0.0;
     assert_eq!(Scene::from_bytes(pinhole.blob().bytes()).unwrap().effects, Effects::default());
+    for (kind, length) in [(CameraKind::Orthographic, 7.0), (CameraKind::Panoramic, 1.0)] {
+        let c = &mut pinhole.cameras[0];
+        (c.kind, c.right, c.down) = (kind as u32, [length, 0.0, 0.0], [0.0, -length, 0.0]);
+        assert_eq!(Scene::from_bytes(pinhole.blob().bytes()).unwrap().effects, Effects::PROJECTIONS, "{kind:?}");
+    }
 }
 
 /// Killed by: a path array one longer or shorter.
@@ -288,6 +293,9 @@ fn every_fault_of_the_records_has_its_error() {
         (|p| p.cameras[0].right[1] = NAN, number(S::Cameras, 0, Field::ImagePlane, NAN)),
         (|p| p.cameras[0].down = [0.0; 3], number(S::Cameras, 0, Field::ImagePlane, 0.0)),
         (|p| p.cameras[0].down = [3.0, 0.0, 0.0], number(S::Cameras, 0, Field::ImagePlane, 0.0)),
+        (|p| p.cameras[0].kind = 3, SceneError::Kind { of: S::Cameras, index: 0, found: 3 }),
+        (|p| p.cameras[0].kind = 1, number(S::Cameras, 0, Field::LensRadius, 0.1)),
+        (|p| (p.cameras[0].kind, p.cameras[0].lens_radius) = (2, 0.0), number(S::Cameras, 0, Field::Direction, 0.25)),
         (|p| p.cameras[0].lens_radius = -0.1, number(S::Cameras, 0, Field::LensRadius, -0.1)),
         (|p| p.cameras[0].focus_distance = 0.0, number(S::Cameras, 0, Field::FocusDistance, 0.0)),
         (|p| p.cameras[0].size[0] = 0, number(S::Cameras, 0, Field::Width, 0.0)),
@@ -394,7 +402,33 @@ fn every_parameter_of_every_kind_is_checked() {
 #[test]
 fn every_field_of_every_light_is_checked() {
     use SectionKind as S;
-    let tiny = Parts::tiny();
+    let mut tiny = Parts::tiny();
+    tiny.lights.push(Light {
+        kind: LightKind::Spot as u32,
+        triangle: NONE,
+        vector: [0.0, 2.0, 0.0],
+        emission: [1.0; 3],
+        params: [0.0, -0.6, 0.8, 0.5, 0.25, 0.0],
+        ..tiny.lights[3]
+    });
+    tiny.lights.push(Light {
+        kind: LightKind::Sun as u32,
+        params: [1e-5, 0.0, 0.0, 0.0, 0.0, 0.0],
+        vector: [0.0, 0.6, 0.8],
+        ..tiny.lights[5]
+    });
+    tiny.light_alias = alias(&[3, 3, 8, 1, 1, 1, 1]);
+    assert_eq!(error(&tiny.blob()), None);
+    for (params, field, found) in [
+        ([0.0, -0.6, 0.8, 0.0, 0.0, 0.0], Field::Cone, 0.0),
+        ([0.0, -0.6, 0.8, 2.5, 0.0, 0.0], Field::Cone, 2.5),
+        ([0.0, -0.6, 0.8, NAN, 0.0, 0.0], Field::Cone, NAN),
+        ([0.0, -0.6, 0.8, 0.5, -0.5, 0.0], Field::Cone, -0.5),
+    ] {
+        let mut parts = tiny.clone();
+        parts.lights[5].params = params;
+        expect("a cone", &parts.blob(), number(S::Lights, 5, field, found));
+    }
     for kind in LightKind::ALL {
         let i = tiny.lights.iter().position(|l| l.kind == *kind as u32).unwrap_or_else(|| panic!("no {kind:?}"));
         let index = i as u32;
@@ -418,6 +452,14 @@ fn every_field_of_every_light_is_checked() {
                     l.vector = [0.0, 0.0, 0.9];
                     number(S::Lights, index, Field::Direction, 0.9 * 0.9)
                 }
+                LightField::Disk => {
+                    l.params[0] = 1.5;
+                    number(S::Lights, index, Field::Cone, 1.5)
+                }
+                LightField::Cone => {
+                    l.params[4] = 0.75;
+                    number(S::Lights, index, Field::Cone, 0.75)
+                }
                 LightField::Emission => {
                     l.emission[2] = MAX_EMISSION.next_up();
                     number(S::Lights, index, Field::Emission, MAX_EMISSION.next_up())
@@ -426,7 +468,7 @@ fn every_field_of_every_light_is_checked() {
             expect(&format!("{} with {field:?}", kind.name()), &parts.blob(), expected);
         }
         let mut parts = tiny.clone();
-        parts.lights[i].params[0] = 1.0;
+        parts.lights[i].params[5] = 1.0;
         expect(kind.name(), &parts.blob(), SceneError::Reserved { of: S::Lights, index });
         // each kind calls for one of its effects
         let effects = Scene::from_bytes(tiny.blob().bytes()).unwrap().effects;

@@ -170,7 +170,7 @@ fn a_profile_without_an_effect_refuses_the_scene() {
     lit.emitters.push(Emitter::Point { position: [0.0, 2.0, 0.0], intensity: [1.0; 3] });
     let (error, text) = missing(&blob(&lit)).expect("an error");
     assert_eq!(error, SessionError::Profile { missing: Effects::DELTA_LIGHTS });
-    assert!(text.contains("point and directional lights"), "{text}");
+    assert!(text.contains("point, directional, spot and sun lights"), "{text}");
 
     let bytes = blob(&everything([8, 8]));
     let scene = Scene::from_bytes(&bytes).unwrap();

@@ -8,6 +8,8 @@
 //! | constant environment | `environment.rs` | uniform sphere | 1 / (4 pi) | pi R^2 x integral |
 //! | point | `point.rs` | the point | delta | 4 pi I |
 //! | directional | `directional.rs` | the direction | delta | pi R^2 E |
+//! | spot | `spot.rs` | the point | delta | 2 pi (inner + (outer - inner) / 3) I |
+//! | sun | `sun.rs` | uniform on the disk at infinity | counts as delta | pi R^2 E |
 //!
 //! A light is chosen by a [`LightSelector`] (power-weighted: `power.rs`); every density stated here contains the
 //! selection probability. What [`sample_of`] states for a direction is what [`area_pdf`] and [`environment_pdf`] give for
@@ -21,6 +23,8 @@ mod environment;
 mod mis;
 mod point;
 mod power;
+mod spot;
+mod sun;
 
 pub use area::{area_pdf, area_radiance};
 pub use environment::{environment_pdf, environment_radiance};
@@ -91,7 +95,7 @@ impl LightSample8 {
 /// light tree.
 ///
 /// Pictures are right if both functions tell the same probabilities and every light that could be seen from a point has
-/// one above 0: point and directional lights are found in no other way. How good the choice is shows in the noise only.
+/// one above 0: delta lights (points, spots, parallel light, the sun) are found in no other way. How good the choice is shows in the noise only.
 ///
 /// ```
 /// use croupier::unstable::light::LightSelector;
@@ -229,6 +233,8 @@ models! {
     Environment => environment::Surroundings,
     Point => point::Point,
     Directional => directional::Directional,
+    Spot => spot::Spot,
+    Sun => sun::Sun,
 }
 
 // The two tables say the same of what both know.

@@ -212,20 +212,40 @@ pub struct Vertex {
     pub uv: [f32; 2],
 }
 
-/// Pinhole or thin-lens camera. A pixel sample at (x, y) in [0, width) x [0, height), y down, looks along
-/// `forward + right * ((2 x / width) - 1) + down * ((2 y / height) - 1)`.
+kinds! {
+    /// Projections of a camera.
+    CameraKind {
+        /// Pinhole or thin lens.
+        Perspective = 0, "perspective";
+        /// Parallel rays.
+        Orthographic = 1, "orthographic";
+        /// Every direction, latitude by longitude.
+        Panoramic = 2, "panoramic";
+    }
+}
+
+/// Camera. A pixel sample is a point (x, y) in [0, width) x [0, height), y down; with X = 2 x / width - 1 and Y = 2 y /
+/// height - 1 its ray
+///
+/// * of a perspective camera looks along `forward + right X + down Y`, from `origin` or a point of the lens,
+/// * of an orthographic one begins at `origin + right X + down Y` and runs along `forward`,
+/// * of a panoramic one looks from `origin` to longitude `pi X` (0 is `forward`, positive towards `right`) and latitude
+///   `pi/2 Y` (positive towards `down`).
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Camera {
+    /// [`CameraKind`].
+    pub kind: u32,
     /// World position.
     pub origin: [f32; 3],
     /// Unit viewing axis.
     pub forward: [f32; 3],
-    /// Vector from the image centre to its right edge, at distance 1.
+    /// Vector from the image centre to its right edge: perspective at distance 1, orthographic in world units;
+    /// panoramic a unit vector.
     pub right: [f32; 3],
-    /// Vector from the image centre to its lower edge, at distance 1.
+    /// Vector from the image centre to its lower edge, likewise.
     pub down: [f32; 3],
-    /// Lens radius; 0 is a pinhole.
+    /// Lens radius; 0 is a pinhole, and 0 for other projections than perspective.
     pub lens_radius: f32,
     /// Distance of the plane in focus along the axis.
     pub focus_distance: f32,

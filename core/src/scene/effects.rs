@@ -46,8 +46,8 @@ effects! {
     ENVIRONMENT = 18, "environment map";
     /// Constant environment.
     CONSTANT = 19, "constant environment";
-    /// Point or directional lights.
-    DELTA_LIGHTS = 20, "point and directional lights";
+    /// Lights that no scattered ray finds: point, directional, spot lights and suns.
+    DELTA_LIGHTS = 20, "point, directional, spot and sun lights";
     /// Thin lens.
     LENS = 21, "thin lens";
     /// Interpolated shading normals.
@@ -60,6 +60,8 @@ effects! {
     ALPHA = 25, "alpha cut-outs";
     /// Compensation of the energy that rough surfaces lose.
     MULTIPLE_SCATTERING = 26, "multiple scattering";
+    /// Orthographic or panoramic camera.
+    PROJECTIONS = 30, "orthographic or panoramic camera";
 }
 
 macro_rules! lights {

@@ -30,6 +30,9 @@ pub enum Field {
     Compensation,
     /// Emission, 0 to [`super::blob::MAX_EMISSION`].
     Emission,
+    /// 1 - cosine of the half angle of a light's cone (outer above 0 up to 2, inner from 0 to the outer one) or disk
+    /// (above 0 up to 1).
+    Cone,
     /// Area, above 0 and that of the light's triangle within 1e-3.
     Area,
     /// Probability, 0 to 1.
@@ -38,7 +41,7 @@ pub enum Field {
     Width,
     /// Rows of an image, 1 (environment map: 2) to [`super::blob::MAX_SIDE`].
     Height,
-    /// Lens radius, from 0.
+    /// Lens radius, from 0; 0 for other projections than perspective.
     LensRadius,
     /// Distance in focus, above 0 if there is a lens.
     FocusDistance,
@@ -73,6 +76,7 @@ impl Field {
             Self::InternalReflectance => "fdr",
             Self::Compensation => "compensation",
             Self::Emission => "emission",
+            Self::Cone => "1 - cosine of a cone",
             Self::Area => "area",
             Self::Probability => "probability",
             Self::Width => "width",

@@ -105,7 +105,12 @@ pub(crate) fn camera_rays<W: World>(
     let px = F32x8::from_fn(|i| x[i] as f32) + u0;
     let py = F32x8::from_fn(|i| y[i] as f32) + u1;
     let lens = if W::EFFECTS.contains(Effects::LENS) { [u2, u3] } else { [F32x8::ZERO; 2] };
-    let (o, d) = camera::generate(world.scene().camera, settings.size, px, py, lens);
+    let scene = world.scene();
+    let (o, d) = if W::EFFECTS.contains(Effects::PROJECTIONS) && scene.effects.contains(Effects::PROJECTIONS) {
+        camera::project(scene.camera, settings.size, px, py, lens)
+    } else {
+        camera::generate(scene.camera, settings.size, px, py, lens)
+    };
     book.counters.camera_rays += lanes as u64;
     RayState8 {
         active: Mask8::first(lanes),

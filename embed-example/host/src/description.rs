@@ -356,6 +356,15 @@ pub enum Emitter {
         /// Irradiance of a surface that faces the light.
         irradiance: [f32; 3],
     },
+    /// Parallel light with the spread of a distant disk. Shadows have soft edges; smooth surfaces do not mirror it.
+    Sun {
+        /// Direction in which the light of the disk's middle travels, of any length but 0.
+        direction: [f32; 3],
+        /// Irradiance of a surface that faces the light.
+        irradiance: [f32; 3],
+        /// Angular diameter, degrees, 0.01 to 90; 0.53 for the sun.
+        angle_deg: f32,
+    },
     /// Point that shines into a cone. At the angle t from the axis it has `intensity * f^2`, with
     /// `f = (cos t - cos outer) / (cos inner - cos outer)` clamped to 0..=1: full inside the inner cone, nothing
     /// outside the outer one (the falloff of glTF's KHR_lights_punctual).
@@ -368,7 +377,7 @@ pub enum Emitter {
         intensity: [f32; 3],
         /// Half angle of the inner cone, degrees, from 0 to `outer_deg`.
         inner_deg: f32,
-        /// Half angle of the outer cone, degrees, above 0, at most 180.
+        /// Half angle of the outer cone, degrees, 0.01 to 180.
         outer_deg: f32,
     },
 }

@@ -7,7 +7,8 @@ use croupier::Scene;
 use croupier::unstable::Effects;
 use croupier::unstable::profile::AnyProfile;
 use croupier::unstable::scene::blob::{
-    LightKind, MATERIAL_COMPENSATED, MATERIAL_CUTOUT, Material, MaterialKind, MediumKind, NONE, TRIANGLE_SMOOTH,
+    CameraKind, LightKind, MATERIAL_COMPENSATED, MATERIAL_CUTOUT, Material, MaterialKind, MediumKind, NONE,
+    TRIANGLE_SMOOTH,
 };
 use serde::{Serialize, Serializer};
 use std::collections::BTreeSet;
@@ -169,7 +170,10 @@ const REASONS: &[(Effects, Facts)] = &[
     (Effects::DELTA_LIGHTS, |c| {
         let count = |kind: LightKind, names| Some(Fact::Count(names, c.lights(kind))).filter(|_| c.lights(kind) > 0);
         let point = count(LightKind::Point, ["point light", "point lights"]);
-        point.into_iter().chain(count(LightKind::Directional, ["directional light", "directional lights"])).collect()
+        let directional = count(LightKind::Directional, ["directional light", "directional lights"]);
+        let spot = count(LightKind::Spot, ["spot light", "spot lights"]);
+        let sun = count(LightKind::Sun, ["sun", "suns"]);
+        [point, directional, spot, sun].into_iter().flatten().collect()
     }),
     (Effects::LENS, |c| {
         let camera = c.scene.camera;
@@ -185,6 +189,11 @@ const REASONS: &[(Effects, Facts)] = &[
     (Effects::GRID_MEDIA, |c| vec![Fact::Sizes("cells", c.grids())]),
     (Effects::ALPHA, |c| c.textures(|m| m.flags & MATERIAL_CUTOUT != 0)),
     (Effects::MULTIPLE_SCATTERING, |c| c.surfaces(|m| m.flags & MATERIAL_COMPENSATED != 0)),
+    (Effects::PROJECTIONS, |c| match CameraKind::from_u32(c.scene.camera.kind) {
+        Some(CameraKind::Orthographic) => vec![Fact::Count(["orthographic camera", "orthographic cameras"], 1)],
+        Some(CameraKind::Panoramic) => vec![Fact::Count(["panoramic camera", "panoramic cameras"], 1)],
+        Some(CameraKind::Perspective) | None => vec![],
+    }),
 ];
 
 /// Every effect that a scene calls for, in the order of their bits, with what uses it.

@@ -30,6 +30,7 @@ fn fails(folder: &Path, arguments: &[&str], parts: &[&str]) {
 fn empty_scene(max_depth: u32) -> Vec<u8> {
     let info = SceneInfo { max_depth, ..SceneInfo::zeroed() };
     let camera = Camera {
+        kind: 0,
         origin: [0.0; 3],
         forward: [0.0, 0.0, -1.0],
         right: [0.5, 0.0, 0.0],

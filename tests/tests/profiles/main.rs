@@ -118,7 +118,8 @@ each_effect!(
     MEDIA,
     GRID_MEDIA,
     ALPHA,
-    MULTIPLE_SCATTERING
+    MULTIPLE_SCATTERING,
+    PROJECTIONS
 );
 
 /// Killed by: an effect that a session does not look for, a message without its name.
@@ -232,7 +233,7 @@ fn reasons_count_what_triangles_use() {
             "textures: 1 material, 1 image",
             "area lights: 2 triangles",
             "environment map: 4x61",
-            "point and directional lights: 1 point light, 1 directional light",
+            "point, directional, spot and sun lights: 1 point light, 1 directional light",
             "thin lens: radius 0.05, focus distance 5",
             "shading normals: 3 materials, 1536 triangles",
         ]

@@ -89,6 +89,20 @@ scenes! {
     };
     "lens", [DIFFUSE, AREA_LIGHTS, LENS],
         || changed(|s| s.camera.lens = Some(ThinLens { radius: 0.1, focus_distance: 3.0 }));
+    "spot light", [DIFFUSE, DELTA_LIGHTS], || {
+        changed(|s| {
+            let (position, direction) = ([0.0, 0.9, 0.0], [0.1, -1.0, 0.0]);
+            s.emitters = vec![Emitter::Spot { position, direction, intensity: [3.0; 3], inner_deg: 20.0, outer_deg: 60.0 }];
+        })
+    };
+    "orthographic", [DIFFUSE, AREA_LIGHTS, PROJECTIONS],
+        || changed(|s| s.camera.projection = Projection::Orthographic { height: 2.0 });
+    "panoramic", [DIFFUSE, AREA_LIGHTS, PROJECTIONS], || {
+        changed(|s| {
+            let camera = Camera { projection: Projection::Panoramic, origin: [0.0; 3], target: [0.0, 0.0, -1.0], ..s.camera };
+            s.camera = camera;
+        })
+    };
     "shading normals", [DIFFUSE, AREA_LIGHTS, SMOOTH_NORMALS], || {
         changed(|s| add_sphere(s, 0, [0.0, -0.4, 0.0], 0.5, Sphere { subdivisions: 2, smooth: true, inwards: false }))
     };

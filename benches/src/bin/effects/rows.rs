@@ -202,5 +202,6 @@ rows! {
     MEDIA: Boundary, |s| fog(s, Density::Homogeneous);
     GRID_MEDIA: Fog, |s| fog(s, grid());
     ALPHA: Textured, |s| s.materials[SPHERE].cutout = true;
+    PROJECTIONS: Diffuse, |s| s.camera.projection = Projection::Orthographic { height: 2.4 };
     MULTIPLE_SCATTERING: Metal, |s| s.materials.iter_mut().for_each(|m| m.compensated = true);
 }

@@ -22,6 +22,10 @@ macro_rules! light_table {
             Point = 2, "point", [DELTA_LIGHTS], [Position, Emission];
             /// Parallel light.
             Directional = 3, "directional", [DELTA_LIGHTS], [Direction, Emission];
+            /// Point that shines into a cone.
+            Spot = 4, "spot", [DELTA_LIGHTS], [Position, Cone, Emission];
+            /// Parallel light with the spread of a distant disk.
+            Sun = 5, "sun", [DELTA_LIGHTS], [Direction, Disk, Emission];
         }
     };
 }
@@ -81,6 +85,10 @@ pub enum LightField {
     Direction,
     /// `emission`, up to [`MAX_EMISSION`].
     Emission,
+    /// `params`: the unit axis along which the light travels, 1 - cos of the outer and of the inner half angle.
+    Cone,
+    /// `params`: 1 - cos of the angular radius of a disk.
+    Disk,
 }
 
 /// One light, a cache line; fields a kind does not use are 0.
@@ -95,12 +103,12 @@ pub struct Light {
     pub area: f32,
     /// Zero.
     pub reserved: u32,
-    /// Point: position. Directional: unit direction towards the light.
+    /// Point, spot: position. Directional, sun: unit direction towards the light.
     pub vector: [f32; 3],
-    /// Area: radiance. Point: intensity. Directional: irradiance on a facing surface.
+    /// Area: radiance. Point: intensity. Spot: intensity on the axis. Directional, sun: irradiance on a facing surface.
     pub emission: [f32; 3],
-    /// Zero: room for kinds to come (the axis and cosines of a cone, the radius of a sphere), so that they need no
-    /// other version of the blob.
+    /// Spot: unit axis, 1 - cos of the outer and of the inner half angle, 0. Sun: 1 - cos of its angular radius, then 0.
+    /// Others: zero, room for kinds to come (the radius of a sphere), so that they need no other version of the blob.
     pub params: [f32; 6],
 }
 

@@ -12,7 +12,7 @@ pub(super) fn lights(scene: &Records<'_>) -> Result<Effects, SceneError> {
     for (at, l) in records(SectionKind::Lights, scene.lights) {
         let kind = LightKind::from_u32(l.kind);
         let kind = kind.ok_or(SceneError::Kind { of: at.of, index: at.index(), found: l.kind })?;
-        at.zero(l.reserved == 0 && l.params.map(f32::to_bits) == [0; 6])?;
+        at.zero(l.reserved == 0 && unused_params_are_zero(kind, &l.params))?;
         at.finite(Field::Area, &[l.area])?;
         at.finite(Field::Direction, &l.vector)?;
         field(scene, at, l, LightField::Emission)?;
@@ -23,6 +23,17 @@ pub(super) fn lights(scene: &Records<'_>) -> Result<Effects, SceneError> {
         }
     }
     Ok(effects)
+}
+
+/// Are the words of `params` that the kind does not use 0?
+fn unused_params_are_zero(kind: LightKind, params: &[f32; 6]) -> bool {
+    let words = |field: &LightField| match field {
+        LightField::Cone => 5,
+        LightField::Disk => 1,
+        _ => 0,
+    };
+    let used = kind.fields().iter().map(words).sum();
+    params.iter().skip(used).all(|p| p.to_bits() == 0)
 }
 
 /// One field of a light that uses it.
@@ -39,6 +50,16 @@ fn field(scene: &Records<'_>, at: Record, l: &Light, field: LightField) -> Resul
         }
         LightField::Position => at.position(&l.vector),
         LightField::Direction => at.unit(l.vector),
+        LightField::Cone => {
+            let [x, y, z, outer, inner, _] = l.params;
+            at.unit([x, y, z])?;
+            at.within(Field::Cone, outer, f32::MIN_POSITIVE, 2.0)?;
+            at.within(Field::Cone, inner, 0.0, outer)
+        }
+        LightField::Disk => {
+            let [width, ..] = l.params;
+            at.within(Field::Cone, width, f32::MIN_POSITIVE, 1.0)
+        }
         LightField::Emission => at.all_within(Field::Emission, &l.emission, 0.0, MAX_EMISSION),
     }
 }

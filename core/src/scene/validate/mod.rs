@@ -20,7 +20,7 @@ use record::{Record, cross, dot64};
 /// Validates all records of a scene whose sections are sound; returns the effects that it calls for.
 pub(super) fn scene(scene: &Records<'_>) -> Result<Effects, SceneError> {
     info(scene.info)?;
-    let lens = camera(scene.camera)?;
+    let camera = camera(scene.camera)?;
     names(scene)?;
     materials::textures(scene)?;
     media::media(scene)?;
@@ -31,7 +31,7 @@ pub(super) fn scene(scene: &Records<'_>) -> Result<Effects, SceneError> {
     let environment = environment::environment(scene)?;
     lights::table(scene, environment.emits)?;
     tree::tree(scene)?;
-    Ok(surfaces.with(lights).with(environment.effects).with(lens))
+    Ok(surfaces.with(lights).with(environment.effects).with(camera))
 }
 
 fn info(info: &SceneInfo) -> Result<(), SceneError> {
@@ -45,6 +45,7 @@ fn info(info: &SceneInfo) -> Result<(), SceneError> {
 /// The axes must span space, so that no pixel has a direction of length 0; how long they are does not matter.
 fn camera(c: &Camera) -> Result<Effects, SceneError> {
     let at = Record { of: SectionKind::Cameras, index: 0 };
+    let kind = CameraKind::from_u32(c.kind).ok_or(SceneError::Kind { of: at.of, index: at.index(), found: c.kind })?;
     at.position(&c.origin)?;
     at.unit(c.forward)?;
     at.all_within(Field::ImagePlane, &c.right, -MAX_COORDINATE, MAX_COORDINATE)?;
@@ -55,13 +56,19 @@ fn camera(c: &Camera) -> Result<Effects, SceneError> {
     if volume * volume <= 1e-12 * lengths {
         return Err(at.bad(Field::ImagePlane, volume as f32));
     }
-    at.within(Field::LensRadius, c.lens_radius, 0.0, MAX_COORDINATE)?;
+    if kind == CameraKind::Panoramic {
+        at.unit(c.right)?;
+        at.unit(c.down)?;
+    }
+    let widest = if kind == CameraKind::Perspective { MAX_COORDINATE } else { 0.0 };
+    at.within(Field::LensRadius, c.lens_radius, 0.0, widest)?;
     let nearest = if c.lens_radius > 0.0 { f32::MIN_POSITIVE } else { -MAX_COORDINATE };
     at.within(Field::FocusDistance, c.focus_distance, nearest, MAX_COORDINATE)?;
     let [width, height] = c.size;
     at.side(Field::Width, width, 1)?;
     at.side(Field::Height, height, 1)?;
-    Ok(if c.lens_radius > 0.0 { Effects::LENS } else { Effects::default() })
+    let lens = if c.lens_radius > 0.0 { Effects::LENS } else { Effects::default() };
+    Ok(if kind == CameraKind::Perspective { lens } else { lens.with(Effects::PROJECTIONS) })
 }
 
 fn names(scene: &Records<'_>) -> Result<(), SceneError> {

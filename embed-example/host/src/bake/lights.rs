@@ -9,6 +9,10 @@ use croupier::unstable::scene::blob::{self, Alias, EnvironmentKind, Light, Light
 use croupier::unstable::scene::blob::{MAX_COORDINATE, MAX_EMISSION, MAX_SIDE};
 use glam::Vec3;
 
+/// Smallest half angle of a spot and smallest diameter of a sun, degrees: the rounding of a direction moves the edge by
+/// 1e-3 of it.
+const MIN_CONE_DEG: f32 = 1e-2;
+
 /// Sections of the blob.
 #[derive(Default)]
 pub(super) struct Lights {
@@ -68,34 +72,72 @@ pub(super) fn bake(
     Ok(out)
 }
 
-/// A point or directional light; black ones are left out.
+/// Unit vector of a direction of any length but 0.
+fn unit(emitter: &str, direction: [f32; 3]) -> Result<Vec3, BakeError> {
+    let wide = Vec3::from_array(direction).as_dvec3();
+    wide.try_normalize().map(|d| d.as_vec3()).ok_or_else(|| BakeError::Emitter {
+        emitter: emitter.into(),
+        what: "length of the direction",
+        found: wide.length() as f32,
+    })
+}
+
+/// Axis and 1 - cos of the outer and of the inner half angle, as `params` of a light has them.
+fn cone(emitter: &str, direction: [f32; 3], [outer, inner]: [f32; 2]) -> Result<[f32; 6], BakeError> {
+    let bad = |what, found| Err(BakeError::Emitter { emitter: emitter.into(), what, found });
+    let [x, y, z] = unit(emitter, direction)?.to_array();
+    if !(MIN_CONE_DEG..=180.0).contains(&outer) {
+        return bad("outer half angle in degrees", outer);
+    }
+    if !(0.0..=outer).contains(&inner) {
+        return bad("inner half angle in degrees", inner);
+    }
+    Ok([x, y, z, versine(outer), versine(inner), 0.0])
+}
+
+/// 1 - cos of an angle in degrees, as 2 sin^2 of half of it: without cancellation.
+fn versine(degrees: f32) -> f32 {
+    (2.0 * (f64::from(degrees).to_radians() / 2.0).sin().powi(2)) as f32
+}
+
+/// A light that no ray meets; black ones are left out.
 fn delta_light(index: usize, e: &Emitter) -> Result<Option<Light>, BakeError> {
-    let (kind, vector, emission) = match *e {
+    let located =
+        |emitter: &str, position: [f32; 3]| match position.into_iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE)
+        {
+            Some(found) => Err(BakeError::Emitter { emitter: emitter.into(), what: "position", found }),
+            None => Ok(position),
+        };
+    let (kind, vector, emission, params) = match *e {
         Emitter::Area { .. } => return Ok(None),
         Emitter::Point { position, intensity } => {
             let emitter = format!("emitter {index} (point)");
             check_emission(&emitter, "intensity", intensity)?;
-            if let Some(found) = position.into_iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE) {
-                return Err(BakeError::Emitter { emitter, what: "position", found });
-            }
-            (LightKind::Point, position, intensity)
+            (LightKind::Point, located(&emitter, position)?, intensity, [0.0; 6])
         }
         Emitter::Directional { direction, irradiance } => {
             let emitter = format!("emitter {index} (directional)");
             check_emission(&emitter, "irradiance", irradiance)?;
-            let travels = Vec3::from_array(direction).as_dvec3();
-            let Some(travels) = travels.try_normalize() else {
-                let found = travels.length() as f32;
-                return Err(BakeError::Emitter { emitter, what: "length of the direction", found });
-            };
-            (LightKind::Directional, (-travels).as_vec3().to_array(), irradiance)
+            (LightKind::Directional, (-unit(&emitter, direction)?).to_array(), irradiance, [0.0; 6])
         }
-        Emitter::Spot { .. } => {
+        Emitter::Sun { direction, irradiance, angle_deg } => {
+            let emitter = format!("emitter {index} (sun)");
+            check_emission(&emitter, "irradiance", irradiance)?;
+            if !(MIN_CONE_DEG..=90.0).contains(&angle_deg) {
+                let what = "angular diameter in degrees";
+                return Err(BakeError::Emitter { emitter, what, found: angle_deg });
+            }
+            let params = [versine(angle_deg / 2.0), 0.0, 0.0, 0.0, 0.0, 0.0];
+            (LightKind::Sun, (-unit(&emitter, direction)?).to_array(), irradiance, params)
+        }
+        Emitter::Spot { position, direction, intensity, inner_deg, outer_deg } => {
             let emitter = format!("emitter {index} (spot)");
-            return Err(BakeError::Emitter { emitter, what: "support by the renderer", found: 0.0 });
+            check_emission(&emitter, "intensity", intensity)?;
+            let params = cone(&emitter, direction, [outer_deg, inner_deg])?;
+            (LightKind::Spot, located(&emitter, position)?, intensity, params)
         }
     };
-    let light = Light { kind: kind as u32, vector, emission, ..Zeroable::zeroed() };
+    let light = Light { kind: kind as u32, vector, emission, params, ..Zeroable::zeroed() };
     Ok((emission != [0.0; 3]).then_some(light))
 }
 

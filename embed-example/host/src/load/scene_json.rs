@@ -4,9 +4,10 @@ use super::json::{self, Place};
 use super::loader::Loader;
 use super::{LoadError, media, obj};
 use crate::description::{
-    Camera, Emitter, Environment, Material, Model, ParameterSource, Principled, Reflectance, SceneDescription, ThinLens,
+    Camera, Emitter, Environment, Material, Model, NamedCamera, ParameterSource, Principled, Projection, Reflectance,
+    SceneDescription, ThinLens,
 };
-use croupier::unstable::scene::blob::{EnvironmentKind, LightKind, MaterialKind};
+use croupier::unstable::scene::blob::{CameraKind, EnvironmentKind, LightKind, MaterialKind};
 use std::path::Path;
 
 pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription, LoadError> {
@@ -15,6 +16,11 @@ pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription,
     let document = Place::document(path, &document);
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut scene = SceneDescription { camera: camera(&document.get("camera")?)?, ..SceneDescription::default() };
+    if let Some(cameras) = document.find("cameras")? {
+        for (name, place) in cameras.entries()? {
+            scene.cameras.push(NamedCamera { name: name.into(), camera: camera(&place)? });
+        }
+    }
     if let Some(transport) = document.find("transport")?
         && let Some(depth) = transport.find("max_depth")?
     {
@@ -36,22 +42,33 @@ pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription,
 }
 
 fn camera(c: &Place<'_>) -> Result<Camera, LoadError> {
-    if let Some(kind) = c.find("type")?
-        && !matches!(kind.text()?, "perspective" | "thinlens")
-    {
-        return Err(kind.error(format!("unknown camera `{}`", kind.text()?)));
-    }
+    let kind = match c.find("type")? {
+        None => CameraKind::Perspective,
+        Some(place) => match place.text()? {
+            "thinlens" => CameraKind::Perspective,
+            name => CameraKind::from_name(name).ok_or_else(|| place.error(format!("unknown camera `{name}`")))?,
+        },
+    };
     let lens = c.find("thin_lens")?.map(|l| -> Result<_, LoadError> {
+        if kind != CameraKind::Perspective {
+            return Err(l.error(format!("a camera of type `{}` has no lens", kind.name())));
+        }
         Ok(ThinLens { radius: l.get("radius")?.float()?, focus_distance: l.get("focus_distance")?.float()? })
     });
-    Ok(Camera {
+    let camera = Camera {
         origin: c.get("origin")?.numbers()?,
         target: c.get("target")?.numbers()?,
         up: c.get("up")?.numbers()?,
-        vfov_deg: c.get("vfov_deg")?.number()?,
         size: [c.get("width")?.count(1)?, c.get("height")?.count(1)?],
         lens: lens.transpose()?,
         ..Camera::default()
+    };
+    Ok(match kind {
+        CameraKind::Perspective => Camera { vfov_deg: c.get("vfov_deg")?.number()?, ..camera },
+        CameraKind::Orthographic => {
+            Camera { projection: Projection::Orthographic { height: c.get("view_height")?.float()? }, ..camera }
+        }
+        CameraKind::Panoramic => Camera { projection: Projection::Panoramic, ..camera },
     })
 }
 
@@ -161,6 +178,18 @@ fn emitter(loader: &mut Loader, scene: &mut SceneDescription, folder: &Path, e: 
         Some(LightKind::Directional) => {
             Emitter::Directional { direction: e.get("direction")?.rgb()?, irradiance: e.get("irradiance")?.rgb()? }
         }
+        Some(LightKind::Sun) => Emitter::Sun {
+            direction: e.get("direction")?.rgb()?,
+            irradiance: e.get("irradiance")?.rgb()?,
+            angle_deg: e.find("angle_deg")?.map_or(Ok(0.53), |d| d.float())?,
+        },
+        Some(LightKind::Spot) => Emitter::Spot {
+            position: e.get("position")?.rgb()?,
+            direction: e.get("direction")?.rgb()?,
+            intensity: e.get("intensity")?.rgb()?,
+            inner_deg: e.find("inner_deg")?.map_or(Ok(0.0), |d| d.float())?,
+            outer_deg: e.get("outer_deg")?.float()?,
+        },
         // An environment's type is that of its own kind.
         Some(LightKind::Environment) | None => {
             let environment = match EnvironmentKind::from_name(name) {
