@@ -4,7 +4,10 @@
 //! coordinates repeat. v = 0 is the lower edge of the bottom row (the OBJ convention).
 
 use crate::scene::Scene;
-use crate::scene::blob::Texture;
+use crate::scene::blob::{
+    TEXTURE_CLAMP, TEXTURE_LINEAR, TEXTURE_MIRROR, TEXTURE_REPEAT, TEXTURE_WRAP, TEXTURE_WRAP_U, TEXTURE_WRAP_V,
+    Texture,
+};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Linear value of each sRGB code (IEC 61966-2-1), every entry the nearest `f32` to the exact value.
@@ -47,37 +50,76 @@ fn position(coordinate: F32x8, size: F32x8) -> (F32x8, F32x8) {
 /// may have up to 2^24 columns and rows.
 pub fn lookup(scene: &Scene<'_>, texture: U32x8, uv: [F32x8; 2], active: Mask8) -> Vec3x8 {
     let rgb = |bytes: [u8; 4]| [bytes[0], bytes[1], bytes[2]].map(|b| SRGB_TO_LINEAR[b as usize]);
-    interpolated(scene, texture, uv, active, rgb)
+    interpolated::<false>(scene, texture, uv, active, rgb)
 }
 
 /// Alpha of `texture` at `uv`, 0 to 1, under the conditions of [`lookup`]. Not encoded: alpha is linear.
 pub fn alpha(scene: &Scene<'_>, texture: U32x8, uv: [F32x8; 2], active: Mask8) -> F32x8 {
-    interpolated(scene, texture, uv, active, |bytes| [f32::from(bytes[3]) / 255.0, 0.0, 0.0]).x
+    interpolated::<false>(scene, texture, uv, active, |bytes| [f32::from(bytes[3]) / 255.0, 0.0, 0.0]).x
+}
+
+/// As [`lookup`], of a texture of any encoding and wrapping; linear texels are code / 255.
+pub fn lookup_any(scene: &Scene<'_>, texture: U32x8, uv: [F32x8; 2], active: Mask8) -> Vec3x8 {
+    let index = texture.to_array();
+    let is_linear = |i: usize| scene.textures.get(index[i] as usize).is_some_and(|t| t.flags & TEXTURE_LINEAR != 0);
+    let linear = Mask8::from_bits(active.lanes().fold(0, |bits, i| bits | u32::from(is_linear(i)) << i));
+    let mut out = Vec3x8::ZERO;
+    if linear.any() {
+        let rgb = |bytes: [u8; 4]| [bytes[0], bytes[1], bytes[2]].map(|b| f32::from(b) / 255.0);
+        out = interpolated::<true>(scene, texture, uv, linear, rgb);
+    }
+    let encoded = active.and_not(linear);
+    if encoded.any() {
+        let rgb = |bytes: [u8; 4]| [bytes[0], bytes[1], bytes[2]].map(|b| SRGB_TO_LINEAR[b as usize]);
+        out = Vec3x8::select(encoded, interpolated::<true>(scene, texture, uv, encoded, rgb), out);
+    }
+    out
+}
+
+/// As [`alpha`], of a texture of any wrapping.
+pub fn alpha_any(scene: &Scene<'_>, texture: U32x8, uv: [F32x8; 2], active: Mask8) -> F32x8 {
+    interpolated::<true>(scene, texture, uv, active, |bytes| [f32::from(bytes[3]) / 255.0, 0.0, 0.0]).x
+}
+
+/// Whole parts of coordinates along one axis of clamped and mirrored textures, brought into [0, 1) so that only the
+/// neighbours of the edges are left to [`neighbour`].
+#[inline(always)]
+fn wrapped(c: F32x8, mode: &[u32; 8]) -> F32x8 {
+    let c = c.is_finite().zero_unless(c);
+    let half = (c * 0.5 - (c * 0.5).floor()) * 2.0;
+    let mirrored = half.gt(F32x8::ONE).select(2.0 - half, half);
+    let below_one = 1.0 - f32::EPSILON / 2.0;
+    let of = |k: u32| U32x8::new(*mode).eq(U32x8::splat(k));
+    let c = of(TEXTURE_CLAMP).select(c.clamp(0.0, below_one), c);
+    of(TEXTURE_MIRROR).select(mirrored.clamp(0.0, below_one), c)
 }
 
 /// Bilinear mean of what `value` makes of the texels around `uv`.
 #[inline(always)]
-fn interpolated(
+fn interpolated<const ANY_WRAP: bool>(
     scene: &Scene<'_>,
     texture: U32x8,
     uv: [F32x8; 2],
     active: Mask8,
     value: impl Fn([u8; 4]) -> [f32; 3],
 ) -> Vec3x8 {
-    const NOTHING: Texture = Texture { first: 0, width: 1, height: 1, reserved: 0 };
+    const NOTHING: Texture = Texture { first: 0, width: 1, height: 1, flags: 0 };
     let index = texture.to_array();
     let mut record = [NOTHING; 8];
     for i in active.lanes() {
         record[i] = scene.textures.get(index[i] as usize).copied().unwrap_or(NOTHING);
     }
+    let mode = |shift: u32| record.each_ref().map(|t| t.flags >> shift & TEXTURE_WRAP);
+    let modes = if ANY_WRAP { [mode(TEXTURE_WRAP_U), mode(TEXTURE_WRAP_V)] } else { [[0; 8]; 2] };
+    let uv = if ANY_WRAP { [wrapped(uv[0], &modes[0]), wrapped(uv[1], &modes[1])] } else { uv };
     let (x, fx) = position(uv[0], F32x8::from_fn(|i| record[i].width as f32));
     let (y, fy) = position(uv[1], F32x8::from_fn(|i| record[i].height as f32));
     let (x, y) = (x.to_i32().to_array(), y.to_i32().to_array());
     let mut corner = [[[0.0f32; 3]; 8]; 4];
     for i in active.lanes() {
         let t = &record[i];
-        let columns = [wrap(x[i], t.width), wrap(x[i].wrapping_add(1), t.width)];
-        let rows = [wrap(y[i], t.height), wrap(y[i].wrapping_add(1), t.height)];
+        let columns = [x[i], x[i].wrapping_add(1)].map(|x| neighbour(x, t.width, modes[0][i]));
+        let rows = [y[i], y[i].wrapping_add(1)].map(|y| neighbour(y, t.height, modes[1][i]));
         for (c, out) in corner.iter_mut().enumerate() {
             // The file's row 0 is the top.
             let row = t.height.saturating_sub(1).saturating_sub(rows[c >> 1]) as usize;
@@ -89,6 +131,12 @@ fn interpolated(
     let lower = a * (1.0 - fx) + b * fx;
     let upper = c * (1.0 - fx) + d * fx;
     (lower * (1.0 - fy) + upper * fy).zero_unless(active)
+}
+
+/// `i` in -1..=size by the wrapping `mode`: a mirrored or clamped texture has its edge again beyond the edge.
+#[inline(always)]
+fn neighbour(i: i32, size: u32, mode: u32) -> u32 {
+    if mode == TEXTURE_REPEAT { wrap(i, size) } else { i.clamp(0, size.saturating_sub(1) as i32) as u32 }
 }
 
 /// `i` in -1..=size brought into 0..size; anything else to some texel.

@@ -193,7 +193,7 @@ impl Parts {
             triangles,
             vertices,
             materials,
-            textures: vec![Texture { first: 1, width: 2, height: 3, reserved: 0 }],
+            textures: vec![Texture { first: 1, width: 2, height: 3, flags: 0 }],
             texels: vec![0, 1, 2, 3, 4, 5, 6],
             tables: (0..64).map(|i| i as f32 / 64.0).collect(),
             lights,

@@ -15,7 +15,7 @@ fn scene() -> (LightScene, Vec<Vec<[u8; 3]>>) {
     for [width, height] in SIZES {
         let texels: Vec<[u8; 3]> = (0..width * height).map(|_| std::array::from_fn(|_| rng.word() as u8)).collect();
         let first = scene.texels.len() as u32;
-        scene.textures.push(croupier::unstable::scene::blob::Texture { first, width, height, reserved: 0 });
+        scene.textures.push(croupier::unstable::scene::blob::Texture { first, width, height, flags: 0 });
         scene.texels.extend(texels.iter().map(|t| u32::from_le_bytes([t[0], t[1], t[2], 77])));
         plain.push(texels);
     }

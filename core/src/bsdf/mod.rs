@@ -10,6 +10,7 @@ mod compensation;
 mod conductor;
 mod dielectric;
 mod diffuse;
+pub mod folded;
 pub mod fresnel;
 pub mod ggx;
 mod henyey_greenstein;
@@ -17,7 +18,7 @@ mod lobes;
 mod mirror;
 mod null;
 mod plastic;
-mod principled;
+pub mod principled;
 mod roughconductor;
 mod roughdielectric;
 mod roughplastic;
@@ -118,6 +119,9 @@ pub trait Bsdf<'s>: Copy + 's {
     /// Whether the model has delta lobes only: no light sampling.
     const DELTA: bool = Self::LOBES.delta_only();
 
+    /// Whether the tracer folds the model at the surface ([`folded`]).
+    const FOLDED: bool = false;
+
     /// Gathers the parameters of the lanes in `active`; other lanes may hold any material index.
     fn gather(scene: &Scene<'s>, inputs: &Inputs8, active: Mask8) -> Self;
 
@@ -206,7 +210,7 @@ models! {
     Plastic => Plastic;
     RoughPlastic => RoughPlastic<'s>, RoughPlastic<'s, false>;
     Null => Null;
-    Principled => Principled;
+    Principled => Principled<'s>;
 }
 
 /// A set of material kinds, a bit each, from a table of one entry per kind.

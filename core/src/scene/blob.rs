@@ -60,10 +60,12 @@ macro_rules! kinds {
 mod lights;
 mod materials;
 mod media;
+mod principled;
 
 pub use lights::*;
 pub use materials::*;
 pub use media::*;
+pub use principled::*;
 
 kinds! {
     /// Kinds of sections.

@@ -60,6 +60,8 @@ effects! {
     ALPHA = 25, "alpha cut-outs";
     /// Compensation of the energy that rough surfaces lose.
     MULTIPLE_SCATTERING = 26, "multiple scattering";
+    /// Normal maps.
+    NORMAL_MAPS = 29, "normal maps";
     /// Orthographic or panoramic camera.
     PROJECTIONS = 30, "orthographic or panoramic camera";
 }

@@ -60,6 +60,10 @@ pub enum Field {
     /// Majorant, from [`super::blob::MAJORANT_MARGIN`] times the largest density that it covers to
     /// [`super::blob::MAX_MAJORANT`].
     Majorant,
+    /// Width of the distribution of a sheen's fibres, [`super::blob::SHEEN_RANGE`].
+    SheenWidth,
+    /// Scale of a normal map, as a magnitude up to [`super::blob::MAX_NORMAL_SCALE`].
+    NormalScale,
 }
 
 impl Field {
@@ -90,6 +94,8 @@ impl Field {
             Self::Cells => "number of cells along an axis",
             Self::Density => "density",
             Self::Majorant => "majorant",
+            Self::SheenWidth => "width of the sheen",
+            Self::NormalScale => "normal scale",
         }
     }
 }

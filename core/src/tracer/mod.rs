@@ -9,6 +9,7 @@
 //! | `trace` | closest hits |
 //! | `emission` | emission that rays meet, weighted against light samples |
 //! | `shading` | the vertices that hits become |
+//! | `relief` | textures and shading normals of principled surfaces |
 //! | `aov` | auxiliary values of pixels |
 //! | `roulette`, `cache_key` | how many samples a vertex gets, and what is known where it lies |
 //! | `settle` | vertices go to the ring, finished paths to the books |
@@ -37,6 +38,7 @@ mod passing;
 mod path;
 mod pipeline;
 mod refill;
+mod relief;
 mod ring;
 mod root;
 mod roulette;

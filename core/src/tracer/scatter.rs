@@ -3,7 +3,7 @@
 use super::class::Kernel as ClassKernel;
 use super::crossing::media_towards;
 use super::packets::{RayState8, Samples8};
-use crate::bsdf::{self, Bsdf, Eval8, HenyeyGreenstein, Inputs8, Sample8, Visitor};
+use crate::bsdf::{self, Bsdf, Eval8, HenyeyGreenstein, Inputs8, Sample8, Visitor, folded};
 use crate::geometry::{self, Ray8};
 use crate::scene::{Effects, Scene};
 use crate::world::World;
@@ -39,6 +39,11 @@ impl<'s> Visitor<'s> for Kernel<'_, 's> {
         let wo = frame.to_local(v.wo);
         let inputs = Inputs8 { material: v.material, reflectance: v.reflectance };
         let b = B::gather(self.scene, &inputs, self.samples.active);
+        if B::FOLDED {
+            let n = frame.to_local(v.ng);
+            let nee = self.nee.map_or(Eval8::ZERO, |wi| folded::eval(&b, wo, frame.to_local(wi), n));
+            return (nee, folded::sample(&b, wo, self.u, n), frame);
+        }
         let nee = match self.nee {
             Some(wi) if !B::DELTA => b.eval(wo, frame.to_local(wi)),
             _ => Eval8::ZERO,

@@ -3,6 +3,7 @@
 use super::class::PHASE_KIND;
 use super::media_set::{MediaSet8, media_behind};
 use super::packets::RayState8;
+use super::relief::relief;
 use super::vertex::PathVertex8;
 use crate::bsdf::{self, Bsdf, Inputs8, Lobes, Visitor};
 use crate::geometry::{SurfaceHit8, SurfacePoint8};
@@ -122,6 +123,15 @@ impl Materials8 {
                 let mask = mask & Mask8::from_bits(cutout);
                 let alpha = texture::alpha(scene, U32x8::new(textures), [at.x, at.y], mask);
                 straight = mask.zero_unless(1.0 - alpha);
+            }
+        }
+        if W::EFFECTS.contains(Effects::PRINCIPLED) && scene.effects.contains(Effects::PRINCIPLED) {
+            let layered = hit.mask & bsdf::lanes_of(Effects::PRINCIPLED.0, &kind);
+            if layered.any() {
+                let r = relief::<W>(scene, hit, wo, ng, ns, layered);
+                reflectance = Vec3x8::select(layered, r.packed, reflectance);
+                straight = layered.select(1.0 - r.opacity, straight);
+                ns = Vec3x8::select(layered, r.ns, ns);
             }
         }
         let cos = wo.dot(ns);

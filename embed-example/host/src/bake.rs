@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `geometry` | vertices, triangles, which of them are degenerate |
 //! | `materials` | materials, their tables, textures |
+//! | `principled` | the records of principled materials |
 //! | `lights` | lights, their choice, the environment |
 //! | `media` | participating media, their majorants |
 //! | `boundary` | nothing: checks that boundaries of media are closed |
@@ -19,6 +20,7 @@ mod geometry;
 mod lights;
 mod materials;
 mod media;
+mod principled;
 
 pub(crate) use boundary::is_closed as boundary_is_closed;
 pub use error::BakeError;

@@ -59,6 +59,11 @@ pub fn conductor(alpha: f64) -> [f64; COMPENSATION_ENTRIES] {
             }
         });
     }
+    balanced(&energy)
+}
+
+/// The factors s with `s x (energy s) = 1`, by the iteration of [`conductor`].
+pub(crate) fn balanced<const N: usize>(energy: &[[f64; N]]) -> [f64; N] {
     let mut s = [1.0; N];
     for _ in 0..60 {
         let energies: [f64; N] = std::array::from_fn(|i| energy[i].iter().zip(&s).map(|(k, s)| k * s).sum());
@@ -70,17 +75,18 @@ pub fn conductor(alpha: f64) -> [f64; COMPENSATION_ENTRIES] {
 /// Energy that a rough dielectric of width `alpha` scatters to both sides, seen from outside and from inside.
 pub fn dielectric(alpha: f64, eta: f64) -> [[f64; COMPENSATION_ENTRIES]; 2] {
     let rule = microfacet::gauss_legendre(DIELECTRIC_POINTS);
-    [eta, 1.0 / eta].map(|eta| {
-        cosines(alpha).map(|mu| {
-            let mut sum = 0.0;
-            microfacet::visible(&rule, alpha, mu, |facet, weight| {
-                let (f, cos_t) = microfacet::fresnel(facet.cos, eta);
-                let g1 = |leaves: Option<(f64, f64)>| leaves.map_or(0.0, |(z, denominator)| 2.0 * z / denominator);
-                sum += weight * (f * g1(facet.reflected()) + (1.0 - f) * g1(facet.refracted(eta, cos_t)));
-            });
-            sum
-        })
-    })
+    [eta, 1.0 / eta].map(|eta| cosines(alpha).map(|mu| interface_energy(&rule, alpha, eta, mu)))
+}
+
+/// Energy that the side of a rough dielectric from which the relative index is `eta` scatters at the cosine `mu`.
+pub(crate) fn interface_energy(rule: &[(f64, f64)], alpha: f64, eta: f64, mu: f64) -> f64 {
+    let mut sum = 0.0;
+    microfacet::visible(rule, alpha, mu, |facet, weight| {
+        let (f, cos_t) = microfacet::fresnel(facet.cos, eta);
+        let g1 = |leaves: Option<(f64, f64)>| leaves.map_or(0.0, |(z, denominator)| 2.0 * z / denominator);
+        sum += weight * (f * g1(facet.reflected()) + (1.0 - f) * g1(facet.refracted(eta, cos_t)));
+    });
+    sum
 }
 
 /// Table of a compensated coat of width `alpha` and relative index `eta`, with its factors `s` of [`conductor`]: T is

@@ -5,7 +5,7 @@
 //! | [`description`] | a scene as plain values | files, blobs |
 //! | [`load`] | files -> description | blobs |
 //! | [`builtin`] | a description without files | blobs |
-//! | [`bake`] | description -> scene blob, with [`bvh`], [`alias`], [`environment`], [`microfacet`] | files |
+//! | [`bake`] | description -> scene blob, with [`bvh`], [`alias`], [`environment`], [`microfacet`], [`principled`] | files |
 //! | [`blob`] | the blob's layout on disk and in memory | what sections mean |
 //! | [`effects`] | reasons for a scene's effects | files |
 //! | [`drive`] | memory, threads, iterations around the core | files |
@@ -30,6 +30,7 @@ pub mod flip;
 pub mod image;
 pub mod load;
 pub mod microfacet;
+pub mod principled;
 pub mod render;
 pub mod statistics;
 pub mod tonemap;

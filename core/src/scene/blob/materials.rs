@@ -241,6 +241,22 @@ pub struct Texture {
     pub width: u32,
     /// Rows, >= 1.
     pub height: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// [`TEXTURE_LINEAR`], wrapping along both axes ([`TEXTURE_WRAP_U`], [`TEXTURE_WRAP_V`]). Textures in
+    /// [`Material::texture`] have 0.
+    pub flags: u32,
 }
+
+/// Red, green and blue are numbers, code / 255; else sRGB-encoded.
+pub const TEXTURE_LINEAR: u32 = 1;
+/// Bits of a wrapping mode, at [`TEXTURE_WRAP_U`] and [`TEXTURE_WRAP_V`].
+pub const TEXTURE_WRAP: u32 = 3;
+/// First bit of the wrapping mode along u.
+pub const TEXTURE_WRAP_U: u32 = 1;
+/// First bit of the wrapping mode along v.
+pub const TEXTURE_WRAP_V: u32 = 3;
+/// Wrapping mode: the texture again beyond its edges.
+pub const TEXTURE_REPEAT: u32 = 0;
+/// Wrapping mode: the texel at the edge.
+pub const TEXTURE_CLAMP: u32 = 1;
+/// Wrapping mode: the texture mirrored at its edges.
+pub const TEXTURE_MIRROR: u32 = 2;

@@ -32,7 +32,7 @@ pub(super) fn triangles(scene: &Records<'_>) -> Result<Effects, SceneError> {
             }
         }
         let material = at.follow(SectionKind::Materials, t.material, scene.materials)?;
-        effects = effects.with(materials::effects(material)).with(media::effects(scene, material));
+        effects = effects.with(materials::effects(scene, material)).with(media::effects(scene, material));
         if smooth {
             effects = effects.with(Effects::SMOOTH_NORMALS);
         }

@@ -1,5 +1,6 @@
 //! Materials, their textures and tables.
 
+use super::principled::{has_textures, principled};
 use super::record::{Record, records};
 use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError};
@@ -10,7 +11,8 @@ pub(super) fn textures(scene: &Records<'_>) -> Result<(), SceneError> {
     for (at, t) in records(SectionKind::Textures, scene.textures) {
         at.side(Field::Width, t.width, 1)?;
         at.side(Field::Height, t.height, 1)?;
-        at.zero(t.reserved == 0)?;
+        let mode = |first: u32| t.flags >> first & TEXTURE_WRAP;
+        at.zero(t.flags >> 5 == 0 && mode(TEXTURE_WRAP_U) <= TEXTURE_MIRROR && mode(TEXTURE_WRAP_V) <= TEXTURE_MIRROR)?;
         // Sides of at most 2^16: neither product nor sum overflows 64 bits.
         let texels = u64::from(t.width).saturating_mul(u64::from(t.height));
         if u64::from(t.first).saturating_add(texels) > scene.texels.len() as u64 {
@@ -32,6 +34,7 @@ pub(super) fn materials(scene: &Records<'_>) -> Result<(), SceneError> {
         at.finite(Field::InternalReflectance, &[m.fdr])?;
         // What arrives at a surface reads these before it looks at the kind.
         at.follow_if_any(SectionKind::Textures, m.texture, scene.textures)?;
+        at.zero(scene.textures.get(m.texture as usize).is_none_or(|t| t.flags == 0))?;
         at.follow_if_any(SectionKind::Media, m.medium, scene.media)?;
         parameter(at, m, Parameter::Reflectance)?;
         kind.facts().parameters.iter().try_for_each(|p| parameter(at, m, *p))?;
@@ -45,6 +48,9 @@ fn tables(scene: &Records<'_>, at: Record, m: &Material, kind: MaterialKind) -> 
     let compensated = m.flags & MATERIAL_COMPENSATED != 0;
     let wrong = || at.wrong_reference(SectionKind::Tables, m.table, scene.tables.len());
     let present = |p: &&Parameter| p.entries() > 0 && (compensated || !p.compensates());
+    if kind.facts().parameters.contains(&Parameter::Principled) {
+        return principled(scene, at, m);
+    }
     let mut next = m.table as usize;
     let mut any = false;
     for p in kind.facts().parameters.iter().filter(present) {
@@ -82,14 +88,17 @@ fn parameter(at: Record, m: &Material, parameter: Parameter) -> Result<(), Scene
 }
 
 /// Effects of a surface of a validated material.
-pub(super) fn effects(m: &Material) -> Effects {
+pub(super) fn effects(scene: &Records<'_>, m: &Material) -> Effects {
     let known = MaterialKind::from_u32(m.kind);
     let compensates = known.is_some_and(|k| k.facts().compensates());
     let kind = known.map(Effects::of_material).unwrap_or_default();
     let textured = m.texture != NONE;
+    let principled = known == Some(MaterialKind::Principled);
+    let [by_record, mapped] = if principled { has_textures(scene, m) } else { [false; 2] };
     let also = [
-        (textured, Effects::TEXTURES),
-        (textured && m.flags & MATERIAL_CUTOUT != 0, Effects::ALPHA),
+        (textured || by_record, Effects::TEXTURES),
+        (mapped, Effects::NORMAL_MAPS),
+        ((textured || principled) && m.flags & MATERIAL_CUTOUT != 0, Effects::ALPHA),
         (compensates && m.flags & MATERIAL_COMPENSATED != 0, Effects::MULTIPLE_SCATTERING),
     ];
     also.iter().filter(|(present, _)| *present).fold(kind, |all, (_, effect)| all.with(*effect))

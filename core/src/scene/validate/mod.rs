@@ -8,6 +8,7 @@ mod geometry;
 mod lights;
 mod materials;
 mod media;
+mod principled;
 mod record;
 mod tree;
 

@@ -50,6 +50,13 @@ pub enum BakeError {
         /// Number of those that exist.
         count: usize,
     },
+    /// A texture that only principled materials can use: of numbers, or not repeated.
+    TextureUse {
+        /// Name of the material.
+        material: String,
+        /// Name of the texture.
+        texture: String,
+    },
     /// A texture or environment map whose size is not allowed or not that of its texels.
     Image {
         /// Name of the image.
@@ -176,6 +183,10 @@ impl fmt::Display for BakeError {
             Self::TextureIndex { material, found, count } => {
                 write!(f, "material `{material}` refers to texture {found}, there are {count}")
             }
+            Self::TextureUse { material, texture } => write!(
+                f,
+                "material `{material}` is not principled: it cannot use texture `{texture}`, which is linear or not repeated"
+            ),
             Self::Image { image, size: [w, h], texels } => {
                 write!(f, "image `{image}` of {w} x {h} pixels with {texels} texels cannot be used")
             }

@@ -1,12 +1,12 @@
 //! Materials, the tables they share, textures.
 
-use super::BakeError;
-use crate::description::{Material, ModelParameters, Reflectance, SceneDescription};
+use super::{BakeError, principled};
+use crate::description::{Encoding, Material, Model, ModelParameters, Reflectance, SceneDescription, Texture, Wrap};
 use crate::{compensation, microfacet};
 use bytemuck::Zeroable;
 use croupier::unstable::scene::blob::{
     self, COMPENSATION_ENTRIES, MATERIAL_COMPENSATED, MATERIAL_CUTOUT, MATERIAL_TWO_SIDED, MAX_SIDE, MIN_CONDUCTOR,
-    NONE, Parameter,
+    NONE, Parameter, TEXTURE_CLAMP, TEXTURE_LINEAR, TEXTURE_MIRROR, TEXTURE_REPEAT, TEXTURE_WRAP_U, TEXTURE_WRAP_V,
 };
 use std::collections::HashMap;
 
@@ -23,7 +23,7 @@ pub(super) struct Materials {
 /// A material in the making.
 struct Draft<'a> {
     name: &'a str,
-    textures: usize,
+    textures: &'a [Texture],
     out: blob::Material,
     /// int_ior / ext_ior in full precision, 0 without them.
     eta: f64,
@@ -65,9 +65,13 @@ impl Draft<'_> {
                 rgb.iter().try_for_each(|x| self.within("reflectance", *x, range).map(|_| ()))?;
                 self.out.reflectance = rgb;
             }
-            Reflectance::Texture(found) if found as usize >= self.textures => {
-                let (material, count) = (self.name.into(), self.textures);
+            Reflectance::Texture(found) if found as usize >= self.textures.len() => {
+                let (material, count) = (self.name.into(), self.textures.len());
                 return Err(BakeError::TextureIndex { material, found, count });
+            }
+            Reflectance::Texture(t) if texture_flags(&self.textures[t as usize]) != 0 => {
+                let texture = self.textures[t as usize].name.clone();
+                return Err(BakeError::TextureUse { material: self.name.into(), texture });
             }
             Reflectance::Texture(texture) => {
                 self.out.texture = texture;
@@ -167,6 +171,7 @@ impl Tables {
 pub(super) fn bake(scene: &SceneDescription) -> Result<Materials, BakeError> {
     let mut out = Materials::default();
     let mut tables = Tables::default();
+    let mut shared = principled::Shared::default();
     for m in &scene.materials {
         let (kind, parameters) = (m.model.kind(), m.model.parameters());
         let facts = kind.facts();
@@ -179,9 +184,12 @@ pub(super) fn bake(scene: &SceneDescription) -> Result<Materials, BakeError> {
         let flags = flags(scene, m);
         let blank =
             blob::Material { kind: kind as u32, flags, texture: NONE, table: NONE, medium, ..Zeroable::zeroed() };
-        let mut draft = Draft { name: &m.name, textures: scene.textures.len(), out: blank, eta: 0.0 };
+        let mut draft = Draft { name: &m.name, textures: &scene.textures, out: blank, eta: 0.0 };
         facts.parameters.iter().try_for_each(|p| draft.take(*p, &parameters))?;
         tables.derive(facts.parameters, &mut draft);
+        if let Model::Principled(p) = &m.model {
+            principled::bake(scene, m, p, &mut shared, &mut tables.entries, &mut draft.out)?;
+        }
         out.materials.push(draft.out);
         out.names.extend(m.name.bytes().map(|b| if b == b'\n' { b' ' } else { b }));
         out.names.push(b'\n');
@@ -194,6 +202,9 @@ pub(super) fn bake(scene: &SceneDescription) -> Result<Materials, BakeError> {
 /// Flags of a material: those that it asks for and that change something.
 fn flags(scene: &SceneDescription, m: &Material) -> u32 {
     let facts = m.model.kind().facts();
+    if let Model::Principled(p) = &m.model {
+        return principled::cutout(scene, m, p) | if m.two_sided { MATERIAL_TWO_SIDED } else { 0 };
+    }
     let cut = match m.model.parameters().reflectance {
         Some(Reflectance::Texture(t)) if m.cutout => {
             scene.textures.get(t as usize).is_some_and(|t| t.texels.iter().any(|[_, _, _, alpha]| *alpha < 255))
@@ -214,6 +225,17 @@ fn inside(r: f32) -> f32 {
     r.clamp(lo, hi)
 }
 
+/// Encoding and wrapping of a texture.
+fn texture_flags(t: &Texture) -> u32 {
+    let mode = |w: Wrap| match w {
+        Wrap::Repeat => TEXTURE_REPEAT,
+        Wrap::Clamp => TEXTURE_CLAMP,
+        Wrap::Mirror => TEXTURE_MIRROR,
+    };
+    let linear = if t.encoding == Encoding::Linear { TEXTURE_LINEAR } else { 0 };
+    linear | mode(t.wrap[0]) << TEXTURE_WRAP_U | mode(t.wrap[1]) << TEXTURE_WRAP_V
+}
+
 fn textures(scene: &SceneDescription, out: &mut Materials) -> Result<(), BakeError> {
     for t in &scene.textures {
         let texels = u64::from(t.width) * u64::from(t.height);
@@ -227,7 +249,7 @@ fn textures(scene: &SceneDescription, out: &mut Materials) -> Result<(), BakeErr
             return Err(BakeError::TooMany { what: "texels", count });
         }
         let first = out.texels.len() as u32;
-        out.textures.push(blob::Texture { first, width: t.width, height: t.height, reserved: 0 });
+        out.textures.push(blob::Texture { first, width: t.width, height: t.height, flags: texture_flags(t) });
         out.texels.extend(t.texels.iter().map(|rgba| u32::from_le_bytes(*rgba)));
     }
     Ok(())
