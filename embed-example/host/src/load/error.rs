@@ -1,5 +1,6 @@
 //! Errors of loading.
 
+use crate::look::LookError;
 use std::path::{Path, PathBuf};
 use std::{error, fmt, io};
 
@@ -48,6 +49,13 @@ pub enum LoadError {
         /// Fault, in words.
         what: String,
     },
+    /// A wish that the scene cannot follow.
+    Look {
+        /// Scene.
+        path: PathBuf,
+        /// Fault.
+        source: LookError,
+    },
     /// Densities that do not fill their grid, or out of range.
     Grid {
         /// File.
@@ -93,6 +101,7 @@ impl fmt::Display for LoadError {
             Self::Unknown { path } => {
                 write!(f, "{} is neither a folder with a scene.json nor an .obj file", path.display())
             }
+            Self::Look { path, source } => write!(f, "{}: {source}", path.display()),
             Self::Line { path, line, what } => write!(f, "{}:{line}: {what}", path.display()),
             Self::Json { path, at, what } => write!(f, "{}: {at}: {what}", path.display()),
             Self::Image { path, referrer, what } => {
