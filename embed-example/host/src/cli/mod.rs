@@ -8,6 +8,7 @@ mod cache;
 mod compare;
 mod console;
 mod info;
+mod look;
 mod notes;
 mod output;
 mod progress;

@@ -7,7 +7,7 @@ use super::output::Outputs;
 use super::progress::Rendering;
 use super::scene;
 use super::settings::SettingsFlags;
-use super::values::{exr_path, positive, stops};
+use super::values::{Exposure, exposure, exr_path, positive};
 use croupier::Scene;
 use croupier::unstable::MAX_PATH_LENGTH;
 use croupier_host::render::{PlanSummary, RenderOptions, RenderResult, RenderStats, Target, check, render_scene};
@@ -39,9 +39,10 @@ pub(crate) struct Flags {
     /// Threads, 0 for one per processor; the image does not depend on their number
     #[arg(long, value_name = "N", default_value_t = RenderOptions::default().threads)]
     threads: usize,
-    /// Exposure of the PNG in stops, -100 to 100; 0 if absent, 1 for the built-in scene
-    #[arg(long, value_name = "STOPS", value_parser = stops, allow_negative_numbers = true)]
-    exposure: Option<f32>,
+    /// Exposure of the PNG in stops, -100 to 100, or auto: from the picture. Absent: auto for a scene without a camera, 1
+    /// for the built-in scene, else 0. The EXR stays as it is
+    #[arg(long, value_name = "STOPS", value_parser = exposure, allow_negative_numbers = true)]
+    exposure: Option<Exposure>,
     /// Add the denoised picture as layer `denoised`, and tone-map it for the PNG
     #[arg(long)]
     denoise: bool,
@@ -137,7 +138,7 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     // Said now, not after an hour of rendering.
     outputs.check()?;
     let options = flags.options()?;
-    let (bytes, mut notes) = scene::open(path, flags.scene)?;
+    let scene::Opened { bytes, mut notes, framed } = scene::open(path, &flags.scene)?;
     let validated = Scene::from_bytes(&bytes).map_err(|e| about(path)(&e))?;
     if let Some(text) = shortened(&validated, options.settings.max_depth) {
         notes.add(path, text);
@@ -152,7 +153,8 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
         notes.add(path, format!("{count} contributions were not finite and left out, the first in pixel ({x}, {y})"));
     }
     // Its area light brings the walls to about a fifth of white.
-    let exposure = flags.exposure.unwrap_or(if path.is_none() { 1.0 } else { 0.0 });
+    let usual = if path.is_none() { Exposure::Stops(1.0) } else { Exposure::Stops(0.0) };
+    let exposure = flags.exposure.unwrap_or(if framed { Exposure::Auto } else { usual });
     let image = if flags.denoise { "denoised" } else { "" };
     let written = outputs.write(picture, cache.as_deref(), image, exposure);
     let report = Report {

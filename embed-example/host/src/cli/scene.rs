@@ -1,11 +1,13 @@
 //! Scene bytes of a path.
 
+use super::look::LookFlags;
 use super::notes::{Notes, about};
 use super::progress;
 use croupier_host::bake::{self, BakeError};
 use croupier_host::builtin;
 use croupier_host::description::SceneDescription;
 use croupier_host::load::{self, LoadReport};
+use croupier_host::look::{Given, dress};
 use memmap2::Mmap;
 use std::error::Error;
 use std::fs::File;
@@ -32,36 +34,52 @@ impl Deref for SceneBytes {
 }
 
 /// Flags of commands that bake.
-#[derive(Clone, Copy, Debug, Default, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 pub(crate) struct SceneFlags {
     /// Compensate no material for the energy that single scattering between microfacets loses: darker rough surfaces, as
     /// in renderers without this effect. Baked files stay as they are
     #[arg(long)]
     single_scattering: bool,
+    #[command(flatten)]
+    look: LookFlags,
+}
+
+/// A scene that was opened.
+pub(crate) struct Opened {
+    pub(crate) bytes: SceneBytes,
+    pub(crate) notes: Notes,
+    /// The picture was composed here, and wants an exposure to suit it.
+    pub(crate) framed: bool,
 }
 
 /// Opens a scene: a baked `.crp` file, anything that loads and bakes (a folder with `scene.json`, an `.obj`), or,
 /// without a path, the built-in one. What had to be assumed, ignored or left out is printed and returned.
-pub(crate) fn open(path: Option<&Path>, flags: SceneFlags) -> Result<(SceneBytes, Notes), Box<dyn Error>> {
-    let (mut description, loaded) = match path {
-        Some(path) if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")) => {
-            if flags.single_scattering {
-                return Err(
-                    format!("{}: `--single-scattering` is for baking, not for baked files", path.display()).into()
-                );
-            }
-            return Ok((map(path)?, Notes::default()));
+pub(crate) fn open(path: Option<&Path>, flags: &SceneFlags) -> Result<Opened, Box<dyn Error>> {
+    let baked_file = path.is_some_and(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")));
+    if let Some(path) = path.filter(|_| baked_file) {
+        let flag = if flags.single_scattering { Some("--single-scattering") } else { flags.look.any() };
+        if let Some(flag) = flag {
+            return Err(format!("{}: `{flag}` is for baking, not for baked files", path.display()).into());
         }
-        Some(path) => load::load(path)?,
-        None => (builtin::cornell_box(), LoadReport::default()),
+        return Ok(Opened { bytes: map(path)?, notes: Notes::default(), framed: false });
+    }
+    let (look, notes) = flags.look.look()?;
+    let (mut description, mut loaded) = match path {
+        Some(path) => load::load_with(path, &look)?,
+        None => {
+            let mut scene = builtin::cornell_box();
+            let notes = dress(&mut scene, &Given::SCENE, &look).map_err(|e| about(None)(&e))?;
+            (scene, LoadReport { notes, ..LoadReport::default() })
+        }
     };
+    loaded.notes.extend(notes);
     if flags.single_scattering {
         description.materials.iter_mut().for_each(|m| m.compensated = false);
     }
     let baked = bake(&description).map_err(|e| about(path)(&e))?;
     let notes = Notes::of(&loaded, &baked.report);
     notes.print(path);
-    Ok((SceneBytes::Baked(baked), notes))
+    Ok(Opened { bytes: SceneBytes::Baked(baked), notes, framed: loaded.framed })
 }
 
 fn bake(description: &SceneDescription) -> Result<bake::Baked, BakeError> {

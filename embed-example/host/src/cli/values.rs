@@ -38,3 +38,20 @@ pub(crate) fn stops(text: &str) -> Result<f32, String> {
         Err(e) => Err(e.to_string()),
     }
 }
+
+/// Exposure of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Exposure {
+    /// In stops.
+    Stops(f32),
+    /// What suits the picture.
+    Auto,
+}
+
+/// An exposure: stops, or `auto`.
+pub(crate) fn exposure(text: &str) -> Result<Exposure, String> {
+    match text {
+        "auto" => Ok(Exposure::Auto),
+        _ => stops(text).map(Exposure::Stops).map_err(|e| format!("{e}; need stops or `auto`")),
+    }
+}

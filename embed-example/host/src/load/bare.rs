@@ -3,6 +3,7 @@
 use super::loader::Loader;
 use super::{LoadError, colors, mtl, obj};
 use crate::description::{Model, Reflectance, SceneDescription, Vertex};
+use crate::look::{Given, Up};
 use std::path::Path;
 
 /// A mesh as its file has it.
@@ -17,8 +18,8 @@ pub(super) struct Mesh {
     pub colors: Vec<[u8; 3]>,
 }
 
-/// The mesh in grey, or in the colours of its vertices, seen and lit like every file without camera and light.
-pub(super) fn scene(loader: &mut Loader, path: &Path, mut mesh: Mesh) -> Result<SceneDescription, LoadError> {
+/// The mesh in grey, or in the colours of its vertices; camera, light and ground are left open. `up` is usual for the format.
+pub(super) fn scene(loader: &mut Loader, path: &Path, mut mesh: Mesh, up: Up) -> Result<SceneDescription, LoadError> {
     let mut scene = SceneDescription::default();
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let diffuse = |reflectance| Model::Diffuse { reflectance };
@@ -39,6 +40,6 @@ pub(super) fn scene(loader: &mut Loader, path: &Path, mut mesh: Mesh) -> Result<
     };
     let material = scene.add_material(material, model);
     scene.add_mesh(&name, material, &mesh.vertices, &mesh.triangles, mesh.smooth);
-    obj::complete(loader, &mut scene, None);
+    loader.given = Given { up, ..Given::MESH };
     Ok(scene)
 }

@@ -1,5 +1,6 @@
 //! Errors of loading.
 
+use crate::look::LookError;
 use std::path::{Path, PathBuf};
 use std::{error, fmt, io};
 
@@ -66,6 +67,13 @@ pub enum LoadError {
         referrer: String,
         /// Fault, in words.
         what: String,
+    },
+    /// A wish that the scene cannot follow.
+    Look {
+        /// Scene.
+        path: PathBuf,
+        /// Fault.
+        source: LookError,
     },
     /// Densities that do not fill their grid, or out of range.
     Grid {
@@ -138,6 +146,7 @@ impl fmt::Display for LoadError {
             }
             Self::File { path, what } => write!(f, "{}: {what}", path.display()),
             Self::Binary { path, offset, what } => write!(f, "{}: byte {offset}: {what}", path.display()),
+            Self::Look { path, source } => write!(f, "{}: {source}", path.display()),
             Self::Line { path, line, what } => write!(f, "{}:{line}: {what}", path.display()),
             Self::Json { path, at, what } => write!(f, "{}: {at}: {what}", path.display()),
             Self::Image { path, referrer, what } => {

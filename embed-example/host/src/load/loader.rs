@@ -3,6 +3,7 @@
 use super::error::LoadError;
 use super::images;
 use crate::description::{Environment, SceneDescription, Texture};
+use crate::look::Given;
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,14 +19,23 @@ pub struct LoadReport {
     pub skipped_elements: u32,
     /// Notes of what was assumed or ignored, one sentence each.
     pub notes: Vec<String>,
+    /// The file has no camera: the picture was composed here, and wants an exposure to suit it.
+    pub framed: bool,
 }
 
 /// State that the files of one scene share.
-#[derive(Default)]
 pub(super) struct Loader {
     pub(super) report: LoadReport,
+    /// What the file says of itself; readers of files without camera or light change it.
+    pub(super) given: Given,
     /// Textures by path: a file that several materials use is decoded once.
     textures: HashMap<PathBuf, u32>,
+}
+
+impl Default for Loader {
+    fn default() -> Self {
+        Self { report: LoadReport::default(), given: Given::SCENE, textures: HashMap::new() }
+    }
 }
 
 impl Loader {

@@ -35,18 +35,25 @@ mod stl;
 pub use error::LoadError;
 pub use loader::LoadReport;
 
-use crate::description::SceneDescription;
+use crate::description::{Environment, SceneDescription};
+use crate::look::{Look, dress};
 use loader::Loader;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// Loads a folder with a `scene.json`, that `scene.json` itself, or a file of another kind by its extension: `.gltf`,
-/// `.glb`, `.obj`, `.ply`, `.stl`. A file that begins like `.glb` or PLY is one, whatever its name is.
+/// As [`load_with`], without wishes.
 pub fn load(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
+    load_with(path, &Look::default())
+}
+
+/// Loads a folder with a `scene.json`, that `scene.json` itself, or a file of another kind by its extension: `.gltf`,
+/// `.glb`, `.obj`, `.ply`, `.stl`. A file that begins like `.glb` or PLY is one, whatever its name is. What it leaves open
+/// is completed, and the wishes of `look` are followed ([`dress`]).
+pub fn load_with(path: &Path, look: &Look) -> Result<(SceneDescription, LoadReport), LoadError> {
     let mut loader = Loader::default();
     let extension = path.extension().map(|e| e.to_ascii_lowercase());
-    let scene = if path.is_dir() {
+    let mut scene = if path.is_dir() {
         scene_json::load(&mut loader, &path.join("scene.json"))?
     } else {
         match extension.as_ref().and_then(|e| e.to_str()) {
@@ -62,6 +69,9 @@ pub fn load(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
             _ => return Err(LoadError::Unknown { path: path.into() }),
         }
     };
+    let notes = dress(&mut scene, &loader.given, look);
+    loader.report.notes.extend(notes.map_err(|source| LoadError::Look { path: path.into(), source })?);
+    loader.report.framed = !loader.given.camera;
     Ok((scene, loader.report))
 }
 
@@ -70,4 +80,11 @@ fn starts(path: &Path, is: fn(&[u8]) -> bool) -> bool {
     let mut head = Vec::new();
     let read = File::open(path).and_then(|file| file.take(64).read_to_end(&mut head));
     read.is_ok() && is(&head)
+}
+
+/// Reads an environment map, unscaled and unrotated: a Radiance file, or an EXR with R, G and B. Notes say what was changed.
+pub fn environment(path: &Path) -> Result<(Environment, Vec<String>), LoadError> {
+    let mut loader = Loader::default();
+    let map = loader.environment(path, "--env")?;
+    Ok((map, loader.report.notes))
 }

@@ -9,8 +9,8 @@
 use super::json::Place;
 use super::loader::Loader;
 use super::{LoadError, mtl};
-use crate::builtin;
-use crate::description::{Camera, Emitter, Material, Model, Object, SceneDescription, Triangle, Vertex};
+use crate::description::{Emitter, Object, SceneDescription, Triangle, Vertex};
+use crate::look::Given;
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -304,8 +304,7 @@ pub(super) fn load_geometry(
     append(path, scene, prepared, &materials)
 }
 
-/// Loads a bare OBJ file with its material libraries. Without lights it gets the sky of [`builtin::sky`]; the camera
-/// sees the whole scene.
+/// Loads a bare OBJ file with its material libraries. Camera, light and ground are left open.
 pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescription, LoadError> {
     let mut scene = SceneDescription::default();
     let prepared = read(loader, path, None)?;
@@ -346,37 +345,6 @@ pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescrip
         materials.push(index);
     }
     append(path, &mut scene, prepared, &materials)?;
-    complete(loader, &mut scene, None);
+    loader.given = Given::MESH;
     Ok(scene)
-}
-
-/// Adds what a file lacks: without a `camera`, one that sees the whole scene; without lights, the sky of
-/// [`builtin::sky`]. Emission that a texture modulates is no light: displays and eyes have it.
-pub(super) fn complete(loader: &mut Loader, scene: &mut SceneDescription, camera: Option<Camera>) {
-    scene.camera = camera.unwrap_or_else(|| {
-        loader.note("the file has no camera: it was framed to show everything".into());
-        frame(scene)
-    });
-    let lamp = |m: &Material| match &m.model {
-        Model::Principled(p) => p.emission != [0.0; 3] && p.emission_texture.is_none(),
-        _ => false,
-    };
-    if scene.emitters.is_empty() && !scene.materials.iter().any(lamp) {
-        scene.environment = Some(builtin::sky());
-        loader.note("the file has no light: an environment was added".into());
-    }
-}
-
-/// A camera that sees the bounding sphere whole, from the front, the right and above.
-fn frame(scene: &SceneDescription) -> Camera {
-    let camera = Camera { size: [640, 480], vfov_deg: 40.0, ..Camera::default() };
-    let Some([lo, hi]) = scene.bounds() else { return camera };
-    let axis = |i: usize| (f64::from(lo[i]), f64::from(hi[i]));
-    let target = [0, 1, 2].map(|i| (axis(i).0 + axis(i).1) / 2.0);
-    let radius = [0, 1, 2].map(|i| (axis(i).1 - axis(i).0).powi(2)).iter().sum::<f64>().sqrt() / 2.0;
-    // The height is the smaller side of the picture, so its half angle decides; 2 % of margin.
-    let distance = 1.02 * radius.max(1e-6) / (camera.vfov_deg.to_radians() / 2.0).sin();
-    let direction = [0.48, 0.36, 0.8];
-    let origin = [0, 1, 2].map(|i| target[i] + distance * direction[i]);
-    Camera { origin, target, ..camera }
 }

@@ -15,6 +15,7 @@ use super::error::quoted;
 use super::loader::Loader;
 use super::{LoadError, polygon};
 use crate::description::{SceneDescription, Vertex};
+use crate::look::Up;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult};
 use std::io::{BufRead, Cursor, ErrorKind};
@@ -34,7 +35,7 @@ pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription,
         file.element(element)?;
     }
     let mesh = file.polygons.mesh(path, file.vertices, &mut loader.report.polygons)?;
-    bare::scene(loader, path, mesh)
+    bare::scene(loader, path, mesh, Up::Y)
 }
 
 /// Names of the numbers of a vertex, in the order of [`Corner::numbers`].

@@ -5,12 +5,13 @@
 //!
 //! A file is binary if its length is what the number of triangles in byte 80 asks for, or longer and without `solid` at
 //! its start; else it is a text. Equal positions become one vertex. Normals of the file are ignored: triangles are flat,
-//! and their order of vertices says where the front is.
+//! and their order of vertices says where the front is. Up is usually +z.
 
 use super::LoadError;
 use super::bare::{self, Mesh};
 use super::loader::Loader;
 use crate::description::{SceneDescription, Vertex};
+use crate::look::Up;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -52,7 +53,7 @@ pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription,
     if welder.mesh.triangles.is_empty() {
         return Err(LoadError::file(path, "no triangles"));
     }
-    bare::scene(loader, path, welder.mesh)
+    bare::scene(loader, path, welder.mesh, Up::Z)
 }
 
 /// A mesh that grows by triangles.

@@ -23,11 +23,12 @@ mod meshes;
 mod nodes;
 mod textures;
 
+use super::LoadError;
 use super::error::quoted;
 use super::loader::Loader;
-use super::{LoadError, obj};
 use crate::bake::boundary_is_closed;
-use crate::description::{Instance, Medium, Model, Object, Projection, Prototype, SceneDescription, Triangle, Vertex};
+use crate::description::{Instance, Material, Medium, Model, Object, Projection, Prototype, SceneDescription, Triangle, Vertex};
+use crate::look::{Given, Up};
 use asset::Asset;
 use croupier::unstable::scene::blob::MAX_MEDIA;
 use glam::{DMat3, DMat4, DVec3};
@@ -79,7 +80,14 @@ pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription,
     solids(loader, &mut scene, &materials.volumes);
     let perspective = scene.cameras.iter().find(|c| c.camera.projection == Projection::Perspective);
     let camera = perspective.or(scene.cameras.first()).map(|c| c.camera);
-    obj::complete(loader, &mut scene, camera);
+    scene.camera = camera.unwrap_or_default();
+    // Emission that a texture modulates is no light: displays and eyes have it.
+    let lamp = |m: &Material| match &m.model {
+        Model::Principled(p) => p.emission != [0.0; 3] && p.emission_texture.is_none(),
+        _ => false,
+    };
+    let light = !scene.emitters.is_empty() || scene.materials.iter().any(lamp);
+    loader.given = Given { camera: camera.is_some(), light, up: Up::Y, up_is_known: true };
     Ok(scene)
 }
 
