@@ -5,8 +5,8 @@
 
 use crate::scene::Scene;
 use crate::scene::blob::{
-    TEXTURE_CLAMP, TEXTURE_LINEAR, TEXTURE_MIRROR, TEXTURE_REPEAT, TEXTURE_WRAP, TEXTURE_WRAP_U, TEXTURE_WRAP_V,
-    Texture,
+    NONE, TEXTURE_CLAMP, TEXTURE_LINEAR, TEXTURE_MIRROR, TEXTURE_REPEAT, TEXTURE_WRAP, TEXTURE_WRAP_U, TEXTURE_WRAP_V,
+    Texture, TextureRecord,
 };
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
@@ -58,27 +58,49 @@ pub fn alpha(scene: &Scene<'_>, texture: U32x8, uv: [F32x8; 2], active: Mask8) -
     interpolated::<false>(scene, texture, uv, active, |bytes| [f32::from(bytes[3]) / 255.0, 0.0, 0.0]).x
 }
 
-/// As [`lookup`], of a texture of any encoding and wrapping; linear texels are code / 255.
-pub fn lookup_any(scene: &Scene<'_>, texture: U32x8, uv: [F32x8; 2], active: Mask8) -> Vec3x8 {
-    let index = texture.to_array();
-    let is_linear = |i: usize| scene.textures.get(index[i] as usize).is_some_and(|t| t.flags & TEXTURE_LINEAR != 0);
-    let linear = Mask8::from_bits(active.lanes().fold(0, |bits, i| bits | u32::from(is_linear(i)) << i));
-    let mut out = Vec3x8::ZERO;
+/// Linear Rec. 709 colours, or numbers code / 255 of linear textures, of a referenced texture per lane at the surface
+/// coordinates `uv`, and the lanes that have one; 1 in the others.
+pub fn referenced(scene: &Scene<'_>, of: &[Option<&TextureRecord>; 8], uv: [F32x8; 2]) -> (Mask8, Vec3x8) {
+    let (index, present) = indices(of);
+    if present.none() {
+        return (present, Vec3x8::ONE);
+    }
+    let uv = transformed(of, uv);
+    let i = index.to_array();
+    let is_linear = |l: usize| scene.textures.get(i[l] as usize).is_some_and(|t| t.flags & TEXTURE_LINEAR != 0);
+    let linear = Mask8::from_bits(present.lanes().fold(0, |bits, l| bits | u32::from(is_linear(l)) << l));
+    let mut out = Vec3x8::ONE;
     if linear.any() {
         let rgb = |bytes: [u8; 4]| [bytes[0], bytes[1], bytes[2]].map(|b| f32::from(b) / 255.0);
-        out = interpolated::<true>(scene, texture, uv, linear, rgb);
+        out = Vec3x8::select(linear, interpolated::<true>(scene, index, uv, linear, rgb), out);
     }
-    let encoded = active.and_not(linear);
+    let encoded = present.and_not(linear);
     if encoded.any() {
         let rgb = |bytes: [u8; 4]| [bytes[0], bytes[1], bytes[2]].map(|b| SRGB_TO_LINEAR[b as usize]);
-        out = Vec3x8::select(encoded, interpolated::<true>(scene, texture, uv, encoded, rgb), out);
+        out = Vec3x8::select(encoded, interpolated::<true>(scene, index, uv, encoded, rgb), out);
     }
-    out
+    (present, out)
 }
 
-/// As [`alpha`], of a texture of any wrapping.
-pub fn alpha_any(scene: &Scene<'_>, texture: U32x8, uv: [F32x8; 2], active: Mask8) -> F32x8 {
-    interpolated::<true>(scene, texture, uv, active, |bytes| [f32::from(bytes[3]) / 255.0, 0.0, 0.0]).x
+/// Alpha of a referenced texture per lane, as [`referenced`].
+pub fn referenced_alpha(scene: &Scene<'_>, of: &[Option<&TextureRecord>; 8], uv: [F32x8; 2]) -> F32x8 {
+    let (index, present) = indices(of);
+    let alpha = |bytes: [u8; 4]| [f32::from(bytes[3]) / 255.0, 0.0, 0.0];
+    present.select(interpolated::<true>(scene, index, transformed(of, uv), present, alpha).x, F32x8::ONE)
+}
+
+/// Indices of the textures, and the lanes that have one.
+#[inline(always)]
+fn indices(of: &[Option<&TextureRecord>; 8]) -> (U32x8, Mask8) {
+    let index = U32x8::from_fn(|l| of[l].map_or(NONE, |t| t.texture));
+    (index, !index.eq(U32x8::splat(NONE)))
+}
+
+/// Coordinates of the textures.
+#[inline(always)]
+fn transformed(of: &[Option<&TextureRecord>; 8], uv: [F32x8; 2]) -> [F32x8; 2] {
+    let entry = |row: usize, k: usize| F32x8::from_fn(|l| of[l].map_or(0.0, |t| t.transform[row & 1][k % 3]));
+    [0, 1].map(|row| entry(row, 0) * uv[0] + entry(row, 1) * uv[1] + entry(row, 2))
 }
 
 /// Whole parts of coordinates along one axis of clamped and mirrored textures, brought into [0, 1) so that only the

@@ -77,6 +77,40 @@ pub struct Parts {
     pub names: Vec<u8>,
 }
 
+/// Adds the record of a principled material with its tables; the entry where it begins.
+fn principled(tables: &mut Vec<f32>) -> u32 {
+    let reflection = tables.len() as u32;
+    let row = ReflectionRow { columns: [[0.5, 0.25, 1.0, 0.0]; 32], nodes: [[0.5, 0.25]; 4] };
+    tables.extend_from_slice(bytemuck::cast_slice(&[row; PRINCIPLED_ROWS]));
+    let energy = tables.len() as u32;
+    tables.extend_from_slice(bytemuck::cast_slice(&[EnergyRow { sides: [[0.75; 32]; 2] }; PRINCIPLED_ENERGY_ROWS]));
+    let record = tables.len() as u32;
+    let layer = LayerRecord { albedo: [0.125; 32], nodes: [0.125; 4] };
+    let mut textures = [TextureRecord::NONE; PRINCIPLED_TEXTURES];
+    textures[0] = TextureRecord { texture: 0, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };
+    tables.extend_from_slice(bytemuck::cast_slice(&[PrincipledRecord {
+        metalness: 0.5,
+        roughness: 0.5,
+        transmission: 0.5,
+        coat: 0.5,
+        opacity: 1.0,
+        f90: 1.0,
+        f0: [0.04; 3],
+        sheen_color: [0.5; 3],
+        coat_alpha: 0.1,
+        sheen_alpha: 0.5,
+        eta: 1.5,
+        normal_scale: 1.0,
+        flags: 0,
+        reflection,
+        energy,
+        textures,
+        coat_layer: layer,
+        sheen_layer: layer,
+    }]));
+    record
+}
+
 impl Parts {
     /// The blob: header, table, sections in the order of their kinds.
     pub fn blob(&self) -> Blob {
@@ -167,6 +201,8 @@ impl Parts {
         };
         let mut materials: Vec<_> = MaterialKind::ALL.iter().map(material).collect();
         materials[0].flags = MATERIAL_TWO_SIDED;
+        let mut tables: Vec<f32> = (0..64).map(|i| i as f32 / 64.0).collect();
+        materials[MaterialKind::Principled as usize].table = principled(&mut tables);
         materials[8].texture = 0;
         let light_alias = alias(&[3, 3, 8, 1, 1]);
         let light = |kind: LightKind, triangle, area, vector, emission| Light {
@@ -195,7 +231,7 @@ impl Parts {
             materials,
             textures: vec![Texture { first: 1, width: 2, height: 3, flags: 0 }],
             texels: vec![0, 1, 2, 3, 4, 5, 6],
-            tables: (0..64).map(|i| i as f32 / 64.0).collect(),
+            tables,
             lights,
             light_alias,
             environment: vec![Environment {

@@ -17,6 +17,7 @@ pub mod media_oracle;
 pub mod media_scene;
 pub mod minimum;
 pub mod model;
+pub mod principled;
 pub mod quadrature;
 mod records;
 pub mod replay;

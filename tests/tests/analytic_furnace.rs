@@ -32,6 +32,9 @@ fn pair(kind: MaterialKind, reflectance: [f32; 3], eta: [f32; 3], k: [f32; 3], a
         M::Plastic => Model::Plastic { reflectance: r, int_ior, ext_ior },
         M::RoughPlastic => Model::RoughPlastic { reflectance: r, int_ior, ext_ior, alpha },
         M::Null => Model::Null,
+        M::Principled => {
+            Model::Principled(croupier_host::description::Principled { base_color: reflectance, ..Default::default() })
+        }
     };
     (model, Case::new(kind, reflectance, eta, k, alpha))
 }

@@ -216,6 +216,7 @@ fn statistics_and_roulette_know_every_kind() {
             RoughConductor => (By::Mirror, 198.0),
             RoughDielectric => (By::View, 198.0),
             Dielectric | ThinDielectric | Null => (By::View, 1e4),
+            Principled => (By::Mirror, 198.0),
         };
         assert_eq!(facts(*kind).cache_direction, direction, "{}", kind.name());
         let of_width = |alpha| bsdf::shininess(*kind, &Case::new(*kind, [0.5; 3], [1.5; 3], [2.0; 3], alpha).material);

@@ -38,7 +38,9 @@ fn scattering_models() {
         | MaterialKind::Conductor
         | MaterialKind::Dielectric
         | MaterialKind::ThinDielectric
-        | MaterialKind::Null => false,
+        | MaterialKind::Null
+        // `bsdf_principled.rs`
+        | MaterialKind::Principled => false,
     };
     let (mut tried, mut kinds) = (0, vec![]);
     for case in cases().iter().filter(smooth) {

@@ -182,7 +182,8 @@ fn models_have_the_parameters_of_their_rows() {
             let baked = bake(&s, &BakeOptions::default(), |_, _| {}).unwrap();
             let scene = Scene::from_bytes(&baked.bytes).unwrap();
             let (m, facts) = (&scene.materials[0], kind.facts());
-            let known = [(MATERIAL_TWO_SIDED, !facts.transmissive), (MATERIAL_COMPENSATED, facts.compensates())];
+            let two_sided = !facts.transmissive || *kind == MaterialKind::Principled;
+            let known = [(MATERIAL_TWO_SIDED, two_sided), (MATERIAL_COMPENSATED, facts.compensates())];
             let asked = |flag| flag != MATERIAL_COMPENSATED || compensated;
             let flags = known.iter().filter(|(flag, holds)| *holds && asked(*flag)).map(|(flag, _)| flag).sum();
             assert_eq!((m.kind, m.flags), (*kind as u32, flags), "{}", kind.name());
@@ -196,12 +197,17 @@ fn models_have_the_parameters_of_their_rows() {
                     Parameter::RelativeEta => m.eta[0] == 1.5,
                     Parameter::ComplexEta => (m.eta, m.k) == ([0.2; 3], [3.0; 3]),
                     Parameter::InternalReflectance => m.fdr > 0.4 && m.fdr < 0.7,
+                    Parameter::Principled => m.table != NONE,
                     Parameter::TransmittanceTable | Parameter::CompensationTable | Parameter::EnergyTable => {
                         m.table == 0 && scene.tables.len() >= entries + parameter.entries()
                     }
                 };
                 assert!(holds, "{} and its {parameter:?}", kind.name());
                 entries += parameter.entries();
+            }
+            if *kind == MaterialKind::Principled {
+                // its record knows where its tables are
+                entries = scene.tables.len();
             }
             assert_eq!((scene.tables.len(), m.table == NONE), (entries, entries == 0), "{}", kind.name());
         }

@@ -16,7 +16,7 @@
 //! | specular | (1 - M), of solids (1 - M) (1 - t), times GGX with `F = f0 + (f90 - f0) (1 - c)^5` | min of L |
 //! | diffuse | (1 - M) (1 - t) rho cos / pi | `T(wo) T(wi) / mean of T`, T = L T_specular |
 //! | thin transmission | (1 - M) t rho times the compensated GGX reflection, wi mirrored to the other side | min of L T_specular |
-//! | solid transmission | (1 - M) t times a GGX interface, rho on what it transmits, over its energy (Turquin 2019) | L of the outside |
+//! | solid transmission | (1 - M) t times a GGX interface, rho on what it transmits, over its energy (Turquin 2019) | min of L, or L(wo) for what passes; 1 from inside |
 //!
 //! - The minimum is reciprocal and never gives more than T(wo); it loses what T(wi) is below T(wo), which is nothing for
 //!   narrow lobes. The diffuse base is scaled by the product instead, with the cosine-weighted mean of T by a quadrature
@@ -35,7 +35,7 @@ mod sheen;
 mod surface;
 mod tables;
 
-pub use surface::{Surface8, Textured8, emission_factor, record, textured};
+pub use surface::{Surface8, Textured8, textured};
 pub use tables::NODES;
 
 use super::fresnel::{self, Index8};
@@ -307,10 +307,8 @@ impl Principled<'_> {
             fresnel::transmittance(c, cos_t, index.eta) * visible * (index.eta * e) * ((c + e) / index.k).sqr();
         let reflected = fresnel::dielectric(c, index).reflectance * d / (denominator * 2.0);
         let pdf = reflect.select(reflected, refracted);
-        let outer = reflect.select(
-            below.select(F32x8::ONE, to.below_coat.min(ti.below_coat)),
-            below.select(ti.below_coat, to.below_coat),
-        );
+        let outer = reflect.select(to.below_coat.min(ti.below_coat), to.below_coat);
+        let outer = below.select(F32x8::ONE, outer);
         let scale = reflect.select(F32x8::ONE, index.inverse * index.inverse) * outer * self.ggx.g1(wi)
             / tables::energy(&self.energies, self.roughness, to.cosine, below);
         let colour = Vec3x8::select(reflect, Vec3x8::ONE, self.base);
@@ -328,7 +326,7 @@ impl<'s> Bsdf<'s> for Principled<'s> {
     #[inline(always)]
     fn gather(scene: &Scene<'s>, inputs: &Inputs8, active: Mask8) -> Self {
         let m = Materials8::new(scene, inputs, active);
-        let one = |l: usize| record(scene, m.0[l]).unwrap_or(IDLE_RECORD);
+        let one = |l: usize| scene.principled(m.0[l]).unwrap_or(IDLE_RECORD);
         let records = [one(0), one(1), one(2), one(3), one(4), one(5), one(6), one(7)];
         let get = |f: fn(&PrincipledRecord) -> f32| F32x8::from_fn(|l| f(records[l]));
         let s = Surface8::unpack(inputs.reflectance.zero_unless(active));

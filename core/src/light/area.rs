@@ -12,7 +12,8 @@
 use super::{Chosen, LightModel, LightSample8, LightSelector, SceneExtent, luminance, usable};
 use crate::geometry::{self, OFFSET_BOUND, SurfaceHit8};
 use crate::scene::Scene;
-use crate::scene::blob::Light;
+use crate::scene::blob::{Light, NONE, PrincipledTexture};
+use crate::texture;
 use core::f64::consts::PI;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
@@ -101,6 +102,36 @@ impl LightModel for Area {
     fn power(light: &Light, _: &SceneExtent) -> f64 {
         PI * f64::from(light.area) * luminance(light.emission)
     }
+}
+
+/// Factors of the radiance at the points of triangles with these vertex indices and barycentric weights of b and c: 1
+/// where the material has no emission texture.
+#[inline(always)]
+fn factor(scene: &Scene<'_>, vertices: [[u32; 3]; 8], material: [u32; 8], [b, c]: [F32x8; 2], mask: Mask8) -> Vec3x8 {
+    let corner = |k: usize| {
+        Vec3x8::from_fn(|i| scene.vertices.get(vertices[i][k] as usize).map_or([0.0; 3], |v| [v.uv[0], v.uv[1], 0.0]))
+    };
+    let uv = corner(0) * (F32x8::ONE - b - c) + corner(1) * b + corner(2) * c;
+    let bits = mask.bits();
+    let reference = |l: usize| {
+        let m = if bits >> l & 1 == 1 { scene.materials.get(material[l] as usize) } else { None };
+        m.and_then(|m| scene.principled(m)).and_then(|r| r.textures.get(PrincipledTexture::Emission as usize))
+    };
+    texture::referenced(scene, &core::array::from_fn(reference), [uv.x, uv.y]).1
+}
+
+/// Emission textures at the points that [`Area`] samples with `words`.
+pub(super) fn sampled_factor(scene: &Scene<'_>, light: &Chosen<'_>, words: [U32x8; 2], mask: Mask8) -> Vec3x8 {
+    let of = |i: usize| scene.triangles.get(light.record[i].triangle as usize);
+    let vertices = core::array::from_fn(|i| of(i).map_or([NONE; 3], |t| t.vertex));
+    let material = core::array::from_fn(|i| of(i).map_or(NONE, |t| t.material));
+    factor(scene, vertices, material, barycentric(words.map(U32x8::to_unit)), mask)
+}
+
+/// Emission textures at the points of `hit`: the factor of what [`area_radiance`] gives. 1 outside `mask`.
+#[inline(never)]
+pub fn area_texture(scene: &Scene<'_>, hit: &SurfaceHit8, mask: Mask8) -> Vec3x8 {
+    factor(scene, hit.vertices, hit.material, [hit.u, hit.v], mask)
 }
 
 /// Density with which [`super::sample_of`] at `p`, `n` chooses the unit directions `dir` that have met the triangles of

@@ -26,7 +26,7 @@ mod power;
 mod spot;
 mod sun;
 
-pub use area::{area_pdf, area_radiance};
+pub use area::{area_pdf, area_radiance, area_texture};
 pub use environment::{environment_pdf, environment_radiance};
 pub use mis::power_heuristic;
 pub use power::{PowerSelector, SceneExtent, luminance};
@@ -247,6 +247,9 @@ const _: () = {
     }
 };
 
+/// Effects without which no triangle has an emission texture.
+pub const TEXTURED_EMISSION: Effects = Effects::AREA_LIGHTS.with(Effects::PRINCIPLED).with(Effects::TEXTURES);
+
 /// Chooses a light and a direction to it for every active lane.
 ///
 /// `p` are the reference points, `n` their unit normals, 0 in media (a hint for the selector only; nothing below
@@ -269,6 +272,11 @@ pub fn sample_of<S: LightSelector>(
     let chosen = Chosen::gather(scene, light, active);
     let possible = active & probability.gt(F32x8::ZERO);
     let mut out = sample_chosen(profile, scene, &chosen, p, [words[1], words[2], words[3]], possible);
+    if profile.contains(TEXTURED_EMISSION) && scene.effects.contains(TEXTURED_EMISSION) {
+        let area = chosen.of_kind(LightKind::Area, possible);
+        let factor = area::sampled_factor(scene, &chosen, [words[1], words[2]], area);
+        out.radiance = Vec3x8::select(area, out.radiance * factor, out.radiance);
+    }
     out.pdf *= probability;
     out.valid &= usable(out.pdf) & out.wi.is_finite() & out.radiance.is_finite() & out.radiance.any_positive();
     out.pdf = out.valid.zero_unless(out.pdf);

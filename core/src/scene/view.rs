@@ -78,6 +78,15 @@ impl<'s> Scene<'s> {
         Self(records)
     }
 
+    /// The record of a material, if it is a principled one.
+    #[inline(always)]
+    pub fn principled(&self, m: &Material) -> Option<&'s PrincipledRecord> {
+        if m.kind != MaterialKind::Principled as u32 {
+            return None;
+        }
+        PrincipledRecord::read::<1>(self.0.tables, m.table).map(|[r]| r)
+    }
+
     /// Name of a material, empty if it has none.
     pub fn material_name(&self, material: u32) -> &'s str {
         let names = core::str::from_utf8(self.names).unwrap_or("");

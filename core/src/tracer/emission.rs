@@ -3,7 +3,7 @@
 use super::packets::Contribution8;
 use super::packets::RayState8;
 use crate::geometry::SurfaceHit8;
-use crate::light::{self, power_heuristic};
+use crate::light::{self, TEXTURED_EMISSION, power_heuristic};
 use crate::scene::Effects;
 use crate::world::World;
 use croupier_simd::{F32x8, Mask8, Vec3x8};
@@ -30,7 +30,10 @@ pub(crate) fn area<W: World>(world: &W, rays: &RayState8, hit: &SurfaceHit8, ng:
         return None;
     }
     let scene = world.scene();
-    let radiance = light::area_radiance(scene, hit, rays.ray.d, ng, emitters);
+    let mut radiance = light::area_radiance(scene, hit, rays.ray.d, ng, emitters);
+    if W::EFFECTS.contains(TEXTURED_EMISSION) && scene.effects.contains(TEXTURED_EMISSION) {
+        radiance *= light::area_texture(scene, hit, emitters);
+    }
     let sampled = emitters.and_not(rays.skip_mis);
     if sampled.none() {
         return Some(Contribution8 { pixel: rays.beta * radiance, local: rays.weight * radiance });

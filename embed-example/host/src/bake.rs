@@ -6,6 +6,7 @@
 //! | `materials` | materials, their tables, textures |
 //! | `principled` | the records of principled materials |
 //! | `lights` | lights, their choice, the environment |
+//! | `emission` | nothing: how much light triangles emit with a texture |
 //! | `media` | participating media, their majorants |
 //! | `boundary` | nothing: checks that boundaries of media are closed |
 //! | `camera` | the camera |
@@ -15,6 +16,7 @@
 
 mod boundary;
 mod camera;
+mod emission;
 mod error;
 mod geometry;
 mod lights;

@@ -294,7 +294,7 @@ models! {
 }
 
 /// What the texels of a texture stand for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Encoding {
     /// Colours, sRGB-encoded.
     #[default]
@@ -304,7 +304,7 @@ pub enum Encoding {
 }
 
 /// Texels beyond the edges of a texture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Wrap {
     /// The texture again.
     #[default]

@@ -8,8 +8,9 @@ use croupier::unstable::scene::blob::{
     ALPHA_RANGE, COMPENSATION_RANGE, ENERGY_RANGE, EnergyRow, LayerRecord, PRINCIPLED_COLUMNS, PRINCIPLED_ENERGY_ROWS,
     PRINCIPLED_NODES, PRINCIPLED_ROWS, ReflectionRow,
 };
+use std::collections::HashMap;
 use std::f64::consts::PI;
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// Quadrature points per dimension.
 const POINTS: usize = 64;
@@ -89,8 +90,15 @@ pub fn reflection() -> &'static [ReflectionRow; PRINCIPLED_ROWS] {
     })
 }
 
-/// Energy that a rough interface of relative index `eta` scatters to both sides.
+/// Energy that a rough interface of relative index `eta` scatters to both sides. Tables are kept for the life of the process: a program that bakes again and again needs few of them.
 pub fn energy(eta: f64) -> [EnergyRow; PRINCIPLED_ENERGY_ROWS] {
+    type Known = HashMap<u64, Box<[EnergyRow; PRINCIPLED_ENERGY_ROWS]>>;
+    static KNOWN: Mutex<Option<Known>> = Mutex::new(None);
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    **known.get_or_insert_default().entry(eta.to_bits()).or_insert_with(|| Box::new(energy_rows(eta)))
+}
+
+fn energy_rows(eta: f64) -> [EnergyRow; PRINCIPLED_ENERGY_ROWS] {
     let rule = microfacet::gauss_legendre(POINTS);
     std::array::from_fn(|i| {
         // as wide as the kernel makes it

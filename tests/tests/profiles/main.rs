@@ -108,6 +108,7 @@ each_effect!(
     PLASTIC,
     ROUGH_PLASTIC,
     NULL,
+    PRINCIPLED,
     TEXTURES,
     AREA_LIGHTS,
     ENVIRONMENT,
@@ -119,6 +120,7 @@ each_effect!(
     GRID_MEDIA,
     ALPHA,
     MULTIPLE_SCATTERING,
+    NORMAL_MAPS,
     PROJECTIONS
 );
 

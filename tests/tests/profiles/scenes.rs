@@ -121,6 +121,22 @@ scenes! {
             add_quad(s, "leaves", m, facing_z(0.6, 0.3, 1.0).map(|[x, y, z]| [x, y - 0.4, z]));
         })
     };
+    "principled", [DIFFUSE, PRINCIPLED, AREA_LIGHTS, TEXTURES, NORMAL_MAPS], || {
+        changed(|s| {
+            let texels = (0..16).map(|i| [100 + 4 * i, 160 - 3 * i, 250, 255]).collect();
+            let normals = Texture { width: 4, height: 4, texels, encoding: Encoding::Linear, ..Texture::default() };
+            s.textures.push(normals);
+            ball(s, Model::Principled(Principled {
+                coat: 0.5,
+                sheen_color: [0.2; 3],
+                transmission: 0.3,
+                normal_texture: Some(TextureRef::new(0)),
+                emission: [0.5; 3],
+                emission_texture: Some(TextureRef::new(0)),
+                ..Principled::default()
+            }));
+        })
+    };
     "everything but media", [
         DIFFUSE, ROUGH_CONDUCTOR, DIELECTRIC, THIN_DIELECTRIC, ROUGH_PLASTIC, NULL, TEXTURES, AREA_LIGHTS, ENVIRONMENT,
         DELTA_LIGHTS, LENS, SMOOTH_NORMALS

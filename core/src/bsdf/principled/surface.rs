@@ -2,10 +2,7 @@
 //! room than its reflectance.
 
 use crate::scene::Scene;
-use crate::scene::blob::{
-    MATERIAL_CUTOUT, Material, MaterialKind, NONE, PRINCIPLED_ALPHA, PrincipledRecord, PrincipledTexture, TableRecord,
-    TextureRecord,
-};
+use crate::scene::blob::{MATERIAL_CUTOUT, Material, PRINCIPLED_ALPHA, PrincipledRecord, PrincipledTexture};
 use crate::texture;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
@@ -80,41 +77,16 @@ pub struct Textured8 {
     pub normal: Vec3x8,
 }
 
-/// The record of a material, if it is a principled one.
-#[inline(always)]
-pub fn record<'s>(scene: &Scene<'s>, m: &Material) -> Option<&'s PrincipledRecord> {
-    if m.kind != MaterialKind::Principled as u32 {
-        return None;
-    }
-    PrincipledRecord::read::<1>(scene.tables, m.table).map(|[r]| r)
-}
-
-/// Colour and alpha of a texture of each lane's record at its own coordinates, in the lanes that have it.
+/// Colour and alpha of a texture of each lane's record at the surface coordinates `uv`, in the lanes that have it; 1 in
+/// others.
 #[inline(always)]
 fn fetch(
     scene: &Scene<'_>,
     records: &[Option<&PrincipledRecord>; 8],
     which: PrincipledTexture,
     uv: [F32x8; 2],
-    with_alpha: bool,
-) -> (Mask8, Vec3x8, F32x8) {
-    let of = |l: usize| records[l].and_then(|r| r.textures.get(which as usize)).unwrap_or(&TextureRecord::NONE);
-    let index = U32x8::from_fn(|l| of(l).texture);
-    let present = !index.eq(U32x8::splat(NONE));
-    if present.none() {
-        return (present, Vec3x8::ONE, F32x8::ONE);
-    }
-    let [u, v] = [0, 1].map(|row: usize| {
-        let [a, b, c] = [0, 1, 2].map(|k: usize| F32x8::from_fn(|l| of(l).transform[row & 1][k]));
-        a * uv[0] + b * uv[1] + c
-    });
-    let rgb = Vec3x8::select(present, texture::lookup_any(scene, index, [u, v], present), Vec3x8::ONE);
-    let alpha = if with_alpha {
-        present.select(texture::alpha_any(scene, index, [u, v], present), F32x8::ONE)
-    } else {
-        F32x8::ONE
-    };
-    (present, rgb, alpha)
+) -> (Mask8, Vec3x8) {
+    texture::referenced(scene, &records.map(|r| r.and_then(|r| r.textures.get(which as usize))), uv)
 }
 
 /// Parameters of the principled materials in the lanes of `active` at the surface coordinates `uv`; `[textures, normal_maps]`
@@ -133,7 +105,7 @@ pub fn textured(
         let m = if bits >> l & 1 == 1 { scene.materials.get(material[l] as usize) } else { None };
         m.unwrap_or(IDLE)
     });
-    let records = m.map(|m| record(scene, m));
+    let records = m.map(|m| scene.principled(m));
     let get = |f: fn(&PrincipledRecord) -> f32| F32x8::from_fn(|l| records[l].map_or(0.0, f));
     let is_cut = |l: usize| m[l].flags & MATERIAL_CUTOUT != 0;
     let cutout = Mask8::from_bits((0..8).fold(0, |bits, l| bits | u32::from(is_cut(l)) << l));
@@ -155,18 +127,22 @@ pub fn textured(
     let by_alpha = |l: usize| records[l].is_some_and(|r| r.flags & PRINCIPLED_ALPHA != 0);
     let by_alpha = Mask8::from_bits((0..8).fold(0, |bits, l| bits | u32::from(by_alpha(l)) << l));
     let s = &mut out.surface;
-    let (_, rgb, alpha) = fetch(scene, &records, PrincipledTexture::Base, uv, (cutout & by_alpha).any());
+    let (_, rgb) = fetch(scene, &records, PrincipledTexture::Base, uv);
     s.base *= rgb;
-    out.opacity = (cutout & by_alpha).select(out.opacity * alpha, out.opacity);
-    let (_, rgb, _) = fetch(scene, &records, PrincipledTexture::MetalRough, uv, false);
+    let cut = cutout & by_alpha;
+    if cut.any() {
+        let base = records.map(|r| r.and_then(|r| r.textures.get(PrincipledTexture::Base as usize)));
+        out.opacity = cut.select(out.opacity * texture::referenced_alpha(scene, &base, uv), out.opacity);
+    }
+    let (_, rgb) = fetch(scene, &records, PrincipledTexture::MetalRough, uv);
     s.roughness *= rgb.y;
     s.metalness *= rgb.z;
-    let (_, rgb, _) = fetch(scene, &records, PrincipledTexture::Transmission, uv, false);
+    let (_, rgb) = fetch(scene, &records, PrincipledTexture::Transmission, uv);
     s.transmission *= rgb.x;
-    let (_, rgb, _) = fetch(scene, &records, PrincipledTexture::Coat, uv, false);
+    let (_, rgb) = fetch(scene, &records, PrincipledTexture::Coat, uv);
     s.coat *= rgb.x;
     if normal_maps {
-        let (mapped, rgb, _) = fetch(scene, &records, PrincipledTexture::Normal, uv, false);
+        let (mapped, rgb) = fetch(scene, &records, PrincipledTexture::Normal, uv);
         let n = rgb.map(|x| decoded(x));
         let scale = get(|r| r.normal_scale);
         // normals from behind have no meaning in a map
@@ -183,16 +159,4 @@ pub fn textured(
 fn decoded(x: F32x8) -> F32x8 {
     let n = x * 2.0 - 1.0;
     n.abs().lt(F32x8::splat(1.5 / 255.0)).select(F32x8::ZERO, n)
-}
-
-/// Factor of the radiance that triangles of `material` emit at the surface coordinates `uv`: 1 without an emission
-/// texture.
-#[inline(never)]
-pub fn emission_factor(scene: &Scene<'_>, material: &[u32; 8], uv: [F32x8; 2], active: Mask8) -> Vec3x8 {
-    let bits = active.bits();
-    let records = core::array::from_fn(|l: usize| {
-        let m = if bits >> l & 1 == 1 { scene.materials.get(material[l] as usize) } else { None };
-        m.and_then(|m| record(scene, m))
-    });
-    fetch(scene, &records, PrincipledTexture::Emission, uv, false).1
 }

@@ -1,10 +1,11 @@
 //! Lights, the table that chooses among them, the environment.
 
-use super::BakeError;
 use super::geometry::{Geometry, area};
-use crate::description::{Emitter, Environment, SceneDescription};
+use super::{BakeError, emission};
+use crate::description::{Emitter, Environment, Model, SceneDescription};
 use crate::{alias, environment};
 use bytemuck::Zeroable;
+use croupier::unstable::light::luminance;
 use croupier::unstable::scene::blob::{self, Alias, EnvironmentKind, Light, LightKind};
 use croupier::unstable::scene::blob::{MAX_COORDINATE, MAX_EMISSION, MAX_SIDE};
 use glam::Vec3;
@@ -43,6 +44,17 @@ pub(super) fn emission_of_materials(scene: &SceneDescription) -> Result<Vec<[f32
         }
         check_emission(&emitter, "radiance", radiance)?;
     }
+    for (i, m) in scene.materials.iter().enumerate() {
+        let Model::Principled(p) = &m.model else { continue };
+        if p.emission == [0.0; 3] {
+            continue;
+        }
+        check_emission(&m.name, "emission", p.emission)?;
+        if emission[i].replace(p.emission).is_some() {
+            let emitter = format!("emission of material `{}`", m.name);
+            return Err(BakeError::EmitterMaterial { emitter, found: i as u32, repeated: true });
+        }
+    }
     Ok(emission.into_iter().map(Option::unwrap_or_default).collect())
 }
 
@@ -53,9 +65,19 @@ pub(super) fn bake(
     geometry: &mut Geometry,
 ) -> Result<Lights, BakeError> {
     let mut out = Lights::default();
+    // of area lights with a texture: its mean in luminance over the whole
+    let mut shares = Vec::new();
     for (i, (t, corners)) in (0..).zip(geometry.triangles.iter_mut().zip(&geometry.corners)) {
         let emission = emission[t.material as usize];
         if emission != [0.0; 3] {
+            let mut share = 1.0;
+            if let Some((texture, reference)) = emission::texture_of(scene, t.material) {
+                let uv = t.vertex.map(|v| geometry.vertices.get(v as usize).map_or([0.0; 2], |v| v.uv));
+                let Some(mean) = emission::mean(texture, &reference, uv) else { continue };
+                let emitted = std::array::from_fn(|c| (f64::from(emission[c]) * mean[c]) as f32);
+                share = luminance(emitted) / luminance(emission);
+            }
+            shares.push(share);
             t.light = out.lights.len() as u32;
             let kind = LightKind::Area as u32;
             out.lights.push(Light { kind, triangle: i, area: area(corners), emission, ..Zeroable::zeroed() });
@@ -67,7 +89,9 @@ pub(super) fn bake(
     if let Some(e) = &scene.environment {
         out.surround(e)?;
     }
-    let weights = environment::light_weights(&out.lights, out.environment.first(), &out.env_texels, geometry.radius());
+    let mut weights =
+        environment::light_weights(&out.lights, out.environment.first(), &out.env_texels, geometry.radius());
+    weights.iter_mut().zip(&shares).for_each(|(weight, share)| *weight *= share);
     out.alias = alias::build(&weights);
     Ok(out)
 }

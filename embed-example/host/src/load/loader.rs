@@ -2,7 +2,7 @@
 
 use super::error::LoadError;
 use super::images;
-use crate::description::{Environment, SceneDescription, Texture};
+use crate::description::{Encoding, Environment, SceneDescription, Texture, Wrap};
 use crate::look::Given;
 use std::collections::HashMap;
 use std::fs;
@@ -28,8 +28,15 @@ pub(super) struct Loader {
     pub(super) report: LoadReport,
     /// What the file says of itself; readers of files without camera or light change it.
     pub(super) given: Given,
-    /// Textures by path: a file that several materials use is decoded once.
-    textures: HashMap<PathBuf, u32>,
+    /// Textures by path and decoding: a file that several materials use is decoded once.
+    textures: HashMap<(PathBuf, Decoding), u32>,
+}
+
+/// What the texels of a file are taken for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct Decoding {
+    pub encoding: Encoding,
+    pub wrap: [Wrap; 2],
 }
 
 impl Default for Loader {
@@ -56,21 +63,33 @@ impl Loader {
         Ok(String::from_utf8(bytes).unwrap_or_else(|e| String::from_utf8_lossy(e.as_bytes()).into_owned()))
     }
 
-    /// Index of the texture in `path`, decoded at its first use.
+    /// Index of the texture in `path`: a colour, repeated.
     pub(super) fn texture(
         &mut self,
         scene: &mut SceneDescription,
         path: &Path,
         referrer: &str,
     ) -> Result<u32, LoadError> {
-        if let Some(index) = self.textures.get(path) {
+        self.texture_as(scene, path, referrer, Decoding::default())
+    }
+
+    /// Index of the texture in `path`, decoded at its first use.
+    pub(super) fn texture_as(
+        &mut self,
+        scene: &mut SceneDescription,
+        path: &Path,
+        referrer: &str,
+        decoding: Decoding,
+    ) -> Result<u32, LoadError> {
+        if let Some(index) = self.textures.get(&(path.into(), decoding)) {
             return Ok(*index);
         }
         let bytes = self.read(path, Some(referrer))?;
         let image = self.decode(&bytes).map_err(|what| LoadError::image(path, referrer, what))?;
         let index = scene.textures.len() as u32;
-        scene.textures.push(Texture { name: path.display().to_string(), ..image });
-        self.textures.insert(path.into(), index);
+        let Decoding { encoding, wrap } = decoding;
+        scene.textures.push(Texture { name: path.display().to_string(), encoding, wrap, ..image });
+        self.textures.insert((path.into(), decoding), index);
         Ok(index)
     }
 

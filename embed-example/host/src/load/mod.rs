@@ -8,6 +8,7 @@
 //! | `ply`, `stl` | geometry: PLY, STL; `bare` makes a scene of it |
 //! | `mtl` | materials of a bare OBJ |
 //! | `media` | participating media of a `scene.json`, density grids |
+//! | `principled` | principled materials of a `scene.json` |
 //! | `presets` | nothing: media by name |
 //! | `images` | PNG and JPEG textures, environment maps: EXR, and Radiance through `hdr` |
 //! | `colors` | nothing: colours of vertices as textures |
@@ -29,6 +30,7 @@ mod obj;
 mod ply;
 mod polygon;
 mod presets;
+mod principled;
 mod scene_json;
 mod stl;
 

@@ -2,10 +2,10 @@
 
 use super::json::{self, Place};
 use super::loader::Loader;
-use super::{LoadError, media, obj};
+use super::{LoadError, media, obj, principled};
 use crate::description::{
-    Camera, Emitter, Environment, Material, Model, NamedCamera, ParameterSource, Principled, Projection, Reflectance,
-    SceneDescription, ThinLens,
+    Camera, Emitter, Environment, Material, Model, ModelParameters, NamedCamera, ParameterSource, Principled,
+    Projection, Reflectance, SceneDescription, ThinLens,
 };
 use croupier::unstable::scene::blob::{CameraKind, EnvironmentKind, LightKind, MaterialKind};
 use std::path::Path;
@@ -85,7 +85,14 @@ fn material(
         .ok_or_else(|| kind.error(format!("unknown material type `{name_of_kind}`")))?;
     let model = Model::from_source(kind, &mut Parameters { loader, scene, folder, m })?;
     let two_sided = m.find("twosided")?.map_or(Ok(false), |t| t.flag())?;
-    let cutout = matches!(model.parameters().reflectance, Some(Reflectance::Texture(_))) && cutout(m)?;
+    let cutout = match model.parameters() {
+        ModelParameters { reflectance: Some(Reflectance::Texture(_)), .. } => cutout(&m.get("reflectance")?)?,
+        ModelParameters { principled: Some(Principled { base_texture: Some(_), .. }), .. } => {
+            let texture = m.get("base_texture")?;
+            texture.is_object() && cutout(&texture)?
+        }
+        _ => false,
+    };
     let compensated = match m.find("compensate")? {
         Some(place) if place.flag()? && !kind.facts().compensates() => {
             return Err(place.error(format!("a `{name_of_kind}` is not rough: it loses no energy")));
@@ -96,8 +103,8 @@ fn material(
 }
 
 /// Whether a texture's alpha cuts holes into the material.
-fn cutout(m: &Place<'_>) -> Result<bool, LoadError> {
-    let Some(place) = m.get("reflectance")?.find("alpha")? else { return Ok(false) };
+fn cutout(texture: &Place<'_>) -> Result<bool, LoadError> {
+    let Some(place) = texture.find("alpha")? else { return Ok(false) };
     match place.text()? {
         "cutout" => Ok(true),
         "ignore" => Ok(false),
@@ -141,7 +148,7 @@ impl ParameterSource for Parameters<'_, '_> {
     }
 
     fn principled(&mut self) -> Result<Principled, LoadError> {
-        Ok(Principled::default())
+        principled::read(self.loader, self.scene, self.folder, self.m)
     }
 }
 

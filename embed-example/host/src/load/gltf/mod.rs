@@ -27,7 +27,9 @@ use super::LoadError;
 use super::error::quoted;
 use super::loader::Loader;
 use crate::bake::boundary_is_closed;
-use crate::description::{Instance, Material, Medium, Model, Object, Projection, Prototype, SceneDescription, Triangle, Vertex};
+use crate::description::{
+    Instance, Material, Medium, Model, Object, Projection, Prototype, SceneDescription, Triangle, Vertex,
+};
 use crate::look::{Given, Up};
 use asset::Asset;
 use croupier::unstable::scene::blob::MAX_MEDIA;
