@@ -4,6 +4,7 @@ use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::description::*;
 use croupier_host::image::Picture;
 use croupier_host::load::{LoadOptions, LoadReport, load, load_with};
+use croupier_host::look::Look;
 use croupier_tests::stats::SplitMix;
 use std::fs;
 use std::path::Path;
@@ -112,26 +113,27 @@ fn mtl_materials_become_models() {
     ];
     for (text, wanted) in cases {
         let (scene, _) = load_obj(TRIANGLE, &format!("newmtl other\nKd 1 1 1\nnewmtl m\n{text}\n"));
-        assert_eq!(scene.materials.len(), 1);
+        assert_eq!(scene.materials.len(), 2, "its own and the added ground's");
         assert_eq!(scene.materials[0].model, *wanted, "{text}");
         assert_eq!(scene.materials[0].two_sided, !wanted.is_transmissive());
         assert!(scene.materials[0].compensated, "{text}");
         assert!(bake(&scene, &BakeOptions::default(), |_, _| {}).is_ok(), "{text}");
     }
     let (scene, report) = load_obj(TRIANGLE, "newmtl m\nKe 3 2 1\nTf\nKd 2 0 0\n");
-    assert_eq!(scene.emitters, [Emitter::Area { material: 0, radiance: [3.0, 2.0, 1.0] }]);
-    assert!(scene.environment.is_none());
+    assert_eq!(scene.emitters[0], Emitter::Area { material: 0, radiance: [3.0, 2.0, 1.0] });
     assert_eq!(scene.materials[0].model, Model::Diffuse { reflectance: Reflectance::Constant([1.0, 0.0, 0.0]) });
     assert!(report.notes.iter().any(|n| n.contains("limited")), "{report:?}");
 }
 
-/// Faces without a material, no light, no camera: grey, an environment, and all corners inside the picture.
+/// Faces without a material, no light, no camera: grey, sun and sky, a ground, and all corners inside the picture.
 #[test]
 fn a_bare_obj_can_be_seen() {
     let (scene, report) = load_obj("v 10 0 0\nv 14 0 0\nv 10 3 0\nf 1 2 3\n", "");
     assert_eq!(scene.materials[0].model, Model::Diffuse { reflectance: Reflectance::Constant([0.5; 3]) });
     assert!(matches!(scene.environment, Some(Environment::Map { .. })));
-    assert_eq!(report.notes.len(), 3, "{report:?}");
+    assert!(matches!(scene.emitters[..], [Emitter::Sun { .. }]) && scene.triangles.len() > 1);
+    assert_eq!(report.notes.len(), 4, "{report:?}");
+    assert!(report.framed);
     let baked = bake(&scene, &BakeOptions::default(), |_, _| {}).unwrap();
     let view = croupier::Scene::from_bytes(&baked.bytes).unwrap();
     let c = view.camera;
@@ -261,7 +263,7 @@ fn jpeg_textures_are_read() {
         assert_eq!(scene.textures[0].texels, t.texels);
         assert!(report.notes.iter().any(|n| n.contains("a.mtl:2") && n.contains("behind the end")), "{report:?}");
         let strict = LoadOptions { strict: true, ..LoadOptions::default() };
-        let error = load_with(&folder.path().join("a.obj"), &strict).unwrap_err().to_string();
+        let error = load_with(&folder.path().join("a.obj"), &strict, &Look::default()).unwrap_err().to_string();
         assert!(error.contains("wood.jpg") && error.contains("behind the end"), "{error}");
     }
     let mut rng = SplitMix(1);
@@ -463,7 +465,7 @@ fn every_wrong_input_is_told_where() {
         let files: Vec<(&str, &str)> = files.iter().map(|(n, t)| (*n, t.as_str())).collect();
         let folder = folder(&files);
         let strict = LoadOptions { strict: true, ..LoadOptions::default() };
-        let error = load_with(&folder.path().join(path), &strict).err();
+        let error = load_with(&folder.path().join(path), &strict, &Look::default()).err();
         let text = error.unwrap_or_else(|| panic!("{parts:?} was loaded")).to_string();
         for part in parts {
             assert!(text.contains(part), "`{text}` lacks `{part}`");

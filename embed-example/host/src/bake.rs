@@ -26,6 +26,7 @@ mod materials;
 mod media;
 mod principled;
 
+pub(crate) use boundary::is_closed as boundary_is_closed;
 pub use error::BakeError;
 
 use crate::blob::{AlignedBytes, BlobWriter};

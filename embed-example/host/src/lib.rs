@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | [`description`] | a scene as plain values | files, blobs |
 //! | [`load`] | files -> description | blobs |
+//! | [`look`] | camera, light, ground and exposure that files leave open | files, blobs |
 //! | [`builtin`] | a description without files | blobs |
 //! | [`bake`] | description -> scene blob, with [`bvh`], [`alias`], [`environment`], [`microfacet`], [`principled`] | files |
 //! | [`blob`] | the blob's layout on disk and in memory | what sections mean |
@@ -33,6 +34,7 @@ pub mod false_color;
 pub mod flip;
 pub mod image;
 pub mod load;
+pub mod look;
 pub mod memory;
 pub mod microfacet;
 pub mod principled;

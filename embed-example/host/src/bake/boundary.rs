@@ -45,6 +45,11 @@ pub(super) fn check(scene: &SceneDescription, runs: &[Vec<Range<u32>>]) -> Resul
     }
 }
 
+/// Whether these triangles can bound a medium. Indices of their vertices are in range.
+pub(crate) fn is_closed(scene: &SceneDescription, triangles: &[u32]) -> bool {
+    closed(scene, triangles).is_ok() && !faces_inwards(scene, triangles)
+}
+
 fn corners(scene: &SceneDescription, triangle: u32) -> [[f32; 3]; 3] {
     let t: &Triangle = &scene.triangles[triangle as usize];
     t.vertices.map(|v| scene.vertices[v as usize].position)

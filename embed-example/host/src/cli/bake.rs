@@ -39,7 +39,7 @@ struct Report<'a> {
 /// Runs the command.
 pub(crate) fn run(args: &Args) -> Outcome {
     super::output::writable(&args.output)?;
-    let scene::Opened { bytes, notes, files } = scene::open(Some(&args.scene), args.scene_flags)?;
+    let scene::Opened { bytes, notes, files, .. } = scene::open(Some(&args.scene), &args.scene_flags)?;
     super::output::spares(&[&args.output], &files)?;
     let scene = Scene::from_bytes(&bytes).map_err(|e| about(Some(&args.scene))(&e))?;
     write_whole(&args.output, |out| out.write_all(&bytes).map_err(|e| ImageError::Write(args.output.clone(), e)))?;

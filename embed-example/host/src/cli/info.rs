@@ -89,7 +89,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let options = args.settings.options()?;
     // Said before the scene is loaded.
     check(&options)?;
-    let scene::Opened { bytes, notes, .. } = scene::open(path, args.scene_flags)?;
+    let scene::Opened { bytes, notes, .. } = scene::open(path, &args.scene_flags)?;
     let f = Facts::of(&bytes, &options, notes).map_err(|e| about(path)(&e))?;
     if args.json {
         return say_json(&f);

@@ -9,6 +9,7 @@ mod checkpoint;
 mod compare;
 mod console;
 mod info;
+mod look;
 mod notes;
 mod output;
 mod progress;

@@ -1,8 +1,10 @@
 //! Files of a render: checked before it begins, and every one of them written when it has ended, whatever happens to
 //! the others. An hour of rendering must not be lost to a full disk or a mistyped name.
 
+use super::values::Exposure;
 use croupier_host::false_color::{Scale, draw};
 use croupier_host::image::{ImageError, Picture, try_write, write_png, write_whole};
+use croupier_host::look::exposure::auto;
 use croupier_host::text;
 use croupier_host::tonemap::{Curve, tonemap};
 use std::fs;
@@ -86,7 +88,7 @@ impl<'a> Outputs<'a> {
     }
 
     /// Writes everything: the PNG and the false colours are made from `picture`. `image` names the layer of the PNG.
-    pub(crate) fn write(&self, picture: &Picture, cache: Option<&[u8]>, image: &str, exposure: f32) -> Written {
+    pub(crate) fn write(&self, picture: &Picture, cache: Option<&[u8]>, image: &str, exposure: Exposure) -> Written {
         let mut written = Written::default();
         written.add(self.exr, picture.write_exr(self.exr));
         if let Some((path, bytes)) = self.cache.zip(cache) {
@@ -104,9 +106,13 @@ impl<'a> Outputs<'a> {
         written
     }
 
-    fn write_png(&self, picture: &Picture, layer: &str, exposure: f32) -> Result<(), ImageError> {
+    fn write_png(&self, picture: &Picture, layer: &str, exposure: Exposure) -> Result<(), ImageError> {
         let image = picture.rgb(layer).ok_or_else(|| ImageError::NoRgb(self.exr.into()))?;
-        write_png(&self.png, picture.width, picture.height, &tonemap(&image, exposure, Curve::Shoulder))
+        let stops = match exposure {
+            Exposure::Stops(stops) => stops,
+            Exposure::Auto => auto(&image),
+        };
+        write_png(&self.png, picture.width, picture.height, &tonemap(&image, stops, Curve::Shoulder))
     }
 }
 
@@ -178,7 +184,7 @@ mod tests {
         FALSE_COLOR.iter().for_each(|(layer, _)| picture.add1(layer, "s", &[1.0; 2]));
         let [exr, cache, lost] = ["a.exr", "a.cache", "no/where"].map(at);
         let whole = Outputs::new(&exr, Some(&cache), None, true);
-        assert_eq!(whole.write(&picture, Some(&[7]), "", 0.0).files.len(), 9);
+        assert_eq!(whole.write(&picture, Some(&[7]), "", Exposure::Stops(0.0)).files.len(), 9);
         for i in 0..9 {
             let dir = tempfile::tempdir().unwrap();
             let mut names: Vec<PathBuf> = (0..9).map(|n| dir.path().join(n.to_string())).collect();
@@ -187,14 +193,14 @@ mod tests {
             let outputs = Outputs { exr: &names[0], png, cache: Some(&names[1]), checkpoint: None, false_color };
             assert!(outputs.check().unwrap_err().contains("not a folder"));
             assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
-            let written = outputs.write(&picture, Some(&[7]), "", 0.0);
+            let written = outputs.write(&picture, Some(&[7]), "", Exposure::Stops(0.0));
             assert!(written.error.unwrap().to_string().contains(&format!("where/{i}")));
             names.remove(i);
             assert_eq!(written.files, names);
             assert!(names.iter().all(|n| n.is_file()));
         }
         let both = Outputs { exr: &lost.join("1"), cache: Some(&lost.join("2")), ..whole };
-        let written = both.write(&picture, Some(&[7]), "", 0.0);
+        let written = both.write(&picture, Some(&[7]), "", Exposure::Stops(0.0));
         assert!(written.error.unwrap().to_string().contains("where/1") && written.files.len() == 7);
     }
 }

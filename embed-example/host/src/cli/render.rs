@@ -7,7 +7,7 @@ use super::notes::{Notes, about};
 use super::output::Outputs;
 use super::progress::Rendering;
 use super::settings::SettingsFlags;
-use super::values::{exr_path, positive, stops};
+use super::values::{Exposure, exposure, exr_path, positive};
 use super::{scene, signals};
 use croupier::Scene;
 use croupier::unstable::MAX_PATH_LENGTH;
@@ -43,9 +43,10 @@ pub(crate) struct Flags {
     /// Threads, up to 4096, 0 for one per processor, at most one per shard; the image does not depend on their number
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=4096))]
     threads: u16,
-    /// Exposure of the PNG in stops, -100 to 100; 0 if absent, 1 for the built-in scene
-    #[arg(long, value_name = "STOPS", value_parser = stops, allow_negative_numbers = true)]
-    exposure: Option<f32>,
+    /// Exposure of the PNG in stops, -100 to 100, or auto: from the picture. Absent: auto for a scene without a camera, 1
+    /// for the built-in scene, else 0. The EXR stays as it is
+    #[arg(long, value_name = "STOPS", value_parser = exposure, allow_negative_numbers = true)]
+    exposure: Option<Exposure>,
     /// Add the denoised picture as layer `denoised`, and tone-map it for the PNG
     #[arg(long)]
     denoise: bool,
@@ -147,7 +148,7 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Result<ExitCode, Box<dy
     // Said now, not after an hour of rendering.
     outputs.check()?;
     let options = flags.options()?;
-    let scene::Opened { bytes, mut notes, mut files } = scene::open(path, flags.scene)?;
+    let scene::Opened { bytes, mut notes, mut files, framed } = scene::open(path, &flags.scene)?;
     files.extend(flags.cache.cache_in.clone());
     outputs.spare(&files, flags.checkpoint.input())?;
     let validated = Scene::from_bytes(&bytes).map_err(|e| about(path)(&e))?;
@@ -186,7 +187,8 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Result<ExitCode, Box<dy
         notes.add(path, format!("{count} contributions were not finite and left out, the first in pixel ({x}, {y})"));
     }
     // Its area light brings the walls to about a fifth of white.
-    let exposure = flags.exposure.unwrap_or(if path.is_none() { 1.0 } else { 0.0 });
+    let usual = if path.is_none() { Exposure::Stops(1.0) } else { Exposure::Stops(0.0) };
+    let exposure = flags.exposure.unwrap_or(if framed { Exposure::Auto } else { usual });
     let image = if flags.denoise { "denoised" } else { "" };
     let mut written = outputs.write(picture, cache.as_deref(), image, exposure);
     if checkpoint_error.is_none() {

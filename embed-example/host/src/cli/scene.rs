@@ -1,5 +1,6 @@
 //! Scene bytes of a path.
 
+use super::look::LookFlags;
 use super::notes::{Notes, about};
 use super::progress;
 use super::values::bytes;
@@ -7,6 +8,7 @@ use croupier_host::bake::{self, BakeError};
 use croupier_host::builtin;
 use croupier_host::description::SceneDescription;
 use croupier_host::load::{self, LoadOptions, LoadReport};
+use croupier_host::look::{Given, dress};
 use croupier_host::text;
 use memmap2::Mmap;
 use std::error::Error;
@@ -34,7 +36,7 @@ impl Deref for SceneBytes {
 }
 
 /// Flags of commands that bake.
-#[derive(Clone, Copy, Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub(crate) struct SceneFlags {
     /// Compensate no material for the energy that single scattering between microfacets loses: darker rough surfaces, as
     /// in renderers without this effect. Baked files stay as they are
@@ -47,6 +49,8 @@ pub(crate) struct SceneFlags {
     /// Most bytes that textures and environment maps may take in all while they are decoded, such as 512MiB
     #[arg(long, value_name = "SIZE", default_value = "2GiB", value_parser = bytes)]
     texture_memory: u64,
+    #[command(flatten)]
+    look: LookFlags,
 }
 
 /// A scene that was opened.
@@ -56,24 +60,32 @@ pub(crate) struct Opened {
     pub(crate) notes: Notes,
     /// Files that were read.
     pub(crate) files: Vec<PathBuf>,
+    /// The picture was composed here, and wants an exposure to suit it.
+    pub(crate) framed: bool,
 }
 
 /// Opens a scene: a baked `.crp` file, anything that loads and bakes (a folder with `scene.json`, an `.obj`), or,
 /// without a path, the built-in one. What had to be assumed, ignored or left out is printed and returned.
-pub(crate) fn open(path: Option<&Path>, flags: SceneFlags) -> Result<Opened, Box<dyn Error>> {
+pub(crate) fn open(path: Option<&Path>, flags: &SceneFlags) -> Result<Opened, Box<dyn Error>> {
     let options = LoadOptions { strict: flags.strict, texture_memory: flags.texture_memory };
-    let (mut description, loaded) = match path {
-        Some(path) if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")) => {
-            if flags.single_scattering {
-                return Err(
-                    format!("{}: `--single-scattering` is for baking, not for baked files", path.display()).into()
-                );
-            }
-            return Ok(Opened { bytes: map(path)?, notes: Notes::default(), files: vec![path.into()] });
+    let baked_file = path.is_some_and(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")));
+    if let Some(path) = path.filter(|_| baked_file) {
+        let flag = if flags.single_scattering { Some("--single-scattering") } else { flags.look.any() };
+        if let Some(flag) = flag {
+            return Err(format!("{}: `{flag}` is for baking, not for baked files", text::path(path)).into());
         }
-        Some(path) => load::load_with(path, &options)?,
-        None => (builtin::cornell_box(), LoadReport::default()),
+        return Ok(Opened { bytes: map(path)?, notes: Notes::default(), files: vec![path.into()], framed: false });
+    }
+    let (look, notes) = flags.look.look()?;
+    let (mut description, mut loaded) = match path {
+        Some(path) => load::load_with(path, &options, &look)?,
+        None => {
+            let mut scene = builtin::cornell_box();
+            let notes = dress(&mut scene, &Given::SCENE, &look).map_err(|e| about(None)(&e))?;
+            (scene, LoadReport { notes, ..LoadReport::default() })
+        }
     };
+    loaded.notes.extend(notes);
     if flags.single_scattering {
         description.materials.iter_mut().for_each(|m| m.compensated = false);
     }
@@ -87,7 +99,9 @@ pub(crate) fn open(path: Option<&Path>, flags: SceneFlags) -> Result<Opened, Box
     drop(description);
     let notes = Notes::of(&loaded, &baked.report);
     notes.print(path);
-    Ok(Opened { bytes: SceneBytes::Baked(baked), notes, files: loaded.files })
+    let mut files = loaded.files;
+    files.extend(flags.look.files());
+    Ok(Opened { bytes: SceneBytes::Baked(baked), notes, files, framed: loaded.framed })
 }
 
 fn bake(description: &SceneDescription) -> Result<bake::Baked, BakeError> {

@@ -53,3 +53,20 @@ pub(crate) fn bytes(text: &str) -> Result<u64, String> {
     let n = digits.parse::<u64>().ok().zip(unit).and_then(|(n, unit)| n.checked_mul(unit));
     n.ok_or_else(|| "need a number of bytes, such as 512MiB or 2GiB".into())
 }
+
+/// Exposure of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Exposure {
+    /// In stops.
+    Stops(f32),
+    /// What suits the picture.
+    Auto,
+}
+
+/// An exposure: stops, or `auto`.
+pub(crate) fn exposure(text: &str) -> Result<Exposure, String> {
+    match text {
+        "auto" => Ok(Exposure::Auto),
+        _ => stops(text).map(Exposure::Stops).map_err(|e| format!("{e}; need stops or `auto`")),
+    }
+}

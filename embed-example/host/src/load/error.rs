@@ -1,8 +1,12 @@
 //! Errors of loading.
 
+use crate::look::LookError;
 use crate::text::{self, excerpt};
 use std::path::{Path, PathBuf};
 use std::{error, fmt, io};
+
+/// Files that scenes come in.
+const KINDS: &str = ".gltf, .glb, .obj, .ply, .stl";
 
 /// Error in the files of a scene; every text names the file, and where in it.
 #[derive(Debug)]
@@ -29,11 +33,27 @@ pub enum LoadError {
         /// Fault, in words.
         what: String,
     },
+    /// A whole file.
+    File {
+        /// File.
+        path: PathBuf,
+        /// Fault, in words.
+        what: String,
+    },
     /// A scene without triangles.
     Empty {
         /// File.
         path: PathBuf,
         /// What is there instead, in words.
+        what: String,
+    },
+    /// A place in a binary file.
+    Binary {
+        /// File.
+        path: PathBuf,
+        /// Bytes before the place.
+        offset: u64,
+        /// Fault, in words.
         what: String,
     },
     /// A line of a text file.
@@ -63,6 +83,13 @@ pub enum LoadError {
         /// Fault, in words.
         what: String,
     },
+    /// A wish that the scene cannot follow.
+    Look {
+        /// Scene.
+        path: PathBuf,
+        /// Fault.
+        source: LookError,
+    },
     /// Densities that do not fill their grid, or out of range.
     Grid {
         /// File.
@@ -77,6 +104,19 @@ pub enum LoadError {
 impl LoadError {
     pub(super) fn line(path: &Path, line: u32, what: impl Into<String>) -> Self {
         Self::Line { path: path.into(), line, what: what.into() }
+    }
+
+    pub(super) fn file(path: &Path, what: impl Into<String>) -> Self {
+        Self::File { path: path.into(), what: what.into() }
+    }
+
+    pub(super) fn binary(path: &Path, offset: u64, what: impl Into<String>) -> Self {
+        Self::Binary { path: path.into(), offset, what: what.into() }
+    }
+
+    /// A value of a JSON file, by its path in the document.
+    pub(super) fn json(path: &Path, at: impl Into<String>, what: impl Into<String>) -> Self {
+        Self::Json { path: path.into(), at: at.into(), what: what.into() }
     }
 
     pub(super) fn image(path: &Path, referrer: &str, what: String) -> Self {
@@ -98,6 +138,13 @@ impl LoadError {
     }
 }
 
+/// Text of a file for a message: in quotes, cut after 60 characters, without control characters.
+pub(super) fn quoted(text: &str) -> String {
+    let shown = text.chars().take(60).map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c });
+    let more = if text.chars().nth(60).is_some() { "..." } else { "" };
+    format!("`{}{more}`", shown.collect::<String>())
+}
+
 impl fmt::Display for LoadError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -106,10 +153,14 @@ impl fmt::Display for LoadError {
                 write!(f, "cannot read {}, which {by} names: {source}", text::path(path))
             }
             Self::Unknown { path } => {
-                write!(f, "{} is neither a folder with a scene.json nor an .obj file", text::path(path))
+                let path = text::path(path);
+                write!(f, "{path} is neither a folder with a scene.json nor a file of a known kind ({KINDS})")
             }
             Self::Format { path, what } => write!(f, "cannot use {}: {what}", text::path(path)),
             Self::Empty { path, what } => write!(f, "{} is no scene, it has no triangles: {what}", text::path(path)),
+            Self::File { path, what } => write!(f, "{}: {what}", text::path(path)),
+            Self::Binary { path, offset, what } => write!(f, "{}: byte {offset}: {what}", text::path(path)),
+            Self::Look { path, source } => write!(f, "{}: {source}", text::path(path)),
             Self::Line { path, line, what } => write!(f, "{}:{line}: {what}", text::path(path)),
             Self::Json { path, at, what } => write!(f, "{}: {}: {what}", text::path(path), excerpt(at)),
             Self::Image { path, referrer, what } => {

@@ -1,6 +1,8 @@
-//! Decoders: PNG and JPEG textures, EXR environment maps. Errors are texts; the caller knows the file. What decoding
-//! takes is known from a header, and compared with the memory that is `free`, before anything of that size is allocated.
+//! Decoders: PNG and JPEG textures, EXR and Radiance environment maps. Errors are texts; the caller knows the file. What
+//! decoding takes is known from a header, and compared with the memory that is `free`, before anything of that size is
+//! allocated.
 
+use super::hdr;
 use crate::description::{Environment, Texture};
 use crate::image::{Picture, Rgb};
 use crate::text;
@@ -29,7 +31,7 @@ pub(super) fn texture(bytes: &[u8], free: u64) -> Result<Decoded, String> {
 }
 
 /// Fails unless an image whose decoding takes `bytes_per_pixel` fits.
-fn fits(width: u64, height: u64, bytes_per_pixel: u64, free: u64) -> Result<(), String> {
+pub(super) fn fits(width: u64, height: u64, bytes_per_pixel: u64, free: u64) -> Result<(), String> {
     match width.checked_mul(height).and_then(|n| n.checked_mul(bytes_per_pixel)) {
         Some(n) if n <= free => Ok(()),
         n => {
@@ -124,21 +126,11 @@ fn jpeg_end(bytes: &[u8]) -> Option<usize> {
     }
 }
 
-/// The RGB picture of an EXR as an unscaled, unrotated environment map, and how many negative, NaN or infinite numbers
-/// (filters and overflows leave them behind) became 0.
-pub(super) fn exr(bytes: &[u8], free: u64) -> Result<(Environment, usize), String> {
-    let unreadable = |e: &dyn std::fmt::Display| format!("not a readable EXR: {e}");
-    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| unreadable(&e))?;
-    for header in &meta.headers {
-        let channels = &header.channels.list;
-        // as decoded, as 32-bit planes of a picture, three of them as pixels
-        let size = |t: SampleType| if t == SampleType::F16 { 2 } else { 4 };
-        let each: u64 = channels.iter().map(|c| size(c.sample_type) + 4).sum();
-        let share = free / meta.headers.len().max(1) as u64;
-        fits(header.layer_size.x() as u64, header.layer_size.y() as u64, each + 12, share)?;
-    }
-    let picture = Picture::decode_exr(Cursor::new(bytes)).map_err(|e| unreadable(&e))?;
-    let Rgb { width, height, pixels: mut texels } = picture.main().ok_or("no layer with channels R, G and B")?;
+/// The RGB picture of an EXR or a Radiance file, told by its first bytes, as an unscaled, unrotated environment map, and
+/// how many negative, NaN or infinite numbers (filters and overflows leave them behind) became 0.
+pub(super) fn environment(bytes: &[u8], free: u64) -> Result<(Environment, usize), String> {
+    let picture = if hdr::is_hdr(bytes) { hdr::decode(bytes, free)? } else { exr(bytes, free)? };
+    let Rgb { width, height, pixels: mut texels } = picture;
     let mut clamped = 0;
     for x in texels.iter_mut().flatten() {
         if !x.is_finite() || *x < 0.0 {
@@ -152,4 +144,20 @@ pub(super) fn exr(bytes: &[u8], free: u64) -> Result<(Environment, usize), Strin
     }
     let to_world = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     Ok((Environment::Map { width, height, texels, scale: [1.0; 3], to_world }, clamped))
+}
+
+/// The RGB picture of an EXR.
+fn exr(bytes: &[u8], free: u64) -> Result<Rgb, String> {
+    let unreadable = |e: &dyn std::fmt::Display| format!("not a readable EXR: {e}");
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| unreadable(&e))?;
+    for header in &meta.headers {
+        let channels = &header.channels.list;
+        // as decoded, as 32-bit planes of a picture, three of them as pixels
+        let size = |t: SampleType| if t == SampleType::F16 { 2 } else { 4 };
+        let each: u64 = channels.iter().map(|c| size(c.sample_type) + 4).sum();
+        let share = free / meta.headers.len().max(1) as u64;
+        fits(header.layer_size.x() as u64, header.layer_size.y() as u64, each + 12, share)?;
+    }
+    let picture = Picture::decode_exr(Cursor::new(bytes)).map_err(|e| unreadable(&e))?;
+    picture.main().ok_or_else(|| "no layer with channels R, G and B".into())
 }

@@ -3,6 +3,7 @@
 use super::error::LoadError;
 use super::{files, images};
 use crate::description::{Encoding, Environment, SceneDescription, Texture, Wrap};
+use crate::look::Given;
 use crate::text;
 use std::collections::HashMap;
 use std::io;
@@ -41,13 +42,16 @@ pub struct LoadReport {
     pub skipped_elements: u32,
     /// Notes of what was assumed or ignored, one sentence each.
     pub notes: Vec<String>,
+    /// The file has no camera: the picture was composed here, and wants an exposure to suit it.
+    pub framed: bool,
 }
 
 /// State that the files of one scene share.
-#[derive(Default)]
 pub(super) struct Loader {
     pub(super) options: LoadOptions,
     pub(super) report: LoadReport,
+    /// What the file says of itself; readers of files without camera or light change it.
+    pub(super) given: Given,
     /// Folder of the scene: other machines' folders are not here, but their files may lie beside the scene.
     folder: PathBuf,
     /// Textures by path and decoding: a file that several materials use is decoded once. `None`: it is missing.
@@ -65,7 +69,14 @@ pub(super) struct Decoding {
 
 impl Loader {
     pub(super) fn new(options: LoadOptions, folder: &Path) -> Self {
-        Self { options, folder: folder.into(), ..Self::default() }
+        Self {
+            options,
+            report: LoadReport::default(),
+            given: Given::SCENE,
+            folder: folder.into(),
+            textures: HashMap::new(),
+            decoded: 0,
+        }
     }
 
     /// Reads a whole file; `referrer` is the place that names it. If it is not there, one is taken that differs in case
@@ -153,10 +164,17 @@ impl Loader {
         Ok(Some(index))
     }
 
+    /// A PNG or JPEG that is in memory; the error is a text.
+    pub(super) fn decode(&mut self, bytes: &[u8]) -> Result<Texture, String> {
+        let image = images::texture(bytes, self.free())?.texture;
+        self.decoded += 4 * image.texels.len() as u64;
+        Ok(image)
+    }
+
     /// The environment map in `path`, unscaled and unrotated.
     pub(super) fn environment(&mut self, path: &Path, referrer: &str) -> Result<Environment, LoadError> {
         let (bytes, path) = self.read_near(path, referrer)?;
-        let decoded = images::exr(&bytes, self.free());
+        let decoded = images::environment(&bytes, self.free());
         let (map, clamped) = decoded.map_err(|what| LoadError::image(&path, referrer, what))?;
         if let Environment::Map { texels, .. } = &map {
             self.decoded += 12 * texels.len() as u64;

@@ -9,8 +9,8 @@
 use super::json::Place;
 use super::loader::Loader;
 use super::{LoadError, files, mtl, polygon};
-use crate::builtin;
-use crate::description::{Camera, Emitter, Object, SceneDescription, Triangle, Vertex};
+use crate::description::{Emitter, Object, SceneDescription, Triangle, Vertex};
+use crate::look::Given;
 use crate::text::{self, excerpt};
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -18,7 +18,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// Name under which faces without `usemtl` appear.
-const NO_MATERIAL: &str = "default";
+pub(super) const NO_MATERIAL: &str = "default";
 
 /// The text for `tobj`, and what the check found.
 struct Prepared {
@@ -434,8 +434,7 @@ pub(super) fn load_geometry(
     append(path, scene, prepared, &materials)
 }
 
-/// Loads a bare OBJ file with its material libraries. Without lights it gets the sky of [`builtin::sky`]; the camera
-/// sees the whole scene.
+/// Loads a bare OBJ file with its material libraries. Camera, light and ground are left open.
 pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescription, LoadError> {
     let mut scene = SceneDescription::default();
     let prepared = read(loader, path, None)?;
@@ -489,12 +488,7 @@ pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescrip
         materials.push(index);
     }
     append(path, &mut scene, prepared, &materials)?;
-    scene.camera = frame(&scene);
-    loader.note("the file has no camera: it was framed to show everything".into());
-    if scene.emitters.is_empty() {
-        scene.environment = Some(builtin::sky());
-        loader.note("the file has no light: an environment was added".into());
-    }
+    loader.given = Given::MESH;
     Ok(scene)
 }
 
@@ -503,18 +497,4 @@ fn libraries(folder: &Path, names: &str) -> Vec<PathBuf> {
     let whole = folder.join(names);
     let several = || names.split_ascii_whitespace().map(|n| folder.join(n)).collect::<Vec<_>>();
     if whole.exists() || !several().iter().any(|f| f.exists()) { vec![whole] } else { several() }
-}
-
-/// A camera that sees the bounding sphere whole, from the front, the right and above.
-fn frame(scene: &SceneDescription) -> Camera {
-    let camera = Camera { size: [640, 480], vfov_deg: 40.0, ..Camera::default() };
-    let Some([lo, hi]) = scene.bounds() else { return camera };
-    let axis = |i: usize| (f64::from(lo[i]), f64::from(hi[i]));
-    let target = [0, 1, 2].map(|i| (axis(i).0 + axis(i).1) / 2.0);
-    let radius = [0, 1, 2].map(|i| (axis(i).1 - axis(i).0).powi(2)).iter().sum::<f64>().sqrt() / 2.0;
-    // The height is the smaller side of the picture, so its half angle decides; 2 % of margin.
-    let distance = 1.02 * radius.max(1e-6) / (camera.vfov_deg.to_radians() / 2.0).sin();
-    let direction = [0.48, 0.36, 0.8];
-    let origin = [0, 1, 2].map(|i| target[i] + distance * direction[i]);
-    Camera { origin, target, ..camera }
 }
