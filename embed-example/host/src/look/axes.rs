@@ -62,7 +62,7 @@ pub(super) fn axes(scene: &SceneDescription, choice: Up, fallback: Up) -> (Axes,
 struct Plane {
     /// Smallest and largest coordinates, across the axis, of the vertices near it.
     bounds: Option<[[f64; 2]; 2]>,
-    /// Area of the triangles in it.
+    /// Area of the triangles in it that face outwards.
     area: f64,
 }
 
@@ -95,7 +95,8 @@ fn guess(scene: &SceneDescription) -> Option<bool> {
                     let q = [q[0], q[3 - axis]];
                     plane.bounds = Some([[a[0].min(q[0]), a[1].min(q[1])], [b[0].max(q[0]), b[1].max(q[1])]]);
                 }
-                if p.iter().all(near) {
+                // outside of it
+                if p.iter().all(near) && n[axis] * (end - lo[axis] - 0.5 * size[axis]) > 0.0 {
                     plane.area += area;
                 }
             }
