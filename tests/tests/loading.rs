@@ -24,9 +24,10 @@ fn load_obj(obj: &str, mtl: &str) -> (SceneDescription, LoadReport) {
     plain(&folder.path().join("a.obj")).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Loads without adding a ground.
+/// Loads without adding ground, sun and sky.
 fn plain(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
-    load_with(path, &Look { without_ground: true, ..Look::default() })
+    let environment = Some(Environment::Constant { radiance: [1.0; 3] });
+    load_with(path, &Look { without_ground: true, environment, ..Look::default() })
 }
 
 fn positions(scene: &SceneDescription, triangle: usize) -> [[f32; 3]; 3] {
@@ -133,11 +134,12 @@ fn mtl_materials_become_models() {
 /// Faces without a material, no light, no camera: grey, sun and sky, a ground, and all corners inside the picture.
 #[test]
 fn a_bare_obj_can_be_seen() {
-    let (scene, report) = load_obj("v 10 0 0\nv 14 0 0\nv 10 3 0\nf 1 2 3\n", "");
+    let folder = folder(&[("a.obj", "v 10 0 0\nv 14 0 0\nv 10 3 0\nf 1 2 3\n")]);
+    let (scene, report) = load(&folder.path().join("a.obj")).unwrap();
     assert_eq!(scene.materials[0].model, Model::Diffuse { reflectance: Reflectance::Constant([0.5; 3]) });
     assert!(matches!(scene.environment, Some(Environment::Map { .. })));
-    assert!(matches!(scene.emitters[..], [Emitter::Sun { .. }]));
-    assert_eq!(report.notes.len(), 3, "{report:?}");
+    assert!(matches!(scene.emitters[..], [Emitter::Sun { .. }]) && scene.triangles.len() > 1);
+    assert_eq!(report.notes.len(), 4, "{report:?}");
     assert!(report.framed);
     let baked = bake(&scene, &BakeOptions::default(), |_, _| {}).unwrap();
     let view = croupier::Scene::from_bytes(&baked.bytes).unwrap();

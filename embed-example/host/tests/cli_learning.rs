@@ -44,8 +44,8 @@ fn without_a_command_the_built_in_scene_is_rendered_here() {
     let found = json(&croupier(dir.path(), &["--spp", "1", "--json"]));
     assert_eq!(found["written"], serde_json::json!(["croupier.exr", "croupier.png"]));
     let exr = Picture::read_exr(&dir.path().join("croupier.exr")).unwrap();
-    assert_eq!((exr.width, exr.height), (720, 480));
-    assert_eq!(png_size(&dir.path().join("croupier.png")), (720, 480));
+    assert_eq!((exr.width, exr.height), (640, 432));
+    assert_eq!(png_size(&dir.path().join("croupier.png")), (640, 432));
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
 }
 

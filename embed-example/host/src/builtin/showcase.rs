@@ -15,15 +15,15 @@ const GROUND: f32 = 0.42;
 ///
 /// ```
 /// let scene = croupier_host::builtin::showcase();
-/// assert_eq!(scene.camera.size, [720, 480]);
+/// assert_eq!(scene.camera.size, [640, 432]);
 /// ```
 pub fn showcase() -> SceneDescription {
     let mut scene = SceneDescription {
         camera: Camera {
             origin: [2.55, 1.75, 6.4],
-            target: [0.02, 0.94, 0.0],
-            vfov_deg: 27.0,
-            size: [720, 480],
+            target: [0.02, 0.9, 0.0],
+            vfov_deg: 25.5,
+            size: [640, 432],
             ..Camera::default()
         },
         max_depth: 12,
