@@ -10,6 +10,7 @@ use croupier_host::builtin;
 use croupier_host::checkpoint;
 use croupier_host::image::Picture;
 use croupier_host::load::{LoadOptions, load_with};
+use croupier_host::look::Look;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -125,7 +126,8 @@ impl Workbench {
         self.write(name, data);
         let bare = matches!(name, "a.obj" | "a.mtl" | "t.png" | "t.jpg");
         let scene = if bare { self.folder.join("a.obj") } else { self.folder.join("scene.json") };
-        let loaded = load_with(&scene, &LoadOptions { strict: false, texture_memory: TEXTURE_MEMORY });
+        let options = LoadOptions { strict: false, texture_memory: TEXTURE_MEMORY };
+        let loaded = load_with(&scene, &options, &Look::default());
         if let Err(e) = &loaded {
             assert_message(&e.to_string(), &self.folder);
         }

@@ -41,6 +41,9 @@ pub(crate) struct LookFlags {
     /// Constant environment in place of the scene's, which lights it: #rrggbb, or linear R,G,B from 0 to 1e6
     #[arg(long, value_name = "COLOR", value_parser = color, conflicts_with = "env", allow_hyphen_values = true)]
     background: Option<Color>,
+    /// Add no ground below a mesh
+    #[arg(long)]
+    no_ground: bool,
 }
 
 /// [`Up`] with a default for the command line.
@@ -63,6 +66,7 @@ impl LookFlags {
             ("--env", self.env.is_some()),
             ("--sun", self.sun.is_some()),
             ("--background", self.background.is_some()),
+            ("--no-ground", self.no_ground),
         ];
         given.into_iter().find(|(_, given)| *given).map(|(name, _)| name)
     }
@@ -91,6 +95,7 @@ impl LookFlags {
             up: self.up.0,
             sun: self.sun,
             environment,
+            without_ground: self.no_ground,
         };
         Ok((look, notes))
     }

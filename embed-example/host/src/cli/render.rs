@@ -22,7 +22,7 @@ use std::process::ExitCode;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder with scene.json, .obj file, or baked .crp file; the built-in Cornell box if absent
+    /// Folder with scene.json, .obj file, or baked .crp file; `cornell` for the built-in Cornell box; a built-in still life if absent
     pub(crate) scene: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) flags: Flags,
@@ -43,11 +43,11 @@ pub(crate) struct Flags {
     /// Threads, up to 4096, 0 for one per processor, at most one per shard; the image does not depend on their number
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=4096))]
     threads: u16,
-    /// Exposure of the PNG in stops, -100 to 100, or auto: from the picture. Absent: auto for a scene without a camera, 1
-    /// for the built-in scene, else 0. The EXR stays as it is
+    /// Exposure of the PNG in stops, -100 to 100, or auto: from the picture. Absent: auto for the built-in
+    /// still life and scenes without a camera, 1 for the Cornell box, else 0. The EXR stays as it is
     #[arg(long, value_name = "STOPS", value_parser = exposure, allow_negative_numbers = true)]
     exposure: Option<Exposure>,
-    /// Add the denoised picture as layer `denoised`, and tone-map it for the PNG
+    /// Add the denoised picture as layer `denoised`, and tone-map it for the PNG; always for the built-in still life
     #[arg(long)]
     denoise: bool,
     /// Also write roulette factors, rays per sample and paths per sample as false-colour pictures with legends:
@@ -137,6 +137,8 @@ struct Report<'a> {
     cache_out: Option<&'a Path>,
     #[serde(skip_serializing_if = "Option::is_none")]
     checkpoint: Option<&'a Path>,
+    /// The PNG shows the denoised picture.
+    denoised: bool,
     /// Complete files.
     written: &'a [PathBuf],
 }
@@ -147,8 +149,10 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Result<ExitCode, Box<dy
     let outputs = Outputs::new(&flags.output, flags.cache.cache_out.as_deref(), checkpoint, flags.false_color);
     // Said now, not after an hour of rendering.
     outputs.check()?;
-    let options = flags.options()?;
-    let scene::Opened { bytes, mut notes, mut files, framed } = scene::open(path, &flags.scene)?;
+    let mut options = flags.options()?;
+    // the first picture that anyone sees
+    options.denoise |= path.is_none();
+    let scene::Opened { bytes, mut notes, mut files, exposure } = scene::open(path, &flags.scene)?;
     files.extend(flags.cache.cache_in.clone());
     outputs.spare(&files, flags.checkpoint.input())?;
     let validated = Scene::from_bytes(&bytes).map_err(|e| about(path)(&e))?;
@@ -186,10 +190,8 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Result<ExitCode, Box<dy
         let count = stats.counters.get("non_finite").unwrap_or(&1);
         notes.add(path, format!("{count} contributions were not finite and left out, the first in pixel ({x}, {y})"));
     }
-    // Its area light brings the walls to about a fifth of white.
-    let usual = if path.is_none() { Exposure::Stops(1.0) } else { Exposure::Stops(0.0) };
-    let exposure = flags.exposure.unwrap_or(if framed { Exposure::Auto } else { usual });
-    let image = if flags.denoise { "denoised" } else { "" };
+    let exposure = flags.exposure.unwrap_or(exposure);
+    let image = if options.denoise { "denoised" } else { "" };
     let mut written = outputs.write(picture, cache.as_deref(), image, exposure);
     if checkpoint_error.is_none() {
         written.files.extend(checkpoint.filter(|c| c.is_file()).map(Path::to_path_buf));
@@ -209,6 +211,7 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Result<ExitCode, Box<dy
         false_color: &outputs.false_color,
         cache_out: outputs.cache,
         checkpoint,
+        denoised: options.denoise,
         written: &written.files,
     };
     // The figures are worth having even if a file is missing.
@@ -257,5 +260,8 @@ fn print(r: &Report<'_>) -> Outcome {
         say(&format!("\n{statistics}"))?;
     }
     let names: Vec<_> = r.written.iter().map(|p| text::path(p)).collect();
+    if r.denoised {
+        say("the PNG shows the denoised picture, the EXR has both")?;
+    }
     if names.is_empty() { Ok(()) } else { say(&format!("wrote {}", names.join(", "))) }
 }

@@ -1,5 +1,6 @@
 //! Which way is up, and which side is the front.
 
+use super::room::Surroundings;
 use crate::description::SceneDescription;
 
 /// Choice of the axis that points up.
@@ -44,7 +45,8 @@ impl Axes {
 
 /// The axes of a choice, and whether they were guessed.
 ///
-/// Files do not say which way is up, apart from a few formats. Signs, by weight: the thin axis of a sheet; the side to
+/// Files do not say which way is up, apart from a few formats. Signs, by weight: the thin axis of a sheet; floor and
+/// ceiling of a room; the side to
 /// which an open surface faces as a whole (a terrain); that what touches the lowest plane across an axis spreads wider
 /// than what touches the highest one (feet, a base, roofs of different heights); that there is more area in the lowest
 /// plane than in the highest one. Without a clear sign it is the `fallback`: most OBJ and all glTF files have y up.
@@ -62,7 +64,7 @@ pub(super) fn axes(scene: &SceneDescription, choice: Up, fallback: Up) -> (Axes,
 struct Plane {
     /// Smallest and largest coordinates, across the axis, of the vertices near it.
     bounds: Option<[[f64; 2]; 2]>,
-    /// Area of the triangles in it.
+    /// Area of the triangles in it that face outwards.
     area: f64,
 }
 
@@ -76,6 +78,12 @@ fn guess(scene: &SceneDescription) -> Option<bool> {
         (true, false) => return Some(false),
         // a card that faces the viewer, or a floor that lies: nothing tells
         (false, true) => return None,
+        _ => {}
+    }
+    let room = |axes: &Axes| Surroundings::of(scene, axes).is_some_and(|s| s.room);
+    match (room(&Axes::Y), room(&Axes::Z)) {
+        (true, false) => return Some(false),
+        (false, true) => return Some(true),
         _ => {}
     }
     let (mut total, mut net) = (0.0, [0.0f64; 3]);
@@ -95,7 +103,8 @@ fn guess(scene: &SceneDescription) -> Option<bool> {
                     let q = [q[0], q[3 - axis]];
                     plane.bounds = Some([[a[0].min(q[0]), a[1].min(q[1])], [b[0].max(q[0]), b[1].max(q[1])]]);
                 }
-                if p.iter().all(near) {
+                // outside of it
+                if p.iter().all(near) && n[axis] * (end - lo[axis] - 0.5 * size[axis]) > 0.0 {
                     plane.area += area;
                 }
             }
@@ -119,7 +128,7 @@ fn guess(scene: &SceneDescription) -> Option<bool> {
         let differ = (y - z).abs() > least;
         (y.max(z) > least).then_some(differ.then_some(z > y))
     };
-    clear(&spread, 0.3).or_else(|| clear(&|p| p.area, 0.15)).flatten()
+    clear(&spread, 0.3).or_else(|| clear(&|p| p.area, 0.25)).flatten()
 }
 
 /// Positions of a triangle's corners.
