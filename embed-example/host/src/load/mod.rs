@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `scene_json` | a folder with `scene.json` (the format of docs/SCENES.md) |
 //! | `obj` | geometry: Wavefront OBJ |
-//! | `mtl` | materials of a bare OBJ |
+//! | `mtl`, `mtl_principled` | materials of a bare OBJ |
 //! | `media` | participating media of a `scene.json`, density grids |
 //! | `principled` | principled materials of a `scene.json` |
 //! | `presets` | nothing: media by name |
@@ -18,6 +18,7 @@ mod json;
 mod loader;
 mod media;
 mod mtl;
+mod mtl_principled;
 mod obj;
 mod presets;
 mod principled;
