@@ -9,7 +9,7 @@ use crate::bsdf::{self, Bsdf, Inputs8, Lobes, Visitor};
 use crate::extension::{Extension, TextureSamples8};
 use crate::geometry::{self, Hit8, SurfaceHit8, SurfacePoint8};
 use crate::learn::cache::NO_BIN;
-use crate::scene::blob::{MATERIAL_CUTOUT, MATERIAL_TWO_SIDED, MaterialKind, NONE};
+use crate::scene::blob::{LAYERED_KINDS, MATERIAL_CUTOUT, MATERIAL_TWO_SIDED, MaterialKind, NONE};
 use crate::scene::{Effects, Scene};
 use crate::texture;
 use crate::world::World;
@@ -134,7 +134,7 @@ impl Materials8 {
             reflectance = own_reflectance(world, hit, reflectance);
         }
         if W::EFFECTS.contains(Effects::PRINCIPLED) && scene.effects.contains(Effects::PRINCIPLED) {
-            let layered = hit.mask & bsdf::lanes_of(Effects::PRINCIPLED.0, &kind);
+            let layered = hit.mask & bsdf::lanes_of(LAYERED_KINDS, &kind);
             if layered.any() {
                 let r = relief::<W>(scene, hit, wo, ng, ns, layered);
                 reflectance = Vec3x8::select(layered, r.packed, reflectance);

@@ -7,9 +7,10 @@
 //! out then has normals for all faces or for none, and `tobj` has nothing left to refuse.
 
 use super::json::Place;
-use super::loader::Loader;
+use super::loader::{Decoding, Loader};
+use super::mtl_principled::{self, Maps};
 use super::{LoadError, files, mtl, polygon};
-use crate::description::{Emitter, Object, SceneDescription, Triangle, Vertex};
+use crate::description::{Emitter, Encoding, Object, SceneDescription, Triangle, Vertex};
 use crate::look::Given;
 use crate::text::{self, excerpt};
 use std::borrow::Cow;
@@ -468,10 +469,16 @@ pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescrip
                     }
                     None => None,
                 };
-                let mapped = mtl::map(definition, texture);
-                loader.report.notes.extend(mapped.notes);
-                scene.materials.push(mapped.material);
-                if let Some(radiance) = mapped.radiance {
+                let (material, radiance) = if mtl_principled::applies(definition) {
+                    let maps = Maps { base: texture, ..maps(loader, &mut scene, definition, file)? };
+                    mtl_principled::map(&mut scene, definition, maps)
+                } else {
+                    let mapped = mtl::map(definition, texture);
+                    loader.report.notes.extend(mapped.notes);
+                    (mapped.material, mapped.radiance)
+                };
+                scene.materials.push(material);
+                if let Some(radiance) = radiance {
                     scene.emitters.push(Emitter::Area { material: index, radiance });
                 }
             }
@@ -497,4 +504,28 @@ fn libraries(folder: &Path, names: &str) -> Vec<PathBuf> {
     let whole = folder.join(names);
     let several = || names.split_ascii_whitespace().map(|n| folder.join(n)).collect::<Vec<_>>();
     if whole.exists() || !several().iter().any(|f| f.exists()) { vec![whole] } else { several() }
+}
+
+/// The textures of a definition besides that of its colour.
+fn maps(
+    loader: &mut Loader,
+    scene: &mut SceneDescription,
+    definition: &mtl::Definition,
+    file: &Path,
+) -> Result<Maps, LoadError> {
+    let mut maps = Maps::default();
+    for (key, texture, line) in &definition.maps {
+        let encoding = if key == "map_Ke" { Encoding::Srgb } else { Encoding::Linear };
+        let decoding = Decoding { encoding, ..Decoding::default() };
+        let referrer = format!("{}:{line} (material `{}`)", text::path(file), excerpt(&definition.material.name));
+        let index = loader.texture_as(scene, &mtl::sibling(file, texture), &referrer, decoding)?;
+        let slot = match key.as_str() {
+            "map_Pr" => &mut maps.roughness,
+            "map_Pm" => &mut maps.metalness,
+            "map_Ke" => &mut maps.emission,
+            _ => &mut maps.normal,
+        };
+        *slot = index;
+    }
+    Ok(maps)
 }
