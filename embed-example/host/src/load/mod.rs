@@ -6,6 +6,7 @@
 //! | `obj` | geometry: Wavefront OBJ |
 //! | `mtl` | materials of a bare OBJ |
 //! | `media` | participating media of a `scene.json`, density grids |
+//! | `instances` | instances and prototypes of a `scene.json` |
 //! | `presets` | nothing: media by name |
 //! | `images` | PNG and JPEG textures, EXR environment maps |
 //! | `loader` | the files that all of them ask for, each once |
@@ -13,6 +14,7 @@
 
 mod error;
 mod images;
+mod instances;
 mod json;
 mod loader;
 mod media;

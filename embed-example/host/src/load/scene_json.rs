@@ -2,7 +2,7 @@
 
 use super::json::{self, Place};
 use super::loader::Loader;
-use super::{LoadError, media, obj};
+use super::{LoadError, instances, media, obj};
 use crate::description::{
     Camera, Emitter, Environment, Material, Model, ParameterSource, Reflectance, SceneDescription, ThinLens,
 };
@@ -32,6 +32,7 @@ pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription,
     let file = document.get("geometry")?.get("file")?;
     obj::load_geometry(loader, &mut scene, &folder.join(file.text()?), &file)?;
     media::load(loader, &mut scene, folder, &document)?;
+    instances::load(&mut scene, &document)?;
     Ok(scene)
 }
 
