@@ -68,7 +68,7 @@ fn lights_state_their_fields() {
         let mut stated: Vec<String> =
             header_table(&file(&format!("core/src/light/{name}.rs"))).into_iter().map(|(f, _)| f).collect();
         let fields = kind.fields().iter().flat_map(|f| match f {
-            LightField::Triangle => &["triangle", "area"][..],
+            LightField::Triangle => &["triangle", "area", "instance"][..],
             LightField::Environment => &[],
             LightField::Position | LightField::Direction => &["vector"],
             LightField::Emission => &["emission"],

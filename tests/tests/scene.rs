@@ -508,7 +508,7 @@ fn every_fault_of_the_frame_has_its_error() {
     let mut bare = Blob::new(&good.bytes()[..64]);
     bare.header(|h| h.length = 64);
     bare.rehash();
-    expect("no table", &bare, SceneError::Truncated { needed: 64 + 19 * 24, given: 64 });
+    expect("no table", &bare, SceneError::Truncated { needed: 64 + 21 * 24, given: 64 });
     bare.header(|h| h.sections = 0);
     expect("no sections", &bare, count(S::Info, 0));
     let mut flipped = good.clone();
@@ -522,17 +522,17 @@ fn every_fault_of_the_frame_has_its_error() {
         b
     };
     let section = |kind, fault| SceneError::Section { kind, fault };
-    expect("kind", &entry(4, |s| s.kind = 19), SceneError::UnknownSection(19));
+    expect("kind", &entry(4, |s| s.kind = 21), SceneError::UnknownSection(21));
     expect("twice", &entry(4, |s| s.kind = 3), section(S::Triangles, SectionFault::Repeated));
     expect("stride", &entry(4, |s| s.stride = 16), section(S::Vertices, SectionFault::Stride(16)));
     expect("stride 0", &entry(4, |s| s.stride = 0), section(S::Vertices, SectionFault::Stride(0)));
     expect("in the table", &entry(0, |s| s.offset = 384), section(S::Info, SectionFault::Offset(384)));
-    expect("off the grid", &entry(18, |s| s.offset += 4), {
-        section(S::Names, SectionFault::Offset(table(&good)[18].offset + 4))
+    expect("off the grid", &entry(20, |s| s.offset += 4), {
+        section(S::Names, SectionFault::Offset(table(&good)[20].offset + 4))
     });
-    expect("beyond the end", &entry(18, |s| s.count += 1), count(S::Names, table(&good)[18].count + 1));
-    expect("overflow", &entry(18, |s| s.count = u64::MAX), count(S::Names, u64::MAX));
-    expect("offset overflow", &entry(18, |s| s.offset = u64::MAX - 63), count(S::Names, table(&good)[18].count));
+    expect("beyond the end", &entry(20, |s| s.count += 1), count(S::Names, table(&good)[20].count + 1));
+    expect("overflow", &entry(20, |s| s.count = u64::MAX), count(S::Names, u64::MAX));
+    expect("offset overflow", &entry(20, |s| s.offset = u64::MAX - 63), count(S::Names, table(&good)[20].count));
     expect("more than 31 bits", &entry(4, |s| (s.stride, s.count) = (0, 1 << 31)), count(S::Vertices, 1 << 31));
     let mut overlapping = good.clone();
     let offset = table(&good)[3].offset;
@@ -541,7 +541,7 @@ fn every_fault_of_the_frame_has_its_error() {
 }
 
 fn table(blob: &Blob) -> &[Section] {
-    bytemuck::cast_slice(&blob.bytes()[64..64 + 19 * size_of::<Section>()])
+    bytemuck::cast_slice(&blob.bytes()[64..64 + 21 * size_of::<Section>()])
 }
 
 /// The message names the object, its index and the number. Killed by: leaving one of them out.
@@ -552,7 +552,7 @@ fn messages_name_object_index_and_number() {
         (reference(SectionKind::Triangles, 5, SectionKind::Materials, 9, 3), ["triangles[5]", "materials[9]", "3"]),
         (child(12, 3, ChildFault::Outside(2.5)), ["nodes[12]", "child 3", "2.5"]),
         (slot(12, 3, SlotFault::Vertex(2.5)), ["leaves[12]", "slot 3", "2.5"]),
-        (SceneError::Version(9), ["version 9", "version 3", "blob"]),
+        (SceneError::Version(9), ["version 9", "version 4", "blob"]),
         (SceneError::Truncated { needed: 90, given: 12 }, ["90", "12", "bytes"]),
     ];
     for (e, parts) in messages {

@@ -19,9 +19,9 @@
 //!    added to the origins of the slabs as `setup` adds its own.
 
 use super::blocking::Blocking;
+use super::grouping::trace;
 use super::setup::{Setup, each};
 use super::single::{Hits, Keys, STACK, key};
-use super::wide::trace;
 use crate::geometry::{Map8, Ray8};
 use crate::scene::blob::{
     CHILD_INDEX, INSTANCE_HIDDEN, Instance, LEAF_BIT, Leaf, MAX_INSTANCE_DEPTH, NONE, Node, Object,

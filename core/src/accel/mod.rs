@@ -2,7 +2,8 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `wide` | [`WideBvh`]: the built-in [`Intersector`], grouping of rays |
+//! | `wide` | [`WideBvh`]: the built-in [`Intersector`] |
+//! | `grouping` | which rays walk a tree together |
 //! | `instances` | rays through top-level trees, into objects |
 //! | `blocking` | which triangles end a search for any hit |
 //! | `setup` | per-ray constants, eight rays at once |
@@ -15,6 +16,7 @@
 
 mod blocking;
 mod build;
+mod grouping;
 mod instances;
 mod packet;
 mod refit;

@@ -1,13 +1,10 @@
-//! The built-in [`Intersector`]: grouping of rays.
-//!
-//! Rays are grouped by direction octant and major axis; groups of more than [`FEW`] walk the tree as a packet, which
-//! doubles the throughput of coherent rays; the others go one by one, which is best for incoherent ones.
+//! The built-in [`Intersector`].
 
 use super::blocking::{Asked, Blocking, Everything};
+use super::grouping::trace;
 use super::instances::{Forest, Found};
-use super::packet::{FEW, walk_packet};
 use super::setup::Setup;
-use super::single::{Hits, Keys, STACK, walk};
+use super::single::{Hits, STACK};
 use super::{Intersector, Occlusion8};
 use crate::geometry::{Hit8, NO_INSTANCE, Ray8};
 use crate::scene::Scene;
@@ -95,33 +92,6 @@ fn hit8(hits: &Hits, instance: [U32x8; 2], rays: &Ray8) -> Hit8 {
         v: hit.zero_unless(F32x8::new(hits.v)),
         instance,
     }
-}
-
-/// Traces the rays `lanes` of `s` through the tree of triangles at node `root`. Closest: improves `hits`. Any: returns the
-/// lanes with a hit that blocks.
-#[inline(always)]
-pub(super) fn trace<const ANY: bool, B: Blocking>(
-    tree: (&[Node], &[Leaf]),
-    root: u32,
-    (s, lanes): (&Setup, u32),
-    hits: &mut Hits,
-    stack: &mut Keys,
-    blocking: &mut B,
-) -> u32 {
-    let (mut left, mut single, mut occluded) = (lanes, 0, 0);
-    while left != 0 {
-        let group = s.alike(left.trailing_zeros() as usize & 7, left);
-        left &= !group;
-        if group.count_ones() <= FEW {
-            single |= group;
-        } else {
-            occluded |= walk_packet::<ANY, B>((tree, root), s, group, hits, stack, blocking);
-        }
-    }
-    if single != 0 {
-        occluded |= walk::<ANY, B>(tree, (root, &s.tmin), (s, single), hits, stack, blocking);
-    }
-    occluded
 }
 
 impl Intersector for WideBvh<'_> {

@@ -75,7 +75,7 @@ environment_table!(define_environments);
 /// Fields of a [`Light`] that a kind may use, a closed set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightField {
-    /// `triangle` and `area`: a triangle that refers back, and its area.
+    /// `triangle`, `area` and `instance`: a triangle that refers back, its area, and the instance that it is in.
     Triangle,
     /// The scene's one [`Environment`], which refers back; it holds what is emitted, and which effect that is.
     Environment,

@@ -9,6 +9,7 @@
 //! | `mtl`, `mtl_principled` | materials of a bare OBJ |
 //! | `media` | participating media of a `scene.json`, density grids |
 //! | `principled` | principled materials of a `scene.json` |
+//! | `instances` | instances and prototypes of a `scene.json` |
 //! | `presets` | nothing: media by name |
 //! | `images` | PNG and JPEG textures, environment maps: EXR, and Radiance through `hdr` |
 //! | `colors` | nothing: colours of vertices as textures |
@@ -24,6 +25,7 @@ mod files;
 mod gltf;
 mod hdr;
 mod images;
+mod instances;
 mod json;
 mod loader;
 mod media;

@@ -2,7 +2,7 @@
 
 use super::json::{self, Place};
 use super::loader::Loader;
-use super::{LoadError, media, obj, principled};
+use super::{LoadError, instances, media, obj, principled};
 use crate::description::{
     Camera, Emitter, Environment, Material, Model, ModelParameters, NamedCamera, ParameterSource, Principled,
     Projection, Reflectance, SceneDescription, ThinLens,
@@ -45,6 +45,7 @@ pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription,
     let file = geometry.get("file")?;
     obj::load_geometry(loader, &mut scene, &folder.join(file.text()?), &file)?;
     media::load(loader, &mut scene, folder, &document)?;
+    instances::load(&mut scene, &document)?;
     Ok(scene)
 }
 
