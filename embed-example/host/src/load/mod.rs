@@ -29,13 +29,13 @@ use crate::look::{Look, dress};
 use loader::Loader;
 use std::path::Path;
 
-/// As [`load_with`], without wishes.
+/// As [`load_with`], without requests.
 pub fn load(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
     load_with(path, &Look::default())
 }
 
 /// Loads a folder with a `scene.json`, that `scene.json` itself, or a bare `.obj` file; what it leaves open is completed,
-/// and the wishes of `look` are followed ([`dress`]).
+/// and the requests of `look` are followed ([`dress`]).
 pub fn load_with(path: &Path, look: &Look) -> Result<(SceneDescription, LoadReport), LoadError> {
     let mut loader = Loader::default();
     let extension = path.extension().map(|e| e.to_ascii_lowercase());
