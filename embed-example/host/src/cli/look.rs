@@ -76,7 +76,7 @@ impl LookFlags {
         self.env.clone()
     }
 
-    /// The wishes for the library, and notes of reading the environment map.
+    /// The requests for the library, and notes of reading the environment map.
     pub(crate) fn look(&self) -> Result<(Look, Vec<String>), Box<dyn Error>> {
         let (mut environment, mut notes) = (None, Vec::new());
         if let Some(path) = &self.env {

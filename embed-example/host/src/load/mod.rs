@@ -50,7 +50,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// As [`load_with`], with the default options and without wishes.
+/// As [`load_with`], with the default options and without requests.
 ///
 /// # Errors
 /// As of [`load_with`].
@@ -60,7 +60,7 @@ pub fn load(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
 
 /// Loads a folder with a `scene.json`, that `scene.json` itself, or a file of another kind by its extension: `.gltf`,
 /// `.glb`, `.obj`, `.ply`, `.stl`. A file that begins like `.glb` or PLY is one, whatever its name is. What it leaves open
-/// is completed, and the wishes of `look` are followed ([`dress`]).
+/// is completed, and the requests of `look` are followed ([`dress`]).
 ///
 /// # Errors
 /// Files that cannot be read or are no scene, also those without a triangle.

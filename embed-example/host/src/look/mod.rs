@@ -1,12 +1,13 @@
 //! What scene files leave open and users ask for: which way is up, camera, light, ground, exposure.
 //!
-//! [`dress`] completes a scene that was loaded, and follows the wishes of a [`Look`]. A bare mesh becomes a picture: its
+//! [`dress`] completes a scene that was loaded, and follows the requests of a [`Look`]. A bare mesh becomes a picture: its
 //! up axis is guessed, it is framed from the front, the right and above, it stands on a matte ground under sun and sky.
 //! Scenes that bring camera and light along stay as they are, but for what is asked for.
 //!
 //! | file | has |
 //! |---|---|
-//! | `axes` | up and front, guessed or chosen |
+//! | `axes` | up and front |
+//! | `up` | the guess which axis points up |
 //! | `framing` | the camera that shows everything |
 //! | `room` | whether a mesh brings a ground or walls along |
 //! | `atmosphere`, `sky` | sun and sky |
@@ -18,6 +19,7 @@ pub mod exposure;
 mod framing;
 mod room;
 mod sky;
+mod up;
 
 pub use atmosphere::Atmosphere;
 pub use axes::{Axes, Up};
@@ -48,7 +50,7 @@ impl Given {
     pub const MESH: Self = Self { camera: false, light: false, up: Up::Y, up_is_known: false };
 }
 
-/// Wishes; the default has none.
+/// Requests; the default has none.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Look {
     /// Camera of the file to use, by name.
@@ -69,7 +71,7 @@ pub struct Look {
     pub without_ground: bool,
 }
 
-/// A wish that cannot be followed.
+/// A request that cannot be followed.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LookError {
@@ -110,7 +112,7 @@ const GROUND_ALBEDO: f32 = 0.4;
 /// Corners of the added ground.
 const GROUND_CORNERS: u32 = 64;
 
-/// Completes a scene and follows the wishes; returns notes on what was assumed, one sentence each.
+/// Completes a scene and follows the requests; returns notes on what was assumed, one sentence each.
 pub fn dress(scene: &mut SceneDescription, given: &Given, look: &Look) -> Result<Vec<String>, LookError> {
     let mut notes = Vec::new();
     let has_camera = choose_camera(scene, look)? || given.camera;
@@ -120,8 +122,8 @@ pub fn dress(scene: &mut SceneDescription, given: &Given, look: &Look) -> Result
     }
     let (axes, guessed) = match (look.up, has_camera) {
         (Up::Auto, true) => (axes_of(&scene.camera), false),
-        (Up::Auto, false) if given.up_is_known => axes::axes(scene, given.up, given.up),
-        (up, _) => axes::axes(scene, up, given.up),
+        (Up::Auto, false) if given.up_is_known => up::axes(scene, given.up, given.up),
+        (choice, _) => up::axes(scene, choice, given.up),
     };
     let surroundings = Surroundings::of(scene, &axes).unwrap_or_default();
     if !has_camera {
