@@ -75,7 +75,7 @@ fn nothing_is_allocated_between_bytes_and_picture() {
 
 fn render<P: Profile>(bytes: &[u8], strategy: Strategy) {
     let scene = without_allocating(|| Scene::from_bytes(bytes)).unwrap();
-    let settings = Settings { strategy, shards: 2, aovs: true, max_depth: 6, ..Settings::for_scene(&scene) };
+    let settings = Settings { strategy, shards: 2, aovs: true.into(), max_depth: 6, ..Settings::for_scene(&scene) };
     let plan = without_allocating(|| Plan::new(&settings)).unwrap();
     let mut shared = AlignedBytes::zeroed(plan.session().size);
     let mut blocks = [(); 2].map(|_| AlignedBytes::zeroed(plan.shard().size));

@@ -91,7 +91,7 @@ fn render(blob: &Path, strategy: &str) -> Result<Value, Box<dyn Error>> {
     let scale = (PIXELS / (width * height)).sqrt();
     let size = [width, height].map(|x| (x * scale).round() as u32);
     // features for the denoiser, as the program renders
-    let settings = Settings { size, shards: SHARDS, aovs: true, ..Settings::for_scene(&scene) };
+    let settings = Settings { size, shards: SHARDS, aovs: true.into(), ..Settings::for_scene(&scene) };
     let plan = Plan::new(&Variant::parse(strategy)?.apply(settings))?;
     let (counters, _) = serial::render(scene, &plan, &ITERATIONS)?;
     Ok(json!({ "rays": counters.rays() }))

@@ -15,10 +15,13 @@ pub use result::{CacheRecord, IterationRecord, Rendered};
 use crate::blob::AlignedBytes;
 use croupier::unstable::Phase;
 use croupier::unstable::accel::Intersector;
+use croupier::unstable::film::Aov;
 use croupier::unstable::learn::cache::{Cache, CacheError};
 use croupier::unstable::profile::{AnyProfile, Profile, ProfileVisitor};
 use croupier::unstable::rrs::Space;
-use croupier::{Budget, Counters, ErrorEstimate, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
+use croupier::{
+    Budget, Counters, ErrorEstimate, Film, Plan, Scene, Session, SessionError, Settings, Shard, StepResult,
+};
 use rayon::prelude::*;
 use schedule::Work;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -92,7 +95,7 @@ pub fn drive_with<P: Profile + Send + Sync>(
     let plan = Plan::new(settings)?;
     let block = |size: usize| AlignedBytes::try_zeroed(size).ok_or(DriveError::Memory(size));
     let mut shared = block(plan.session().size)?;
-    let mut blocks = (0..settings.shards).map(|_| block(plan.shard().size)).collect::<Result<Vec<_>, _>>()?;
+    let mut blocks = (0..settings.shards).map(|i| block(plan.shard_of(i).size)).collect::<Result<Vec<_>, _>>()?;
     let mut session = Session::builder(scene).profile::<P>().build(&plan, shared.as_mut())?;
     let mut shards = Vec::with_capacity(blocks.len());
     for (i, b) in blocks.iter_mut().enumerate() {
@@ -149,19 +152,29 @@ pub fn drive_with<P: Profile + Send + Sync>(
     Ok(Rendered {
         size: film.size(),
         pixels: film.pixels().collect(),
-        aovs: film.aovs().to_vec(),
+        aovs: film.aovs().collect(),
+        planes: planes(film),
         counters: *session.counters(),
         error: film.error_estimate(),
         spp: all.samples,
         seconds,
         profile: P::NAME,
-        memory: [plan.session().size, plan.shard().size * shards.len()],
+        memory: [plan.session().size, (0..settings.shards).map(|i| plan.shard_of(i).size).sum()],
         stopped_early,
         threads: pool.current_num_threads().min(shards.len()),
         iterations,
         cache: used.filter(|_| options.save_cache).map(save).transpose()?,
         calibration: used.filter(|_| options.calibrate).and_then(|c| calibrate::calibrate(c, &scene)),
     })
+}
+
+/// All planes of auxiliary values that a film has.
+fn planes(film: &Film<'_>) -> Vec<(Aov, Vec<Vec<f32>>)> {
+    let of = |aov: Aov| {
+        let channels = (0..aov.channels().len()).map(|c| film.plane(aov, c).map(<[f32]>::to_vec));
+        Some((aov, channels.collect::<Option<Vec<_>>>()?)).filter(|(_, channels)| !channels.is_empty())
+    };
+    Aov::ALL.into_iter().filter_map(of).collect()
 }
 
 /// Fails unless the settings keep statistics of the scene, which a cache holds.
