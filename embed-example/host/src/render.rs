@@ -5,6 +5,7 @@ pub use crate::drive::{DriveError as RenderError, Observer, Progress, Target};
 use crate::drive::{self, Options, Rendered, drive_scene};
 use crate::image::{Channel, Picture};
 use crate::statistics::Statistics;
+use croupier::unstable::STACK_BYTES;
 use croupier::unstable::denoise::{Planes, scratch_len};
 use croupier::unstable::film::{Aov, PixelStats};
 use croupier::unstable::learn::ControlVariate;
@@ -132,6 +133,10 @@ pub struct PlanSummary {
     pub shards: u32,
     /// Bytes among all these that learning needs.
     pub learning_bytes: u64,
+    /// Bytes that grow with the picture, per pixel: of what the shards share, and of the shards together.
+    pub bytes_per_pixel: [f64; 2],
+    /// Stack that each thread needs for the core, bytes.
+    pub stack_bytes: usize,
 }
 
 impl PlanSummary {
@@ -150,6 +155,8 @@ impl PlanSummary {
             shared_bytes: plan.session().size as u64,
             shard_bytes: plan.shard().size as u64,
             shards: settings.shards,
+            bytes_per_pixel: plan.bytes_per_pixel(),
+            stack_bytes: STACK_BYTES,
             learning_bytes: bytes(&plan).saturating_sub(bytes(&Plan::new(&without_learning)?)),
         })
     }
@@ -158,10 +165,13 @@ impl PlanSummary {
 /// The memory in words.
 impl fmt::Display for PlanSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { shared_bytes, shards, shard_bytes, learning_bytes, .. } = self;
+        let Self {
+            shared_bytes, shards, shard_bytes, learning_bytes, bytes_per_pixel: [shared, own], stack_bytes, ..
+        } = self;
         write!(
             f,
-            "{shared_bytes} bytes shared + {shards} shards of {shard_bytes} bytes, of which {learning_bytes} bytes for learning"
+            "{shared_bytes} bytes shared + {shards} shards of {shard_bytes} bytes, of which {learning_bytes} bytes for learning; \
+             {shared} + {own} bytes a pixel, {stack_bytes} bytes of stack a thread"
         )
     }
 }
