@@ -81,7 +81,7 @@ pub fn render(
 ) -> Result<Run, Box<dyn Error>> {
     let scene = Scene::from_bytes(&subject.baked.bytes)?;
     let size = [subject.image.width as u32, subject.image.height as u32];
-    let settings = Settings { size, seed, shards: 16, aovs: true, ..Settings::for_scene(&scene) };
+    let settings = Settings { size, seed, shards: 16, aovs: true.into(), ..Settings::for_scene(&scene) };
     let watch = Watch { subject, outliers, start: cpu_seconds(), state: Mutex::default() };
     let pixel_estimate = variant.truth().then_some(&*subject.image.pixels);
     let options = Options { threads: 1, pixel_estimate, ..Options::new(variant.apply(settings), target) };

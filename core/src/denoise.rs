@@ -29,22 +29,14 @@ mod noisy;
 mod pixels;
 mod planes;
 mod prepare;
+mod progress;
 mod work;
 
 pub(crate) use noisy::NoisySource;
 pub use noisy::{COLOR_LIMIT, DenoiseError, Noisy, Part};
 pub use planes::Planes;
-pub(crate) use work::{Progress, Work, window_len};
-
-/// Distance of the taps at each level, pixels.
-const STEPS: [usize; 5] = [1, 2, 4, 8, 16];
-/// Standard errors of a difference at which two pixels stop belonging together at the first level. Chosen by hand
-/// after varying one number at a time, by the relMSE of seven scenes with 4 and 16 samples per pixel: no joint optimum,
-/// and not checked on other scenes.
-const MEMBERSHIP: f32 = 2.75;
-/// Factor of [`MEMBERSHIP`] from level to level: filtered neighbours share samples, which variances count as
-/// independent.
-const MEMBERSHIP_DECAY: f32 = 0.95;
+pub(crate) use progress::Progress;
+pub(crate) use work::{Work, window_len};
 
 /// Number of values of scratch memory that [`denoise`] needs for a picture of `size`: two per pixel and a window of rows;
 /// `usize::MAX` if that is not addressable.

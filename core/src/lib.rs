@@ -125,6 +125,7 @@ pub use tracer::{Budget, Shard, ShardError, StepResult};
 pub mod unstable {
     pub use crate::counters::Utilisation;
     pub use crate::memory::Layout;
+    pub use crate::plan::STACK_BYTES;
     pub use crate::record::ResumeError;
     pub use crate::scene::Effects;
     pub use crate::session::Phase;

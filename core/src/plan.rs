@@ -1,12 +1,16 @@
 //! How much memory a render needs: sizes first, so that nothing is ever asked for again.
 
-use crate::film::{DIGITS, Film};
-use crate::learn::LearnedState;
+use crate::film::{AovLayout, DIGITS, Film};
+use crate::learn::{LearnedState, PixelEstimator};
 use crate::memory::{Layout, Measure};
 use crate::record::{SessionRecord, fingerprint};
 use crate::settings::{Settings, SettingsError};
 use crate::tiles::Tiles;
 use crate::tracer::{Job, Shard, ShardError};
+
+/// Stack that [`Shard::step`] and [`Session::finish_iteration`](crate::Session::finish_iteration) need at most, with any
+/// profile and optimised code, bytes: tested by threads that have no more.
+pub const STACK_BYTES: usize = 64 << 10;
 
 /// Sizes of the memory blocks of a render.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +54,34 @@ impl Plan {
     /// there is no such shard.
     pub fn shard_of(&self, index: u32) -> Layout {
         Shard::measure(&self.job, self.job.tiles.pixels_of(index)).layout().unwrap_or(self.shard)
+    }
+
+    /// Bytes per pixel of the session's block and of the shards' blocks together, of what grows with the picture:
+    ///
+    /// | | session | shards |
+    /// |---|---|---|
+    /// | always | 40 | 40 |
+    /// | per plane of [`Settings::aovs`] | 4 | 4 |
+    /// | with [`Settings::adaptive`] or the AOV `cost` | 4 | 4 |
+    /// | with [`Settings::adaptive`] | 40.1 | |
+    /// | with an estimate of the pixels, denoised (strategies that learn, [`Settings::adaptive`]) | 20 | |
+    ///
+    /// The rest does not: statistics of the scene ([`Learning::cache_bytes`](crate::unstable::learn::Learning) in all), 2112
+    /// bytes a column for a denoised estimate, and in each shard 200 bytes per slot of [`Settings::ring`] and, if the
+    /// strategy learns, 68 bytes per record of its ledger. [`Self::session`] and [`Self::shard_of`] are exact.
+    /// [`STACK_BYTES`](crate::unstable::STACK_BYTES) of stack come to that.
+    pub fn bytes_per_pixel(&self) -> [f64; 2] {
+        let s = self.settings();
+        let planes = AovLayout::new(s.aovs).planes as f64;
+        let rays = if s.counts_rays() { 4.0 } else { 0.0 };
+        let weights = if s.adaptive { 40.0 + 8.0 / 64.0 } else { 0.0 };
+        let estimate = match s.needs(self.job.cache).pixels {
+            Some(PixelEstimator::Denoised) => 20.0,
+            Some(PixelEstimator::Blocks) => 12.0 / 64.0,
+            None => 0.0,
+        };
+        let both = 40.0 + 4.0 * planes + rays;
+        [both + weights + estimate, both]
     }
 
     /// Hash of the settings, which tells blocks of other plans.

@@ -1,6 +1,6 @@
 //! Settings of a render.
 
-use crate::film::FilmLayout;
+use crate::film::{Aov, AovSet, FilmLayout};
 use crate::learn::cache::CacheSize;
 use crate::learn::{ControlVariate, Learning, Needs};
 use crate::rrs::{Space, Strategy};
@@ -43,8 +43,9 @@ settings! {
         split_budget: u32 = 4096 =>
             "split-budget", "Samples that splitting may add to one camera sample";
         /// Denoising, that of the pixel estimate included, is better with them.
-        aovs: bool = false =>
-            "aovs", "Albedo, normal and depth of the first hits, and mean roulette factors, besides the picture";
+        /// What is not in the set costs neither memory nor time.
+        aovs: AovSet = AovSet::NONE =>
+            "aovs", "Auxiliary values besides the picture; true are those of first hits, factors, paths and cost";
         /// From the second iteration on. Every pixel gets one at least, and every iteration counts as much in all of
         /// them, so that no pixel's mean depends on its own noise.
         adaptive: bool = false =>
@@ -114,7 +115,7 @@ impl Settings {
 
     /// Are the rays of every pixel counted?
     pub(crate) fn counts_rays(&self) -> bool {
-        self.aovs || self.adaptive
+        self.aovs.has(Aov::Cost) || self.adaptive
     }
 
     /// What these settings have the render learn, with room for `cache`.

@@ -216,7 +216,7 @@ fn learning_with<P: Profile + Sync, I: Intersector + Sync>(
     Image {
         size: film.size(),
         pixels: film.pixels().collect(),
-        aovs: film.aovs().to_vec(),
+        aovs: film.aovs().collect(),
         counters: session.counters(),
         error: film.error_estimate(),
     }

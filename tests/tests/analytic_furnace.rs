@@ -132,7 +132,7 @@ fn first_hits_have_their_albedo() {
                 expected = std::array::from_fn(|c| expected[c] + lobe.weight[c]);
             }
             let scene = quad_in_white_environment(pair, false, degrees);
-            let image = render(&scene, &Settings { aovs: true, max_depth: 2, ..settings(&scene, "none") }, 16);
+            let image = render(&scene, &Settings { aovs: true.into(), max_depth: 2, ..settings(&scene, "none") }, 16);
             let hits: f64 = image.aovs.iter().map(|a| a.hits).sum();
             // what passes straight on is no hit, and the rest of a thin sheet is a mirror
             let straight = matches!(case.kind, MaterialKind::ThinDielectric | MaterialKind::Null);

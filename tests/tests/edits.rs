@@ -223,7 +223,7 @@ fn shards_may_be_put_away_between_steps() {
     let bytes = blob(&everything([24, 16]));
     let scene = Scene::from_bytes(&bytes).unwrap();
     for strategy in ["classic", "ears", "bolin-meyer"] {
-        let s = Settings { shards: 2, aovs: true, shadow_roulette: true, ..settings(&bytes, strategy) };
+        let s = Settings { shards: 2, aovs: true.into(), shadow_roulette: true, ..settings(&bytes, strategy) };
         let plan = Plan::new(&s).unwrap();
         let run = |budget: u64, put_away: bool| {
             let mut shared = AlignedBytes::zeroed(plan.session().size);
@@ -255,7 +255,7 @@ fn shards_may_be_put_away_between_steps() {
             }
             let film = session.film();
             let pixels = film.pixels().flat_map(|p| bytemuck::bytes_of(&p).to_vec());
-            let film: Vec<u8> = pixels.chain(film.aovs().iter().flat_map(|a| bytemuck::bytes_of(a).to_vec())).collect();
+            let film: Vec<u8> = pixels.chain(film.aovs().flat_map(|a| bytemuck::bytes_of(&a).to_vec())).collect();
             (film, *session.counters())
         };
         let (whole, parts) = (run(u64::MAX, false), run(37, true));

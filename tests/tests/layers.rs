@@ -49,7 +49,7 @@ fn known_imports_of_core_are_seen() {
         ("denoise/planes.rs", "film/pixel.rs", "PixelStats"),
         ("learn/cache/shared.rs", "learn/cache/tree.rs", "Tree"),
         ("learn/cache/save.rs", "learn/settings.rs", "Objective"),
-        ("learn/estimate.rs", "denoise.rs", "denoise::scratch_len"),
+        ("learn/estimate.rs", "denoise/work.rs", "window_len"),
     ] {
         let seen = found.iter().any(|i| i.from == from && i.to == to && i.names.contains(name));
         let others: Vec<_> = found.iter().filter(|i| i.from == from).map(|i| format!("{i}")).collect();

@@ -175,7 +175,7 @@ fn mirrors_and_glass_play_learned_roulette() {
         let scene = blob(&s);
         let none = Known::of(&render(&scene, &Settings { seed: 15, ..learns(&scene, "none", 3) }, 14_000));
         for strategy in ["adrrs", "ears"] {
-            let s = Settings { seed: 17, aovs: true, ..learns(&scene, strategy, 3) };
+            let s = Settings { seed: 17, aovs: true.into(), ..learns(&scene, strategy, 3) };
             let image = scheduled(&scene, &s, &doubling(7000), IN_ORDER);
             let sum = |of: fn(&PixelAov) -> f64| image.aovs.iter().map(of).sum::<f64>();
             let vertices = sum(|a| a.vertices[1]);

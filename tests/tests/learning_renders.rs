@@ -173,7 +173,7 @@ fn denoised_pictures_are_nearer_the_truth() {
 fn the_denoiser_knows_what_the_first_hits_look_like() {
     let o = RenderOptions { denoise: true, ..options("classic", 5) };
     let base = Settings::for_scene(&Scene::from_bytes(scene()).unwrap());
-    let settings = Settings { aovs: true, shards: o.settings.shards, ..base };
+    let settings = Settings { aovs: true.into(), shards: o.settings.shards, ..base };
     let driven = drive(scene(), &Options { threads: 1, ..Options::new(settings, o.target) }, &Unobserved).unwrap();
     let size = driven.size;
     let mut memory = vec![0.0; Planes::len(size, true)];

@@ -83,7 +83,7 @@ fn a_faulty_intersector_spoils_its_own_lanes_only() {
     let bytes = blob(&description);
     let scene = Scene::from_bytes(&bytes).unwrap();
     let eye = scene.camera.origin;
-    let settings = Settings { max_depth: 6, aovs: true, ..settings(&bytes, "none") };
+    let settings = Settings { max_depth: 6, aovs: true.into(), ..settings(&bytes, "none") };
     let clean = scheduled(&bytes, &settings, &[4], IN_ORDER);
     let (nan, inf) = (f32::NAN, f32::INFINITY);
     let faults = [Fault::T(nan), Fault::T(inf), Fault::T(-1.0), Fault::T(0.0)];
@@ -125,7 +125,7 @@ fn overflowing_radiance_is_counted_and_left_out() {
     s.emitters.push(Emitter::Point { position, intensity: [1e18, 1.0, 0.0] });
     let bytes = blob(&s);
     for strategy in ["none", "fixed:1.5", "classic:1"] {
-        let settings = Settings { max_depth: 3, aovs: true, ..settings(&bytes, strategy) };
+        let settings = Settings { max_depth: 3, aovs: true.into(), ..settings(&bytes, strategy) };
         let image = scheduled(&bytes, &settings, &[16, 16], IN_ORDER);
         let c = image.counters;
         assert!(all_finite(&image), "{strategy}");
@@ -259,7 +259,8 @@ fn counters_add_up() {
     for (name, scene) in [("cornell", cornell([20, 20])), ("everything", everything([20, 20]))] {
         let bytes = blob(&scene);
         for strategy in ["none", "classic:2", "fixed:2.5", "fixed:0.4", "ears"] {
-            let mut s = Settings { max_depth: 5, shards: 3, ring: 200, aovs: true, ..settings(&bytes, strategy) };
+            let mut s =
+                Settings { max_depth: 5, shards: 3, ring: 200, aovs: true.into(), ..settings(&bytes, strategy) };
             s.shadow_roulette = strategy == "ears";
             let image = scheduled(&bytes, &s, &[3, 5], IN_ORDER);
             let c: Counters = image.counters;

@@ -77,7 +77,7 @@ fn nothing_is_allocated_between_bytes_and_picture() {
 
 fn render<P: Profile>(bytes: &[u8], strategy: Strategy) {
     let scene = without_allocating(|| Scene::from_bytes(bytes)).unwrap();
-    let settings = Settings { strategy, shards: 2, aovs: true, max_depth: 6, ..Settings::for_scene(&scene) };
+    let settings = Settings { strategy, shards: 2, aovs: true.into(), max_depth: 6, ..Settings::for_scene(&scene) };
     let plan = without_allocating(|| Plan::new(&settings)).unwrap();
     let mut shared = AlignedBytes::zeroed(plan.session().size);
     let mut blocks = [(); 2].map(|_| AlignedBytes::zeroed(plan.shard().size));
@@ -115,7 +115,7 @@ fn frames_of_an_owning_renderer_allocate_nothing() {
     let bytes = blob(&everything([20, 12]));
     let scene = Scene::from_bytes(&bytes).unwrap();
     let strategy = Strategy::parse("ears").unwrap();
-    let settings = Settings { strategy, shards: 3, aovs: true, ..Settings::for_scene(&scene) };
+    let settings = Settings { strategy, shards: 3, aovs: true.into(), ..Settings::for_scene(&scene) };
     let (mut camera, material) = (*scene.camera, scene.materials[0]);
     let light = scene.lights[0];
     let renderer: Renderer = Renderer::new(bytes, &settings).unwrap();

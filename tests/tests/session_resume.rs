@@ -13,7 +13,7 @@ use croupier_tests::stats::SplitMix;
 fn cases(bytes: &[u8]) -> Vec<Settings> {
     let learning = Learning { cache_bytes: 1 << 20, subdivide_count: 300.0, ..Learning::default() };
     let of = |strategy: &str, aovs: bool, adaptive: bool| Settings {
-        aovs,
+        aovs: aovs.into(),
         adaptive,
         learning,
         shards: 2,
@@ -33,7 +33,7 @@ fn everything(session: &Session<'_, '_>) -> Vec<u8> {
     let film = session.film();
     let mut all = format!("{:?} {:?}", session.counters(), film.error_estimate()).into_bytes();
     all.extend_from_slice(bytemuck::cast_slice(&film.pixels().collect::<Vec<_>>()));
-    all.extend_from_slice(bytemuck::cast_slice(film.aovs()));
+    all.extend_from_slice(bytemuck::cast_slice(&film.aovs().collect::<Vec<_>>()));
     if let Some(cache) = session.cache() {
         let mut saved = vec![0; cache.saved_len()];
         cache.save(&mut saved).unwrap();

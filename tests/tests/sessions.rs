@@ -25,7 +25,7 @@ fn blocks_must_fit_to_the_byte() {
     let bytes = blob(&cornell([17, 9]));
     let scene = Scene::from_bytes(&bytes).unwrap();
     for aovs in [false, true] {
-        let plan = Plan::new(&Settings { aovs, shards: 3, ..settings(&bytes, "classic") }).unwrap();
+        let plan = Plan::new(&Settings { aovs: aovs.into(), shards: 3, ..settings(&bytes, "classic") }).unwrap();
         for layout in [plan.session(), plan.shard()] {
             assert_eq!((layout.align, layout.size % BLOCK_ALIGN), (BLOCK_ALIGN, 0));
         }
@@ -74,7 +74,7 @@ fn blocks_may_hold_garbage() {
         let s = settings(&bytes, strategy);
         let learning = Learning { cache_bytes: 1 << 20, subdivide_count: 300.0, ..s.learning };
         let learns = strategy != "fixed:1.5";
-        let s = Settings { aovs: true, adaptive: strategy == "ears", shadow_roulette: learns, learning, ..s };
+        let s = Settings { aovs: true.into(), adaptive: strategy == "ears", shadow_roulette: learns, learning, ..s };
         let plan = Plan::new(&s).unwrap();
         let run = |garbage: &dyn Fn(usize) -> u8| {
             let [mut shared, mut block] = [plan.session(), plan.shard()].map(|l| AlignedBytes::zeroed(l.size));
@@ -95,9 +95,11 @@ fn blocks_may_hold_garbage() {
                 saved
             });
             let leaves = session.cache().map_or(0, |c| c.leaves());
-            let bits =
-                [bytemuck::cast_slice::<_, u8>(&film.pixels().collect::<Vec<_>>()), bytemuck::cast_slice(film.aovs())]
-                    .concat();
+            let bits = [
+                bytemuck::cast_slice::<_, u8>(&film.pixels().collect::<Vec<_>>()),
+                bytemuck::cast_slice(&film.aovs().collect::<Vec<_>>()),
+            ]
+            .concat();
             (bits, saved, *session.counters(), leaves)
         };
         let clean = run(&|_| 0);
@@ -185,8 +187,8 @@ fn a_profile_without_an_effect_refuses_the_scene() {
 
 /// The pixels of a session's film as bytes.
 fn film_of(session: &Session<'_, '_, DiffuseOnly, WideBvh<'_>>) -> Vec<u8> {
-    let (pixels, aovs): (Vec<_>, _) = (session.film().pixels().collect(), session.film().aovs());
-    [bytemuck::cast_slice::<_, u8>(&pixels), bytemuck::cast_slice(aovs)].concat()
+    let (pixels, aovs): (Vec<_>, Vec<_>) = (session.film().pixels().collect(), session.film().aovs().collect());
+    [bytemuck::cast_slice::<_, u8>(&pixels), bytemuck::cast_slice(&aovs)].concat()
 }
 
 /// Killed by: a merge that starts before all shards were checked, a check of the count alone, an iteration that counts
@@ -195,7 +197,7 @@ fn film_of(session: &Session<'_, '_, DiffuseOnly, WideBvh<'_>>) -> Vec<u8> {
 fn iterations_end_with_every_shard_in_order_or_not_at_all() {
     let bytes = blob(&cornell([40, 24]));
     let scene = Scene::from_bytes(&bytes).unwrap();
-    let settings = Settings { shards: 3, aovs: true, ..settings(&bytes, "classic") };
+    let settings = Settings { shards: 3, aovs: true.into(), ..settings(&bytes, "classic") };
     let plan = Plan::new(&settings).unwrap();
     let mut shared = AlignedBytes::zeroed(plan.session().size);
     let mut blocks = [(); 3].map(|_| AlignedBytes::zeroed(plan.shard().size));
@@ -254,7 +256,9 @@ fn shards_of_another_plan_are_refused() {
     let mut shared = AlignedBytes::zeroed(plan.session().size);
     let mut session = start(&scene, &plan, shared.as_mut()).unwrap();
     session.begin_iteration(1);
-    for other in [Settings { size: [16, 8], ..base }, Settings { seed: 1, ..base }, Settings { aovs: true, ..base }] {
+    for other in
+        [Settings { size: [16, 8], ..base }, Settings { seed: 1, ..base }, Settings { aovs: true.into(), ..base }]
+    {
         let other = Plan::new(&other).unwrap();
         let mut block = AlignedBytes::zeroed(other.shard().size);
         let mut shard = Shard::new(&other, 0, block.as_mut()).unwrap();

@@ -48,6 +48,13 @@ fn texts(range: SettingRange) -> (Vec<String>, Vec<String>) {
         SettingRange::WordsOrNumber(words) => {
             (owned(&[words, &["0.25", "-1", "3e-9"]].concat()), owned(&["on", "inf", "-inf"]))
         }
+        SettingRange::Set(words) => {
+            let all = words.join(",");
+            (
+                vec!["albedo".into(), "normal,direct".into(), all, "true".into(), "false".into()],
+                owned(&["albedo,", "Depth", "1"]),
+            )
+        }
         SettingRange::Strategy => {
             let names = Strategy::TABLE.iter().map(|t| t.0).filter(|name| *name != "fixed");
             let more = ["fixed:2.5", "classic:7", "classic:5:relative", "threshold:0.01", "throughput:mean:0.1:1:3"];

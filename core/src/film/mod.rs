@@ -4,12 +4,14 @@
 //! | file | holds |
 //! |---|---|
 //! | `pixel` | sums of one pixel |
+//! | `aov` | auxiliary values: [`Aov`], their planes |
 //! | `short` | 32-bit numbers with the range of `f64` |
 //! | `error` | relMSE of a pixel, [`ErrorEstimate`] |
 //! | `independence` | correlation of an iteration's samples, measured |
 //! | `selection` | sums without the largest values |
 //! | `sqrt` | square root in f64 |
 
+mod aov;
 mod error;
 mod independence;
 mod pixel;
@@ -17,13 +19,16 @@ mod selection;
 mod short;
 mod sqrt;
 
+pub use aov::{Aov, AovSet, PixelAov};
+pub(crate) use aov::{AovLayout, AovSums};
 pub use error::{ErrorEstimate, REL_MSE_EPSILON};
+pub use pixel::PixelStats;
 pub(crate) use pixel::PixelSums;
-pub use pixel::{PixelAov, PixelStats};
 pub(crate) use selection::{DIGITS, Selection};
 pub(crate) use sqrt::SqrtNewton;
 
 use crate::memory::{Carver, Measure, MemoryError};
+use aov::AovPlanes;
 use bytemuck::{Pod, Zeroable};
 use error::relative_error;
 use independence::{Differences, Independence};
@@ -38,14 +43,18 @@ pub(crate) struct FilmLayout {
     pub weights: bool,
     /// Rays are counted.
     pub rays: bool,
-    /// There are auxiliary values.
-    pub aovs: bool,
+    /// Auxiliary values.
+    pub aovs: AovSet,
 }
 
 impl FilmLayout {
     /// Number of pixels.
     pub(crate) fn pixels(&self) -> usize {
         self.size[0] as usize * self.size[1] as usize
+    }
+
+    fn aov_values(&self) -> usize {
+        self.pixels().saturating_mul(AovLayout::new(self.aovs).planes)
     }
 
     fn if_any(&self, wanted: bool) -> usize {
@@ -60,7 +69,7 @@ pub struct Film<'m> {
     pixels: &'m mut [PixelSums],
     weights: &'m mut [PixelWeights],
     rays: &'m mut [u32],
-    aovs: &'m mut [PixelAov],
+    aovs: AovPlanes<'m>,
     scalars: FilmScalars,
 }
 
@@ -92,7 +101,7 @@ impl<'m> Film<'m> {
         m.add::<PixelSums>(l.pixels())
             .add::<PixelWeights>(l.if_any(l.weights))
             .add::<u32>(l.if_any(l.rays))
-            .add::<PixelAov>(l.if_any(l.aovs))
+            .add::<f32>(l.aov_values())
     }
 
     /// Carves without touching the memory.
@@ -102,7 +111,7 @@ impl<'m> Film<'m> {
             pixels: c.take_unset(l.pixels())?,
             weights: c.take_unset(l.if_any(l.weights))?,
             rays: c.take_unset(l.if_any(l.rays))?,
-            aovs: c.take_unset(l.if_any(l.aovs))?,
+            aovs: AovPlanes::new(AovLayout::new(l.aovs), l.pixels(), c.take_unset(l.aov_values())?),
             scalars,
         })
     }
@@ -152,15 +161,23 @@ impl<'m> Film<'m> {
         (0..self.pixels.len()).map(|i| self.pixel(i))
     }
 
-    /// Auxiliary sums of the pixels, row by row; empty if the settings do not ask for them, and before the end of the
-    /// first iteration.
-    pub fn aovs(&self) -> &[PixelAov] {
-        if self.is_filled() { self.aovs } else { &[] }
+    /// Plane `channel` of an auxiliary value ([`Aov::channels`]), one value per pixel, row by row from the top left; see
+    /// [`Aov`] for its unit and divisor. `None` if the settings do not ask for it, and before the end of the first
+    /// iteration.
+    pub fn plane(&self, aov: Aov, channel: usize) -> Option<&[f32]> {
+        self.aovs.plane(aov, channel).filter(|_| self.is_filled())
+    }
+
+    /// Auxiliary sums of the pixels, row by row; empty if the settings do not ask for any, and before the end of the first
+    /// iteration.
+    pub fn aovs(&self) -> impl ExactSizeIterator<Item = PixelAov> + DoubleEndedIterator + Clone + '_ {
+        let n = if self.aovs.is_empty() || !self.is_filled() { 0 } else { self.pixels.len() };
+        (0..n).map(|i| self.aovs.sums(i, self.samples(i)))
     }
 
     /// Adds the sums of an iteration to a pixel, each sample with weight `w` if samples have weights.
     #[inline]
-    pub(crate) fn merge(&mut self, pixel: usize, sums: &PixelSums, rays: u32, aov: Option<&PixelAov>, w: f64) {
+    pub(crate) fn merge(&mut self, pixel: usize, sums: &PixelSums, rays: u32, aov: &[f32], w: f64) {
         let fresh = !self.is_filled();
         let before = self.pixel(pixel);
         let Some(p) = self.pixels.get_mut(pixel) else { return };
@@ -183,14 +200,7 @@ impl<'m> Film<'m> {
         if let Some(r) = self.rays.get_mut(pixel) {
             *r = if fresh { rays } else { r.saturating_add(rays) };
         }
-        if let Some(a) = self.aovs.get_mut(pixel) {
-            if fresh {
-                *a = PixelAov::default();
-            }
-            if let Some(b) = aov {
-                a.merge(b);
-            }
-        }
+        self.aovs.merge(pixel, before.samples as u32, sums.samples, aov);
     }
 
     /// Ends the merge of an iteration: all its pixels were added.

@@ -1,4 +1,4 @@
-//! Sums of one pixel: of an iteration, of all of them, and of its auxiliary values.
+//! Sums of one pixel: of an iteration, and of all of them.
 
 use super::short::{long, short};
 use bytemuck::{Pod, Zeroable};
@@ -128,30 +128,9 @@ pub struct PixelStats {
     pub weight_sqr: f64,
     /// Number of camera samples, at most 2^32 - 1.
     pub samples: u64,
-    /// Number of rays traced for them, of all kinds; 0 unless the settings ask for it ([`crate::Settings::aovs`] or
+    /// Number of rays traced for them, of all kinds; 0 unless the settings ask for it ([`Aov::Cost`](super::Aov::Cost) or
     /// [`crate::Settings::adaptive`]).
     pub rays: u64,
-}
-
-/// Sums of auxiliary values of one pixel.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-pub struct PixelAov {
-    /// Sum of albedos of the first hit, seen from the camera, as roulette uses them: reflected and transmitted, 1 for
-    /// clear glass.
-    pub albedo: [f64; 3],
-    /// Sum of shading normals of the first hit, world space.
-    pub normal: [f64; 3],
-    /// Sum of distances to the first hit, world units.
-    pub depth: f64,
-    /// Number of camera samples that hit a surface.
-    pub hits: f64,
-    /// Sum of roulette factors at vertices of depth 1, 2, 3 and above.
-    pub factor: [f64; 4],
-    /// Number of those vertices.
-    pub vertices: [f64; 4],
-    /// Number of paths: camera samples and samples that splitting added.
-    pub paths: f64,
 }
 
 impl PixelStats {
@@ -172,15 +151,6 @@ impl PixelStats {
             1 => m[c] * m[c],
             _ => self.spread[c] / (w * w - w2),
         })
-    }
-}
-
-impl PixelAov {
-    pub(super) fn merge(&mut self, o: &Self) {
-        let (a, b): (&mut [f64; 17], &[f64; 17]) = (bytemuck::cast_mut(self), bytemuck::cast_ref(o));
-        for (a, b) in a.iter_mut().zip(b) {
-            *a += *b;
-        }
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::settings::{Learning, Objective, PixelEstimator};
 use crate::denoise::{NoisySource, Progress, Work, window_len};
-use crate::film::{Film, REL_MSE_EPSILON};
+use crate::film::{Aov, Film, REL_MSE_EPSILON};
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::tiles::{BlockGrid, film_index};
 use bytemuck::{Pod, Zeroable};
@@ -215,19 +215,15 @@ impl NoisySource for NoisyFilm<'_, '_> {
     }
 
     fn features(&self, at: usize) -> ([F32x8; 3], [F32x8; 3]) {
-        let aovs = self.0.aovs();
-        if aovs.is_empty() {
-            return ([F32x8::ONE; 3], [F32x8::ZERO; 3]);
-        }
-        let (mut albedo, mut normal) = ([[0.0; 8]; 3], [[0.0; 8]; 3]);
-        for i in 0..8 {
-            let Some(a) = aovs.get(at + i) else { continue };
-            let n = f64::from(self.0.samples(at + i).max(1));
-            for c in 0..3 {
-                albedo[c][i] = (a.albedo[c] / n) as f32;
-                normal[c][i] = (a.normal[c] / n) as f32;
-            }
-        }
-        (albedo.map(F32x8::new), normal.map(F32x8::new))
+        let load = |aov, unknown: f32| {
+            core::array::from_fn(|c| match self.0.plane(aov, c) {
+                Some(plane) => match plane.get(at..).and_then(|p| p.first_chunk()) {
+                    Some(a) => F32x8::new(*a),
+                    None => F32x8::from_fn(|i| plane.get(at + i).copied().unwrap_or(unknown)),
+                },
+                None => F32x8::splat(unknown),
+            })
+        };
+        (load(Aov::Albedo, 1.0), load(Aov::Normal, 0.0))
     }
 }

@@ -34,7 +34,7 @@ impl fmt::Display for Objective {
 /// Method of the pixel estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PixelEstimator {
-    /// Built-in denoiser, which uses albedo and normals if [`crate::Settings::aovs`] is on; takes about 140 bytes per
+    /// Built-in denoiser, which uses albedo and normals if they are in [`crate::Settings::aovs`]; takes 20 bytes per
     /// pixel, scratch included.
     #[default]
     Denoised,
@@ -115,7 +115,7 @@ settings! {
             SettingRange::Numbers { min: 0.0, max: 1.0 };
         pixel_estimator: PixelEstimator = PixelEstimator::Denoised =>
             "pixel-estimator",
-            "Pixel estimate for relative errors: the denoised picture (140 bytes a pixel) or means of 8x8 pixels (12 bytes)";
+            "Pixel estimate for relative errors: the denoised picture (20 bytes a pixel) or means of 8x8 pixels (12 bytes)";
         objective: Objective = Objective::Relative =>
             "objective", "Error of the picture to minimise: relative to the pixel (relMSE), or absolute (MSE)";
         norm: Norm = Norm::Mean =>

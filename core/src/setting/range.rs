@@ -1,5 +1,6 @@
 //! Values of settings, and the ranges that hold them.
 
+use crate::film::AovSet;
 use crate::rrs::Strategy;
 use core::fmt;
 
@@ -43,6 +44,8 @@ pub enum SettingRange {
     Words(&'static [&'static str]),
     /// One of these words, or a finite number.
     WordsOrNumber(&'static [&'static str]),
+    /// Lists of these words with commas between, true or false.
+    Set(&'static [&'static str]),
     /// Roulette strategies with parameters that are numbers.
     Strategy,
 }
@@ -52,7 +55,7 @@ impl SettingRange {
     pub fn contains(&self, value: SettingValue) -> bool {
         use SettingValue as V;
         match (*self, value) {
-            (Self::Flag, V::Flag(_)) | (Self::Bytes, V::Bytes(_)) => true,
+            (Self::Flag, V::Flag(_)) | (Self::Bytes, V::Bytes(_)) | (Self::Set(_), V::Aovs(_)) => true,
             (Self::Integers { min, max }, V::Integer(x)) => (min..=max).contains(&x),
             (Self::Numbers { min, max }, V::Number(x)) => (min..=max).contains(&x),
             (Self::Positive, V::Number(x)) => x > 0.0 && x.is_finite(),
@@ -102,6 +105,10 @@ impl fmt::Display for SettingRange {
                 list(f, words, ", ")?;
                 f.write_str(" or a finite number")
             }
+            Self::Set(words) => {
+                f.write_str("true, false or some of ")?;
+                list(f, words, ",")
+            }
             Self::Strategy => {
                 f.write_str("a roulette strategy with its options: ")?;
                 Strategy::TABLE
@@ -139,6 +146,8 @@ pub enum SettingValue {
     Size([u32; 2]),
     /// A name.
     Word(&'static str),
+    /// Auxiliary values.
+    Aovs(AovSet),
     /// A roulette strategy with its options.
     Strategy(Strategy),
 }
@@ -159,6 +168,7 @@ impl fmt::Display for SettingValue {
             Self::Pair([a, b]) => write!(f, "{a}:{b}"),
             Self::Size([w, h]) => write!(f, "{w}x{h}"),
             Self::Word(x) => x.fmt(f),
+            Self::Aovs(x) => x.fmt(f),
             Self::Strategy(x) => x.fmt(f),
         }
     }

@@ -1,6 +1,7 @@
 //! Types of values that settings can have, and how they are written.
 
 use super::range::{BYTE_SUFFIXES, SettingRange, SettingValue};
+use crate::film::{Aov, AovSet};
 use crate::rrs::{Norm, ParseError, Strategy};
 
 /// A type of values that settings can have.
@@ -37,6 +38,20 @@ impl Value for bool {
 
     fn value(self) -> SettingValue {
         SettingValue::Flag(self)
+    }
+}
+
+/// `albedo,depth`, `true`, `false`.
+impl Value for AovSet {
+    const PLACEHOLDER: &'static str = "true|false|LIST";
+    const RANGE: SettingRange = SettingRange::Set(Aov::NAMES);
+
+    fn parse(text: &str) -> Result<Self, Unreadable> {
+        Self::from_text(text).ok_or(Unreadable::Text)
+    }
+
+    fn value(self) -> SettingValue {
+        SettingValue::Aovs(self)
     }
 }
 

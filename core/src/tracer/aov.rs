@@ -1,17 +1,32 @@
-//! Auxiliary values of pixels: what camera rays hit first, and the factors of roulette along the paths.
+//! Auxiliary values of pixels: what camera rays hit first, the factors of roulette along the paths, parts of the radiance.
 
-use super::book::Bookkeeping;
+use super::book::{Beyond, Bookkeeping};
 use super::path::Path8;
+use crate::film::{Aov, AovSet};
 use croupier_simd::{F32x8, Mask8, Vec3x8};
 
 impl Bookkeeping<'_> {
-    /// Does the caller want auxiliary values?
-    pub(super) fn wants_aovs(&self) -> bool {
-        !self.aovs.is_empty()
+    /// Does the caller want to know of first hits?
+    pub(super) fn wants_first_hits(&self) -> bool {
+        self.aovs.layout.any(AovSet::FIRST_HITS)
     }
 
-    /// Adds distance, shading normal and albedo of the first hits in the lanes of `first`.
-    pub(super) fn record_first_hit(&mut self, first: Mask8, path: &Path8, t: F32x8, normal: Vec3x8, albedo: Vec3x8) {
+    /// Does the caller want their albedos?
+    pub(super) fn wants_albedo(&self) -> bool {
+        self.aovs.layout.first(Aov::Albedo).is_some()
+    }
+
+    /// Adds distance, shading normal, albedo and material of the first hits in the lanes of `first`. Objects are to be
+    /// recorded here too, beside the material, when hits tell them.
+    pub(super) fn record_first_hit(
+        &mut self,
+        first: Mask8,
+        path: &Path8,
+        t: F32x8,
+        normal: Vec3x8,
+        albedo: Vec3x8,
+        material: &[u32; 8],
+    ) {
         let root = path.root.to_array();
         // a host's intersector may answer anything
         let good = first & t.is_finite() & normal.is_finite() & albedo.is_finite();
@@ -19,31 +34,50 @@ impl Bookkeeping<'_> {
             self.count_non_finite(root[i]);
         }
         for i in good.lanes() {
-            let pixel = self.roots.get(root[i]).target.pixel as usize;
-            let Some(aov) = self.aovs.get_mut(pixel) else { continue };
-            let (albedo, normal) = (albedo.lane(i), normal.lane(i));
-            for c in 0..3 {
-                aov.albedo[c] += f64::from(albedo[c]);
-                aov.normal[c] += f64::from(normal[c]);
+            let target = self.roots.get(root[i]).target;
+            let pixel = target.pixel();
+            self.aovs.add(pixel, Aov::Albedo, albedo.lane(i));
+            self.aovs.add(pixel, Aov::Normal, normal.lane(i));
+            self.aovs.add(pixel, Aov::Depth, [t.lane(i)]);
+            self.aovs.add(pixel, Aov::Alpha, [1.0]);
+            if target.is_first()
+                && let Some(id) = self.aovs.get(pixel, Aov::Material, 0)
+            {
+                *id = material[i] as i32 as f32;
             }
-            aov.depth += f64::from(t.lane(i));
-            aov.hits += 1.0;
         }
     }
 
     /// Adds the factors `s` of the vertices in the lanes of `active`.
     pub(super) fn record_factors(&mut self, active: Mask8, path: &Path8, s: F32x8) {
-        if !self.wants_aovs() {
+        if self.aovs.layout.first(Aov::Factors).is_none() {
             return;
         }
         let (s, root, depth) = (s.to_array(), path.root.to_array(), path.depth.to_array());
         for i in active.lanes() {
-            let pixel = self.roots.get(root[i]).target.pixel as usize;
-            if let Some(aov) = self.aovs.get_mut(pixel) {
-                let d = (depth[i].clamp(1, 4) - 1) as usize;
-                aov.factor[d] += f64::from(s[i]);
-                aov.vertices[d] += 1.0;
+            let pixel = self.roots.get(root[i]).target.pixel();
+            let d = (depth[i].clamp(1, 4) - 1) as usize;
+            for (channel, x) in [(d, s[i]), (4 + d, 1.0)] {
+                if let Some(sum) = self.aovs.get(pixel, Aov::Factors, channel) {
+                    *sum += x;
+                }
             }
+        }
+    }
+
+    /// Adds radiance to the part of the picture that it belongs to, by how often the light scattered. What a control
+    /// variate adds is 0 on average, and counts as indirect.
+    #[cold]
+    pub(super) fn record_light(&mut self, good: Mask8, path: &Path8, radiance: Vec3x8, beyond: Beyond) {
+        let (root, depth) = (path.root.to_array(), path.depth.to_array());
+        for i in good.lanes() {
+            let pixel = self.roots.get(root[i]).target.pixel();
+            let aov = match (beyond, depth[i]) {
+                (Beyond::Ray, 0..=1) => Aov::Emission,
+                (Beyond::Ray, 2) | (Beyond::ShadowRay, 0..=1) => Aov::Direct,
+                _ => Aov::Indirect,
+            };
+            self.aovs.add(pixel, aov, radiance.lane(i));
         }
     }
 }

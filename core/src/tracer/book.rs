@@ -17,7 +17,7 @@ use super::root::{PixelTarget, Roots};
 use super::vertex::PathVertex;
 use crate::cost::MEDIUM_STEPS_PER_RAY;
 use crate::counters::Counters;
-use crate::film::{PixelAov, PixelSums, REL_MSE_EPSILON};
+use crate::film::{Aov, AovLayout, AovSet, AovSums, PixelSums, REL_MSE_EPSILON};
 use crate::learn::LearnedState;
 use crate::learn::cache::NO_BIN;
 use crate::learn::cache::Training;
@@ -26,6 +26,17 @@ use crate::rrs::Norm;
 use crate::settings::{MAX_PATH_LENGTH, Settings};
 use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+
+/// Segments of a contribution's path behind those of the path that it is added to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Beyond {
+    /// None: the ray met the light.
+    Ray,
+    /// A shadow ray.
+    ShadowRay,
+    /// Any number: what is expected of light that scatters further on.
+    Unknown,
+}
 
 /// All that a shard keeps beyond a packet, but for the vertices that wait.
 #[derive(Debug)]
@@ -37,7 +48,7 @@ pub(crate) struct Bookkeeping<'m> {
     pixels: &'m mut [PixelSums],
     /// Rays of those pixels, if anything needs them.
     rays: &'m mut [u32],
-    pub(super) aovs: &'m mut [PixelAov],
+    pub(super) aovs: AovSums<'m>,
     /// Number of pixels begun; what memory holds of others is of no iteration.
     begun: usize,
     pub(crate) counters: Counters,
@@ -77,22 +88,21 @@ impl<'m> Bookkeeping<'m> {
         let s = &job.settings;
         let m = Ledger::measure(Roots::measure(m, roots_capacity(s)), ledger_capacity(s));
         let m = job.cache.map_or(m, |size| Training::measure(m, size));
-        m.add::<PixelSums>(pixels).add::<u32>(if s.counts_rays() { pixels } else { 0 }).add::<PixelAov>(if s.aovs {
-            pixels
-        } else {
-            0
-        })
+        m.add::<PixelSums>(pixels)
+            .add::<u32>(if s.counts_rays() { pixels } else { 0 })
+            .add::<f32>(pixels.saturating_mul(AovLayout::new(s.aovs).planes))
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, job: &Job, pixels: usize) -> Result<Self, MemoryError> {
         let s = &job.settings;
+        let aovs = AovLayout::new(s.aovs);
         Ok(Self {
             roots: Roots::carve(c, roots_capacity(s))?,
             ledger: Ledger::carve(c, ledger_capacity(s))?,
             training: job.cache.map(|size| Training::carve(c, size)).transpose()?,
             pixels: c.take_unset(pixels)?,
             rays: c.take_unset(if s.counts_rays() { pixels } else { 0 })?,
-            aovs: c.take_unset(if s.aovs { pixels } else { 0 })?,
+            aovs: AovSums::new(aovs, c.take_unset(pixels.saturating_mul(aovs.planes))?),
             begun: 0,
             counters: Counters::default(),
             outlier: f32::INFINITY,
@@ -163,17 +173,15 @@ impl<'m> Bookkeeping<'m> {
         if let Some(r) = self.rays.get_mut(slot) {
             *r = 0;
         }
-        if let Some(a) = self.aovs.get_mut(slot) {
-            *a = PixelAov::default();
-        }
+        self.aovs.clear(slot);
         self.begun = slot + 1;
     }
 
     /// Sums, rays and auxiliary sums of pixel `slot` in this iteration; none before it begins.
-    pub(super) fn pixel(&self, slot: usize) -> (PixelSums, u32, Option<&PixelAov>) {
+    pub(super) fn pixel(&self, slot: usize) -> (PixelSums, u32, &[f32]) {
         match self.pixels.get(slot) {
-            Some(p) if slot < self.begun => (*p, self.rays.get(slot).copied().unwrap_or(0), self.aovs.get(slot)),
-            _ => (PixelSums::default(), 0, None),
+            Some(p) if slot < self.begun => (*p, self.rays.get(slot).copied().unwrap_or(0), self.aovs.row(slot)),
+            _ => (PixelSums::default(), 0, &[]),
         }
     }
 
@@ -217,9 +225,9 @@ impl<'m> Bookkeeping<'m> {
         U32x8::new(out)
     }
 
-    /// Adds radiance to the roots and ledger records of the lanes in `mask`. What is not finite is counted, not added.
+    /// Adds radiance to the roots and ledger records of the lanes in `mask`; `beyond` says by which part of the path. What is not finite is counted, not added.
     #[inline]
-    pub(super) fn accumulate(&mut self, mask: Mask8, path: &Path8, found: &Contribution8) {
+    pub(super) fn accumulate(&mut self, mask: Mask8, path: &Path8, found: &Contribution8, beyond: Beyond) {
         let radiance = found.pixel;
         let mask = mask & radiance.abs().max_component().gt(F32x8::ZERO) | mask.and_not(radiance.is_finite());
         if mask.none() {
@@ -236,6 +244,9 @@ impl<'m> Bookkeeping<'m> {
         }
         for i in mask.and_not(good).lanes() {
             self.count_non_finite(root[i]);
+        }
+        if self.aovs.layout.any(AovSet::LIGHT) {
+            self.record_light(good, path, radiance, beyond);
         }
         let logged = mask.and_not(path.record.eq(U32x8::splat(NO_RECORD)));
         if logged.any() {
@@ -367,15 +378,13 @@ impl<'m> Bookkeeping<'m> {
         self.close_record(record);
         if let Some(done) = self.roots.close(root) {
             self.counters.camera_samples += 1;
-            if let Some(p) = self.pixels.get_mut(done.target.pixel as usize) {
+            if let Some(p) = self.pixels.get_mut(done.target.pixel()) {
                 p.add(done.radiance);
             }
-            if let Some(r) = self.rays.get_mut(done.target.pixel as usize) {
+            if let Some(r) = self.rays.get_mut(done.target.pixel()) {
                 *r = r.saturating_add(done.rays);
             }
-            if let Some(a) = self.aovs.get_mut(done.target.pixel as usize) {
-                a.paths += 1.0 + f64::from(done.splits);
-            }
+            self.aovs.add(done.target.pixel(), Aov::Paths, [1.0 + done.splits as f32]);
         }
     }
 

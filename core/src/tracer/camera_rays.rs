@@ -123,7 +123,7 @@ pub(crate) fn camera_rays<W: World>(
             book.begin_pixel(slot);
         }
         let (error_weight, share) = learned.error_weight(film);
-        let target = PixelTarget { error_weight, share, film, pixel: slot };
+        let target = PixelTarget::numbered(error_weight, share, film, slot, s);
         let Some(opened) = book.open_camera_sample(target, s < settings.learning.samples) else { break };
         [x[lanes], y[lanes]] = p;
         pixel[lanes] = film;

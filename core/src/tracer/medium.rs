@@ -1,6 +1,6 @@
 //! Stage `medium`: what befalls rays on their way through media, before they reach the surfaces that they hit.
 
-use super::book::Bookkeeping;
+use super::book::{Beyond, Bookkeeping};
 use super::class::PHASE_KIND;
 use super::packets::{Contribution8, RayState8};
 use super::passing::wait;
@@ -47,7 +47,7 @@ pub(crate) fn cross_media<W: World>(
     let flight = media::fly(W::EFFECTS, world.scene(), medium, &segment, rays.beta, rays.key, inside);
     book.charge_medium(inside, &rays.path, flight.steps, flight.roulettes);
     let found = Contribution8 { pixel: rays.beta * flight.emitted, local: rays.weight * flight.emitted };
-    book.accumulate(inside, &rays.path, &found);
+    book.accumulate(inside, &rays.path, &found, Beyond::Ray);
     rays.beta = Vec3x8::select(inside, rays.beta * flight.weight, rays.beta);
     rays.weight = Vec3x8::select(inside, rays.weight * flight.weight, rays.weight);
     let goes_on = rays.beta.any_positive() & rays.beta.is_finite();

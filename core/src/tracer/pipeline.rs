@@ -16,6 +16,7 @@
 //! Stages compute packets from packets and read nothing but the [`World`]; what outlives the packet goes to the books
 //! ([`Bookkeeping`](super::book::Bookkeeping)) or, as waiting vertices, to the [`Ring`](super::ring::Ring).
 
+use super::book::Beyond;
 use super::camera_rays::camera_rays;
 use super::emission;
 use super::job::Job;
@@ -64,7 +65,7 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
                 if let Some(mut shadow) = shadow_rays(world, book, &samples, &light, &scattered.nee, roulette) {
                     let visible = occlude(world, book, &samples, &mut shadow);
                     book.learn_shadow_rays(&samples, &shadow, visible);
-                    book.accumulate(visible, &shadow.path, &shadow.found);
+                    book.accumulate(visible, &shadow.path, &shadow.found, Beyond::ShadowRay);
                 }
             }
             book.break_lanes(scattered.broken, &samples.path);
@@ -85,7 +86,7 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
     let escaped = rays.active.and_not(hit.hit | collision.mask);
     if escaped.any() {
         if let Some(found) = emission::environment(world, &rays, escaped) {
-            book.accumulate(escaped, &rays.path, &found);
+            book.accumulate(escaped, &rays.path, &found, Beyond::Ray);
         }
         book.close_lanes(escaped, &rays.path);
     }
@@ -99,14 +100,14 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
     }
     book.counters.surface.count(hit.mask.count());
     if let Some(found) = emission::area(world, &rays, &hit, point.ng) {
-        book.accumulate(hit.emitters(), &rays.path, &found);
+        book.accumulate(hit.emitters(), &rays.path, &found, Beyond::Ray);
     }
 
     // segments may end here, and camera samples are looked at all the same
     let met = hit.mask | collision.mask;
     let alive = met & rays.path.depth.lt(U32x8::splat(world.max_depth()));
     let first = met & rays.path.depth.eq(U32x8::splat(1));
-    let wants_aovs = book.wants_aovs() && first.any();
+    let wants_aovs = book.wants_first_hits() && first.any();
     let may_pass = may_pass::<W>(world.scene());
     if alive.none() && !wants_aovs && !may_pass {
         book.count_longest(settings, met);
@@ -127,7 +128,7 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
     }
     let needs_albedo = settings.strategy.needs_albedo();
     let first = first & met;
-    let seen = if wants_aovs { first & arrival.active } else { Mask8::NONE };
+    let seen = if wants_aovs && book.wants_albedo() { first & arrival.active } else { Mask8::NONE };
     arrival.active &= alive;
     let albedo = albedo(world, &arrival, seen | if needs_albedo { arrival.active } else { Mask8::NONE });
     if wants_aovs {
@@ -136,7 +137,11 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
         } else {
             hit.t
         };
-        book.record_first_hit(first, &rays.path, t, arrival.vertex.ns, albedo);
+        let mut material = hit.material;
+        for i in collision.mask.lanes() {
+            material[i] = u32::MAX;
+        }
+        book.record_first_hit(first, &rays.path, t, arrival.vertex.ns, albedo, &material);
     }
     arrival.albedo = if needs_albedo { albedo } else { Vec3x8::ZERO };
     book.close_lanes(met.and_not(arrival.active), &rays.path);

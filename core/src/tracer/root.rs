@@ -34,8 +34,30 @@ pub(crate) struct PixelTarget {
     pub share: f32,
     /// Film index.
     pub film: u32,
-    /// Pixel slot of the shard.
-    pub pixel: u32,
+    /// Number of the pixel in the shard, below 2^31, and in the highest bit whether the sample is its first of the
+    /// iteration; see [`Self::numbered`].
+    pixel: u32,
+}
+
+/// Bit of a pixel's first sample.
+const FIRST: u32 = 1 << 31;
+
+impl PixelTarget {
+    /// The target of sample `sample`, of this iteration, of pixel `pixel` of the shard.
+    pub(crate) fn numbered(error_weight: [f32; 3], share: f32, film: u32, pixel: u32, sample: u32) -> Self {
+        Self { error_weight, share, film, pixel: pixel & !FIRST | if sample == 0 { FIRST } else { 0 } }
+    }
+
+    /// Number of the pixel in the shard.
+    #[inline(always)]
+    pub(crate) fn pixel(&self) -> usize {
+        (self.pixel & !FIRST) as usize
+    }
+
+    /// Is it the pixel's first sample of the iteration?
+    pub(crate) fn is_first(&self) -> bool {
+        self.pixel & FIRST != 0
+    }
 }
 
 /// The pixels of eight camera samples.

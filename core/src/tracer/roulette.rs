@@ -2,7 +2,7 @@
 //! with n samples) are the packet's roulette masks; one comb rounds the whole packet, another decides which samples draw
 //! light samples.
 
-use super::book::Bookkeeping;
+use super::book::{Beyond, Bookkeeping};
 use super::cache_key::cache_lookup;
 use super::packets::Contribution8;
 use super::ring::RESERVE;
@@ -129,7 +129,7 @@ pub(crate) fn roulette<W: World>(
         // what the samples rounded away, or added, is expected to have given (Szecsi et al. 2003)
         let rounded = F32x8::ONE - F32x8::from_fn(|i| n[i] as f32) / s;
         let found = Contribution8 { pixel: v.beta * c * rounded, local: a.weight * c * rounded };
-        book.accumulate(active, &v.path, &found);
+        book.accumulate(active, &v.path, &found, Beyond::Unknown);
     }
     if let Some(k) = &key {
         book.arrive(active, &v.path, k.bin, k.scale, a.weight / s);

@@ -5,7 +5,7 @@ use super::job::Job;
 use super::pipeline::turn;
 use super::state::{State, StateRecord};
 use crate::counters::Counters;
-use crate::film::{PixelAov, PixelSums};
+use crate::film::PixelSums;
 use crate::learn::cache::Training;
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::settings::Settings;
@@ -248,7 +248,7 @@ impl<'m> Shard<'m> {
         &self,
         at: &mut ShardCursor,
         limit: u64,
-        mut f: impl FnMut(usize, &PixelSums, u32, Option<&PixelAov>),
+        mut f: impl FnMut(usize, &PixelSums, u32, &[f32]),
     ) -> (u64, bool) {
         let tiles = &self.job.tiles;
         let mut visited = 0;

@@ -2,6 +2,7 @@
 
 extern crate std;
 
+use super::book::Beyond;
 use super::cache_key::cache_lookup;
 use super::camera_rays::{CameraCursor, camera_rays};
 use super::class::PacketClass;
@@ -22,6 +23,7 @@ use super::shard::Shard;
 use super::state::State;
 use super::trace::trace;
 use super::vertex::PathVertex8;
+use crate::film::{Aov, AovSet};
 use crate::geometry::{Ray8, SurfaceHit8};
 use crate::learn::cache::NO_BIN;
 use crate::light::power_heuristic;
@@ -64,7 +66,7 @@ fn strategy(name: &str) -> impl FnOnce(&mut Settings) {
 fn paths(shard: &mut Shard<'_>, depth: u32) -> Path8 {
     let root = U32x8::from_fn(|i| {
         shard.state.book.begin_pixel(i as u32);
-        let target = PixelTarget { error_weight: [1.0; 3], share: 1.0, film: i as u32, pixel: i as u32 };
+        let target = PixelTarget::numbered([1.0; 3], 1.0, i as u32, i as u32, 0);
         shard.state.book.open_camera_sample(target, false).expect("a root").0
     });
     Path8 { root, record: U32x8::splat(NO_RECORD), depth: U32x8::splat(depth) }
@@ -414,22 +416,26 @@ fn hits_become_vertices() {
 #[test]
 fn auxiliary_values_go_to_their_pixels() {
     world(
-        |_| (),
+        |s| s.aovs = AovSet::STANDARD.with(AovSet::of(&[Aov::Material])),
         |world, shard| {
             let (rays, hit, a) = arrive(world, shard, 1);
             let t = F32x8::from_fn(|i| if i == 1 { f32::NAN } else { hit.t.lane(i) });
             let first = Mask8::from_bits(0b0000_0111);
-            shard.state.book.record_first_hit(first, &rays.path, t, a.vertex.ns, Vec3x8::from_fn(|_| FLOOR));
-            let [good, bad] = [0, 1].map(|pixel: usize| shard.state.book.aovs[pixel]);
-            assert_eq!((good.hits, good.depth, good.normal), (1.0, 0.5, [0.0, 0.0, 1.0]));
-            assert_eq!((good.albedo, bad.hits), (FLOOR.map(f64::from), 0.0));
+            let floor = Vec3x8::from_fn(|_| FLOOR);
+            shard.state.book.record_first_hit(first, &rays.path, t, a.vertex.ns, floor, &[7; 8]);
+            let mut of =
+                |pixel: usize, aov: Aov, channel: usize| *shard.state.book.aovs.get(pixel, aov, channel).unwrap();
+            assert_eq!((of(0, Aov::Alpha, 0), of(0, Aov::Depth, 0), of(0, Aov::Material, 0)), (1.0, 0.5, 7.0));
+            assert_eq!([0, 1, 2].map(|c| of(0, Aov::Normal, c)), [0.0, 0.0, 1.0]);
+            assert_eq!([0, 1, 2].map(|c| of(0, Aov::Albedo, c)), FLOOR);
+            assert_eq!((of(1, Aov::Alpha, 0), of(1, Aov::Material, 0)), (0.0, -1.0));
             assert_eq!((shard.state.book.counters.non_finite, shard.state.book.counters.first_non_finite), (1, 2));
             let path = Path8 { depth: U32x8::new([1, 2, 3, 4, 5, 9, 1, 1]), ..rays.path };
             shard.state.book.record_factors(Mask8::from_bits(0b0011_1111), &path, F32x8::splat(2.0));
-            let column =
-                [0, 1, 2, 3, 4, 5].map(|p: usize| shard.state.book.aovs[p].factor.iter().position(|f| *f == 2.0));
+            let mut of = |p: usize, c: usize| *shard.state.book.aovs.get(p, Aov::Factors, c).unwrap();
+            let column = [0, 1, 2, 3, 4, 5].map(|p| (0..4).find(|c| of(p, *c) == 2.0));
             assert_eq!(column, [Some(0), Some(1), Some(2), Some(3), Some(3), Some(3)]);
-            assert_eq!(shard.state.book.aovs[6].vertices, [0.0; 4]);
+            assert_eq!([4, 5, 6, 7].map(|c| of(6, c)), [0.0; 4]);
         },
     );
 }
@@ -528,8 +534,8 @@ fn books_close_into_pixels() {
             let path = paths(shard, 3);
             let x = Vec3x8::from_fn(|i| [i as f32, 1.0, if i == 5 { f32::INFINITY } else { 0.5 }]);
             let found = Contribution8 { pixel: x, local: x };
-            shard.state.book.accumulate(Mask8::from_bits(0b0011_0110), &path, &found);
-            shard.state.book.accumulate(Mask8::from_bits(0b0000_0010), &path, &found);
+            shard.state.book.accumulate(Mask8::from_bits(0b0011_0110), &path, &found, Beyond::Ray);
+            shard.state.book.accumulate(Mask8::from_bits(0b0000_0010), &path, &found, Beyond::Ray);
             shard.state.book.close_lanes(Mask8::all_lanes(), &path);
             let sums = [0, 1, 2, 5].map(|p| shard.state.book.pixel(p).0).map(|p| (p.sum, p.samples));
             assert_eq!(sums, [([0.0; 3], 1), ([2.0, 2.0, 1.0], 1), ([2.0, 1.0, 0.5], 1), ([0.0; 3], 1)]);

@@ -16,10 +16,13 @@ use crate::blob::AlignedBytes;
 use crate::checkpoint::{self, Schedule};
 use croupier::unstable::Phase;
 use croupier::unstable::accel::Intersector;
+use croupier::unstable::film::Aov;
 use croupier::unstable::learn::cache::{Cache, CacheError};
 use croupier::unstable::profile::{AnyProfile, Profile, ProfileVisitor};
 use croupier::unstable::rrs::Space;
-use croupier::{Budget, Counters, ErrorEstimate, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
+use croupier::{
+    Budget, Counters, ErrorEstimate, Film, Plan, Scene, Session, SessionError, Settings, Shard, StepResult,
+};
 use rayon::prelude::*;
 use schedule::Work;
 use std::path::Path;
@@ -108,7 +111,7 @@ pub fn drive_with<P: Profile + Send + Sync>(
     let plan = Plan::new(settings)?;
     let block = |size: usize| AlignedBytes::try_zeroed(size).ok_or(DriveError::Memory(size));
     let mut shared = block(plan.session().size)?;
-    let mut blocks = (0..settings.shards).map(|_| block(plan.shard().size)).collect::<Result<Vec<_>, _>>()?;
+    let mut blocks = (0..settings.shards).map(|i| block(plan.shard_of(i).size)).collect::<Result<Vec<_>, _>>()?;
     let saved = options.resume.map(|path| checkpoint::read(path, scene.hash, settings, shared.as_mut())).transpose()?;
     let builder = || Session::builder(scene).profile::<P>();
     let mut session = match &saved {
@@ -188,13 +191,14 @@ pub fn drive_with<P: Profile + Send + Sync>(
     Ok(Rendered {
         size: film.size(),
         pixels: film.pixels().collect(),
-        aovs: film.aovs().to_vec(),
+        aovs: film.aovs().collect(),
+        planes: planes(film),
         counters: *session.counters(),
         error: film.error_estimate(),
         spp: all.samples,
         seconds,
         profile: P::NAME,
-        memory: [plan.session().size, plan.shard().size * shards.len()],
+        memory: [plan.session().size, (0..settings.shards).map(|i| plan.shard_of(i).size).sum()],
         stopped_early,
         checkpoint_error: saver.error,
         threads: pool.current_num_threads().min(shards.len()),
@@ -208,6 +212,15 @@ pub fn drive_with<P: Profile + Send + Sync>(
 fn threads(wanted: usize, shards: usize) -> usize {
     let wanted = if wanted == 0 { std::thread::available_parallelism().map_or(1, usize::from) } else { wanted };
     wanted.min(shards).max(1)
+}
+
+/// All planes of auxiliary values that a film has.
+fn planes(film: &Film<'_>) -> Vec<(Aov, Vec<Vec<f32>>)> {
+    let of = |aov: Aov| {
+        let channels = (0..aov.channels().len()).map(|c| film.plane(aov, c).map(<[f32]>::to_vec));
+        Some((aov, channels.collect::<Option<Vec<_>>>()?)).filter(|(_, channels)| !channels.is_empty())
+    };
+    Aov::ALL.into_iter().filter_map(of).collect()
 }
 
 /// Fails unless the settings keep statistics of the scene, which a cache holds.

@@ -219,7 +219,8 @@ impl Picture {
         Ok(picture)
     }
 
-    fn layer_mut(&mut self, name: String) -> &mut Layer {
+    /// The layer of this name, added if there is none.
+    pub(crate) fn layer_mut(&mut self, name: String) -> &mut Layer {
         let at = self.layers.iter().position(|l| l.name == name).unwrap_or_else(|| {
             self.layers.push(Layer { name, channels: Vec::new() });
             self.layers.len() - 1

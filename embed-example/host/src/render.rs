@@ -4,10 +4,11 @@ pub use crate::drive::{DriveError as RenderError, Observer, Progress, Target};
 
 use crate::checkpoint::Schedule;
 use crate::drive::{self, Options, Rendered, drive_scene};
-use crate::image::Picture;
+use crate::image::{Channel, Picture};
 use crate::statistics::Statistics;
+use croupier::unstable::STACK_BYTES;
 use croupier::unstable::denoise::{Planes, scratch_len};
-use croupier::unstable::film::{PixelAov, PixelStats};
+use croupier::unstable::film::{Aov, PixelStats};
 use croupier::unstable::learn::ControlVariate;
 use croupier::unstable::learn::cache::CacheSize;
 use croupier::unstable::profile::AnyProfile;
@@ -49,7 +50,7 @@ impl RenderOptions {
         let settings = Settings {
             strategy,
             shards: 16,
-            aovs: true,
+            aovs: true.into(),
             shadow_roulette: strategy.is_efficiency_aware(),
             ..Settings::default()
         };
@@ -142,6 +143,10 @@ pub struct PlanSummary {
     pub shards: u32,
     /// Bytes among all these that learning needs.
     pub learning_bytes: u64,
+    /// Bytes that grow with the picture, per pixel: of what the shards share, and of the shards together.
+    pub bytes_per_pixel: [f64; 2],
+    /// Stack that each thread needs for the core, bytes.
+    pub stack_bytes: usize,
 }
 
 impl PlanSummary {
@@ -160,6 +165,8 @@ impl PlanSummary {
             shared_bytes: plan.session().size as u64,
             shard_bytes: plan.shard().size as u64,
             shards: settings.shards,
+            bytes_per_pixel: plan.bytes_per_pixel(),
+            stack_bytes: STACK_BYTES,
             learning_bytes: bytes(&plan).saturating_sub(bytes(&Plan::new(&without_learning)?)),
         })
     }
@@ -168,10 +175,13 @@ impl PlanSummary {
 /// The memory in words.
 impl fmt::Display for PlanSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { shared_bytes, shards, shard_bytes, learning_bytes, .. } = self;
+        let Self {
+            shared_bytes, shards, shard_bytes, learning_bytes, bytes_per_pixel: [shared, own], stack_bytes, ..
+        } = self;
         write!(
             f,
-            "{shared_bytes} bytes shared + {shards} shards of {shard_bytes} bytes, of which {learning_bytes} bytes for learning"
+            "{shared_bytes} bytes shared + {shards} shards of {shard_bytes} bytes, of which {learning_bytes} bytes for learning; \
+             {shared} + {own} bytes a pixel, {stack_bytes} bytes of stack a thread"
         )
     }
 }
@@ -257,24 +267,41 @@ fn picture(r: &Rendered) -> Picture {
     let mut picture = Picture::new(r.size[0] as usize, r.size[1] as usize);
     picture.add3("", RGB, &r.image());
     picture.add3("stderr", RGB, &r.stderr());
-    let per_sample = |p: &PixelStats| (p.rays as f64 / p.samples.max(1) as f64) as f32;
-    picture.add1("cost", "rays", &r.pixels.iter().map(per_sample).collect::<Vec<_>>());
+    if r.pixels.iter().any(|p| p.rays > 0) {
+        let per_sample = |p: &PixelStats| (p.rays as f64 / p.samples.max(1) as f64) as f32;
+        picture.add1("cost", "rays", &r.pixels.iter().map(per_sample).collect::<Vec<_>>());
+    }
     picture.add1("samples", "N", &r.pixels.iter().map(|p| p.samples as f32).collect::<Vec<_>>());
-    if !r.aovs.is_empty() {
-        let per_hit = |a: &PixelAov, x: f64| (x / a.hits.max(1.0)) as f32;
-        let albedo: Vec<_> = r.aovs.iter().map(|a| a.albedo.map(|x| per_hit(a, x))).collect();
-        picture.add3("albedo", RGB, &albedo);
-        let normal: Vec<_> = r.aovs.iter().map(|a| a.normal.map(|x| per_hit(a, x))).collect();
-        picture.add3("normal", ["X", "Y", "Z"], &normal);
-        picture.add1("depth", "Z", &r.aovs.iter().map(|a| per_hit(a, a.depth)).collect::<Vec<_>>());
-        let paths = |(p, a): (&PixelStats, &PixelAov)| (a.paths / p.samples.max(1) as f64) as f32;
-        picture.add1("paths", "N", &r.pixels.iter().zip(&r.aovs).map(paths).collect::<Vec<_>>());
-        for (d, layer) in ["factor1", "factor2", "factor3", "factor4"].into_iter().enumerate() {
-            let mean = |a: &PixelAov| (a.factor[d] / a.vertices[d].max(1.0)) as f32;
-            picture.add1(layer, "s", &r.aovs.iter().map(mean).collect::<Vec<_>>());
-        }
+    for (aov, channels) in &r.planes {
+        add_aov(&mut picture, r, *aov, channels);
     }
     picture
+}
+
+/// Adds the layers of an auxiliary value. What is known of first hits becomes the mean over the camera samples that hit, if
+/// their share is known.
+fn add_aov(picture: &mut Picture, r: &Rendered, aov: Aov, channels: &[Vec<f32>]) {
+    let quotients = |over: &[f32], values: &[f32]| -> Vec<f32> {
+        values.iter().zip(over).map(|(x, n)| if *n > 0.0 { x / n } else { 0.0 }).collect()
+    };
+    let mut layer = |name: &str, channel: &str, values: Vec<f32>| {
+        picture.layer_mut(name.into()).channels.push(Channel { name: channel.into(), values });
+    };
+    match (aov, channels) {
+        (Aov::Factors, [s1, s2, s3, s4, n1, n2, n3, n4]) => {
+            let means = [(s1, n1), (s2, n2), (s3, n3), (s4, n4)];
+            for (name, (sums, counts)) in ["factor1", "factor2", "factor3", "factor4"].into_iter().zip(means) {
+                layer(name, "s", quotients(counts, sums));
+            }
+        }
+        _ => {
+            let of_hits = matches!(aov, Aov::Albedo | Aov::Normal | Aov::Depth);
+            let alpha = r.channels(Aov::Alpha).and_then(<[_]>::first).filter(|_| of_hits);
+            for (name, values) in aov.channels().iter().zip(channels) {
+                layer(aov.name(), name, alpha.map_or_else(|| values.clone(), |a| quotients(a, values)));
+            }
+        }
+    }
 }
 
 fn stats(r: &Rendered) -> RenderStats {

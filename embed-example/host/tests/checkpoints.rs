@@ -55,7 +55,8 @@ fn resumed_renders_have_the_same_bits() {
     let scene = Scene::from_bytes(&baked.bytes).unwrap();
     let dir = tempfile::tempdir().unwrap();
     for (strategy, adaptive) in [("classic", false), ("ears", false), ("ears", true), ("bolin-meyer", false)] {
-        let mut settings = Settings { size: [40, 30], shards: 3, aovs: true, adaptive, ..Settings::for_scene(&scene) };
+        let mut settings =
+            Settings { size: [40, 30], shards: 3, aovs: true.into(), adaptive, ..Settings::for_scene(&scene) };
         settings.set("rrs", strategy).unwrap();
         settings.set("cache-bytes", "1MiB").unwrap();
         let learns = strategy == "ears";

@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 fn settings(scene: &Scene<'_>, strategy: &str) -> Settings {
     let strategy = Strategy::parse(strategy).unwrap();
     let learns = strategy.is_efficiency_aware();
-    let s = Settings { strategy, shards: 2, aovs: true, max_depth: 8, ..Settings::for_scene(scene) };
+    let s = Settings { strategy, shards: 2, aovs: true.into(), max_depth: 8, ..Settings::for_scene(scene) };
     Settings { shadow_roulette: learns, adaptive: learns, ..s }
 }
 

@@ -117,7 +117,7 @@ fn render(blob: &Path, args: &Args) -> Result<(), Box<dyn Error>> {
     let [width, height] = scene.camera.size.map(f64::from);
     let scale = (f64::from(args.pixels) / (width * height)).sqrt();
     let size = [width, height].map(|x| (x * scale).round() as u32);
-    let settings = Settings { size, shards: SHARDS, aovs: true, ..Settings::for_scene(&scene) };
+    let settings = Settings { size, shards: SHARDS, aovs: true.into(), ..Settings::for_scene(&scene) };
     let plan = Plan::new(&Variant::parse(&args.strategy)?.apply(settings))?;
     let (counters, _) = (wanted.render)(scene, &plan, &ITERATIONS)?;
     println!("{}", json!({ "rays": counters.rays() }));

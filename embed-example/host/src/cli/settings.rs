@@ -70,6 +70,8 @@ fn default(row: &SettingInfo) -> String {
 
 fn arg(row: &'static SettingInfo) -> Arg {
     let is_flag = row.range == SettingRange::Flag;
+    // the name alone stands for `true`
+    let stands_alone = is_flag || matches!(row.range, SettingRange::Set(_));
     let mut help = row.help.to_string();
     // their names say it already
     if !is_flag && !matches!(row.range, SettingRange::Words(_) | SettingRange::Strategy) {
@@ -78,7 +80,7 @@ fn arg(row: &'static SettingInfo) -> Arg {
     let _ = write!(help, " [default: {}]", default(row));
     let arg = Arg::new(row.name).long(row.name).value_name(row.value_name).allow_negative_numbers(true);
     let arg = arg.value_parser(move |text: &str| check(row, text)).help(help.clone());
-    let arg = if is_flag { arg.num_args(0..=1).require_equals(true).default_missing_value("true") } else { arg };
+    let arg = if stands_alone { arg.num_args(0..=1).require_equals(true).default_missing_value("true") } else { arg };
     let arg = if Learning::TABLE.contains(row) { arg.help_heading("Learning") } else { arg };
     match row.range {
         SettingRange::Strategy => arg.long_help(Strategy::TABLE.iter().fold(help, |mut help, (name, about)| {

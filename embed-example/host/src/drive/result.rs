@@ -2,7 +2,7 @@
 
 use super::calibrate::Calibration;
 use super::schedule::Work;
-use croupier::unstable::film::{PixelAov, PixelStats};
+use croupier::unstable::film::{Aov, PixelAov, PixelStats};
 use croupier::unstable::learn::PictureStatistics;
 use croupier::{Counters, ErrorEstimate};
 
@@ -48,6 +48,8 @@ pub struct Rendered {
     pub pixels: Vec<PixelStats>,
     /// Auxiliary sums; empty if not asked for.
     pub aovs: Vec<PixelAov>,
+    /// Planes of the auxiliary values that were asked for: each with its channels, row by row.
+    pub planes: Vec<(Aov, Vec<Vec<f32>>)>,
     /// Counters of the whole render.
     pub counters: Counters,
     /// Error estimate of the picture.
@@ -83,6 +85,11 @@ impl Rendered {
     /// Standard error of the mean radiance, row by row, rgb.
     pub fn stderr(&self) -> Vec<[f32; 3]> {
         self.pixels.iter().map(|p| p.variance_of_mean().map(|v| v.sqrt() as f32)).collect()
+    }
+
+    /// Channels of an auxiliary value, if it was asked for.
+    pub fn channels(&self, aov: Aov) -> Option<&[Vec<f32>]> {
+        self.planes.iter().find(|p| p.0 == aov).map(|p| p.1.as_slice())
     }
 
     /// Rays per second, in millions.

@@ -1,0 +1,359 @@
+//! Auxiliary values of pixels ("AOVs"): which there are, and planes of those that were asked for.
+
+use crate::bits::bit_set;
+use crate::names::names;
+use bytemuck::{Pod, Zeroable};
+use core::fmt;
+
+/// An auxiliary value of pixels. Where nothing else is said, planes hold means over the camera samples of a pixel, those
+/// that missed everything counted as 0; divide by [`Aov::Alpha`] for means over the samples that hit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Aov {
+    /// Albedo of the first hit, rgb, seen from the camera, as roulette uses it: reflected and transmitted, 1 for clear
+    /// glass.
+    Albedo,
+    /// Shading normal of the first hit, xyz, world space; shorter than 1 where normals differ within the pixel.
+    Normal,
+    /// Distance to the first hit, world units.
+    Depth,
+    /// Share of the camera samples that met a surface or scattered in a medium (coverage), 0 to 1.
+    Alpha,
+    /// Sum of the factors of roulette at vertices of depth 1, 2, 3 and above, and number of these vertices: eight planes.
+    Factors,
+    /// Number of paths: the camera sample and what splitting added.
+    Paths,
+    /// Number of rays of all kinds. It has no plane but is part of the pixels' statistics
+    /// ([`PixelStats::rays`](super::PixelStats::rays)), which are sums.
+    Cost,
+    /// Radiance of what is seen directly: emitters and environment, rgb. Emission, direct and indirect light add up to the
+    /// picture, but for rounding in `f32`.
+    Emission,
+    /// Radiance of light that scattered once, rgb.
+    Direct,
+    /// Radiance of light that scattered more often, rgb.
+    Indirect,
+    /// Index of the first hit's material, of the first camera sample of the pixel in its first iteration; -1 where
+    /// that sample met no surface. Exact below 2^24.
+    Material,
+}
+
+names!(Aov: Albedo = "albedo", Normal = "normal", Depth = "depth", Alpha = "alpha", Factors = "factors",
+    Paths = "paths", Cost = "cost", Emission = "emission", Direct = "direct", Indirect = "indirect",
+    Material = "material");
+
+impl Aov {
+    /// All of them.
+    pub const ALL: [Self; 11] = [
+        Self::Albedo,
+        Self::Normal,
+        Self::Depth,
+        Self::Alpha,
+        Self::Factors,
+        Self::Paths,
+        Self::Cost,
+        Self::Emission,
+        Self::Direct,
+        Self::Indirect,
+        Self::Material,
+    ];
+
+    /// Names of the planes, as usual in EXR files.
+    pub const fn channels(self) -> &'static [&'static str] {
+        match self {
+            Self::Albedo | Self::Emission | Self::Direct | Self::Indirect => &["R", "G", "B"],
+            Self::Normal => &["X", "Y", "Z"],
+            Self::Depth => &["Z"],
+            Self::Alpha => &["A"],
+            Self::Factors => &["S1", "S2", "S3", "S4", "N1", "N2", "N3", "N4"],
+            Self::Paths => &["N"],
+            Self::Cost => &[],
+            Self::Material => &["id"],
+        }
+    }
+
+    const fn is_id(self) -> bool {
+        matches!(self, Self::Material)
+    }
+}
+
+/// Set of auxiliary values. As text it is a list of their names with commas between, `true` for [`Self::STANDARD`] or
+/// `false` for none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AovSet(u32);
+
+bit_set!(AovSet);
+
+impl AovSet {
+    /// None.
+    pub const NONE: Self = Self(0);
+    /// Albedo, normal, depth and alpha of the first hits, factors of roulette, paths and cost.
+    pub const STANDARD: Self = Self((1 << (Aov::Cost as u32 + 1)) - 1);
+    /// What is known of first hits.
+    pub(crate) const FIRST_HITS: Self = Self::of(&[Aov::Albedo, Aov::Normal, Aov::Depth, Aov::Alpha, Aov::Material]);
+    /// Parts of the radiance.
+    pub(crate) const LIGHT: Self = Self::of(&[Aov::Emission, Aov::Direct, Aov::Indirect]);
+
+    /// The set of these.
+    pub const fn of(aovs: &[Aov]) -> Self {
+        let (mut set, mut i) = (0, 0);
+        while i < aovs.len() {
+            set |= 1 << aovs[i] as u32;
+            i += 1;
+        }
+        Self(set)
+    }
+
+    /// Is this one in the set?
+    pub const fn has(self, aov: Aov) -> bool {
+        self.0 >> aov as u32 & 1 != 0
+    }
+
+    /// Set of the text; `None` for a name that is none.
+    pub(crate) fn from_text(text: &str) -> Option<Self> {
+        match text {
+            "true" => Some(Self::STANDARD),
+            "false" => Some(Self::NONE),
+            _ => text.split(',').try_fold(Self::NONE, |set, name| Some(set.with(Self::of(&[Aov::from_name(name)?])))),
+        }
+    }
+}
+
+impl From<bool> for AovSet {
+    fn from(standard: bool) -> Self {
+        if standard { Self::STANDARD } else { Self::NONE }
+    }
+}
+
+impl fmt::Display for AovSet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::NONE => f.write_str("false"),
+            Self::STANDARD => f.write_str("true"),
+            _ => {
+                let mut names = Aov::ALL.iter().filter(|a| self.has(**a)).enumerate();
+                names.try_for_each(|(i, a)| write!(f, "{}{}", if i == 0 { "" } else { "," }, a.name()))
+            }
+        }
+    }
+}
+
+/// Where the planes of a set are among all of its planes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AovLayout {
+    set: AovSet,
+    first: [usize; Aov::ALL.len()],
+    /// Number of planes.
+    pub planes: usize,
+    /// Planes of indices, one bit each.
+    ids: u64,
+}
+
+impl AovLayout {
+    pub(crate) fn new(set: AovSet) -> Self {
+        let mut layout = Self { set, first: [0; Aov::ALL.len()], planes: 0, ids: 0 };
+        for (aov, first) in Aov::ALL.into_iter().zip(&mut layout.first) {
+            *first = layout.planes;
+            if set.has(aov) {
+                layout.ids |= u64::from(aov.is_id()) << layout.planes;
+                layout.planes += aov.channels().len();
+            }
+        }
+        layout
+    }
+
+    /// Number of the first plane, if the set has any.
+    #[inline(always)]
+    pub(crate) fn first(&self, aov: Aov) -> Option<usize> {
+        if self.set.has(aov) { self.first.get(aov as usize).copied() } else { None }
+    }
+
+    /// Is anything of `other` in the set?
+    #[inline(always)]
+    pub(crate) fn any(&self, other: AovSet) -> bool {
+        self.set.intersects(other)
+    }
+
+    fn is_id(&self, plane: usize) -> bool {
+        self.ids >> plane & 1 != 0
+    }
+}
+
+/// Sums of one iteration, one row of values per pixel of a shard.
+#[derive(Debug)]
+pub(crate) struct AovSums<'m> {
+    pub layout: AovLayout,
+    values: &'m mut [f32],
+}
+
+impl<'m> AovSums<'m> {
+    pub(crate) fn new(layout: AovLayout, values: &'m mut [f32]) -> Self {
+        Self { layout, values }
+    }
+
+    /// Values of a pixel; none if there are none.
+    #[inline]
+    pub(crate) fn row(&self, pixel: usize) -> &[f32] {
+        let n = self.layout.planes;
+        self.values.get(pixel * n..pixel * n + n).unwrap_or(&[])
+    }
+
+    /// Empties a pixel.
+    pub(crate) fn clear(&mut self, pixel: usize) {
+        let n = self.layout.planes;
+        for (plane, x) in self.values.get_mut(pixel * n..pixel * n + n).unwrap_or(&mut []).iter_mut().enumerate() {
+            *x = if self.layout.is_id(plane) { -1.0 } else { 0.0 };
+        }
+    }
+
+    /// Value `channel` of one of the pixel's auxiliary values, if it is wanted.
+    #[inline]
+    pub(crate) fn get(&mut self, pixel: usize, aov: Aov, channel: usize) -> Option<&mut f32> {
+        let plane = self.layout.first(aov)? + channel;
+        self.values.get_mut(pixel * self.layout.planes + plane)
+    }
+
+    /// Adds to it.
+    #[inline]
+    pub(crate) fn add<const N: usize>(&mut self, pixel: usize, aov: Aov, x: [f32; N]) {
+        for (channel, x) in x.into_iter().enumerate() {
+            if let Some(sum) = self.get(pixel, aov, channel) {
+                *sum += x;
+            }
+        }
+    }
+}
+
+/// Planes of all pixels, row by row.
+#[derive(Debug)]
+pub(crate) struct AovPlanes<'m> {
+    layout: AovLayout,
+    pixels: usize,
+    values: &'m mut [f32],
+}
+
+impl<'m> AovPlanes<'m> {
+    pub(crate) fn new(layout: AovLayout, pixels: usize, values: &'m mut [f32]) -> Self {
+        Self { layout, pixels, values }
+    }
+
+    /// Plane `channel` of an auxiliary value.
+    pub(crate) fn plane(&self, aov: Aov, channel: usize) -> Option<&[f32]> {
+        let plane = self.layout.first(aov).filter(|_| channel < aov.channels().len())? + channel;
+        self.values.get(plane * self.pixels..(plane + 1) * self.pixels)
+    }
+
+    /// Value of a pixel, 0 where there is none.
+    fn value(&self, aov: Aov, channel: usize, pixel: usize) -> f64 {
+        self.plane(aov, channel).and_then(|p| p.get(pixel)).map_or(0.0, |x| f64::from(*x))
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.layout.set == AovSet::NONE
+    }
+
+    /// Adds the sums of `more` samples to the means over `before` samples of a pixel.
+    pub(crate) fn merge(&mut self, pixel: usize, before: u32, more: u32, sums: &[f32]) {
+        let total = f64::from(before) + f64::from(more);
+        for plane in 0..self.layout.planes {
+            let Some(mean) = self.values.get_mut(plane * self.pixels + pixel) else { return };
+            let empty = if self.layout.is_id(plane) { -1.0 } else { 0.0 };
+            if before == 0 {
+                *mean = empty;
+            }
+            let Some(sum) = sums.get(plane).filter(|_| more > 0) else { continue };
+            if !self.layout.is_id(plane) {
+                let old = f64::from(*mean);
+                *mean = (old + (f64::from(*sum) - f64::from(more) * old) / total) as f32;
+            } else if before == 0 {
+                *mean = *sum;
+            }
+        }
+    }
+
+    /// Sums of a pixel over `samples` samples.
+    pub(crate) fn sums(&self, pixel: usize, samples: u32) -> PixelAov {
+        let n = f64::from(samples);
+        let of = |aov, channel| n * self.value(aov, channel, pixel);
+        PixelAov {
+            albedo: core::array::from_fn(|c| of(Aov::Albedo, c)),
+            normal: core::array::from_fn(|c| of(Aov::Normal, c)),
+            depth: of(Aov::Depth, 0),
+            hits: of(Aov::Alpha, 0),
+            factor: core::array::from_fn(|c| of(Aov::Factors, c)),
+            vertices: core::array::from_fn(|c| of(Aov::Factors, 4 + c)),
+            paths: of(Aov::Paths, 0),
+        }
+    }
+}
+
+/// Sums of auxiliary values of one pixel, computed from the means of its planes; 0 for those that the settings do not ask
+/// for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct PixelAov {
+    /// Sum of albedos ([`Aov::Albedo`]).
+    pub albedo: [f64; 3],
+    /// Sum of shading normals of the first hit, world space.
+    pub normal: [f64; 3],
+    /// Sum of distances to the first hit, world units.
+    pub depth: f64,
+    /// Number of camera samples that hit a surface.
+    pub hits: f64,
+    /// Sum of roulette factors at vertices of depth 1, 2, 3 and above.
+    pub factor: [f64; 4],
+    /// Number of those vertices.
+    pub vertices: [f64; 4],
+    /// Number of paths: camera samples and samples that splitting added.
+    pub paths: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::string::ToString;
+    use std::vec;
+
+    /// Killed by: a name that stands for another, a set that is written as another.
+    #[test]
+    fn sets_are_read_as_they_are_written() {
+        for bits in 0..1 << Aov::ALL.len() {
+            let set = AovSet(bits);
+            assert_eq!(AovSet::from_text(&set.to_string()), Some(set), "{set}");
+        }
+        assert!(Aov::ALL.iter().all(|a| AovSet::of(&[*a]).has(*a) && !AovSet::NONE.has(*a)));
+        assert_eq!(AovSet::STANDARD.to_string(), "true");
+        assert_eq!(AovSet::from_text("albedo,depth"), Some(AovSet::of(&[Aov::Albedo, Aov::Depth])));
+        assert_eq!([AovSet::from_text("albedo,"), AovSet::from_text("Depth"), AovSet::from_text("")], [None; 3]);
+    }
+
+    /// Means over iterations, indices of the first sample. Killed by: a mean over iterations instead of samples, planes
+    /// that overlap, an index that is averaged, a pixel without samples that counts.
+    #[test]
+    fn planes_hold_means_over_samples() {
+        let layout = AovLayout::new(AovSet::of(&[Aov::Depth, Aov::Material, Aov::Normal]));
+        assert_eq!(layout.planes, 5);
+        let (mut memory, mut rows) = (vec![f32::NAN; 10], vec![f32::NAN; 10]);
+        let mut planes = AovPlanes::new(layout, 2, &mut memory);
+        let mut sums = AovSums::new(layout, &mut rows);
+        sums.clear(1);
+        assert_eq!(sums.row(1), [0.0, 0.0, 0.0, 0.0, -1.0]);
+        sums.add(1, Aov::Depth, [6.0]);
+        sums.add(1, Aov::Normal, [0.0, 1.0, 2.0]);
+        sums.add(1, Aov::Albedo, [7.0; 3]);
+        *sums.get(1, Aov::Material, 0).unwrap() = 4.0;
+        planes.merge(0, 0, 0, &[]);
+        planes.merge(1, 0, 2, sums.row(1));
+        sums.clear(1);
+        sums.add(1, Aov::Depth, [1.0]);
+        *sums.get(1, Aov::Material, 0).unwrap() = 9.0;
+        planes.merge(1, 2, 6, sums.row(1));
+        planes.merge(1, 8, 0, &[]);
+        assert_eq!(planes.plane(Aov::Depth, 0), Some(&[0.0, 7.0 / 8.0][..]));
+        assert_eq!(planes.plane(Aov::Normal, 2), Some(&[0.0, 0.25][..]));
+        assert_eq!(planes.plane(Aov::Material, 0), Some(&[-1.0, 4.0][..]));
+        assert_eq!([planes.plane(Aov::Albedo, 0), planes.plane(Aov::Depth, 1)], [None; 2]);
+        assert_eq!(planes.sums(1, 8).depth, 7.0);
+    }
+}
