@@ -196,7 +196,7 @@ fn assert_message(text: &str, folder: &Path) {
 }
 
 fn settings(scene: &Scene<'_>) -> Settings {
-    let mut s = Settings { size: [4, 3], shards: 1, aovs: true, ..Settings::for_scene(scene) };
+    let mut s = Settings { size: [4, 3], shards: 1, aovs: true.into(), ..Settings::for_scene(scene) };
     for (name, value) in [("rrs", "ears"), ("cache-bytes", "96KiB"), ("ring", "32"), ("ledger", "64")] {
         s.set(name, value).expect("a setting");
     }
