@@ -54,7 +54,6 @@ impl Corners {
     }
 
     /// Brings those that are in instances to the world.
-    #[inline(never)]
     fn place(&mut self, scene: &Scene<'_>, light: &Chosen<'_>, mask: Mask8) -> Placed8 {
         let index = light.index.to_array();
         let path: [[u32; 2]; 8] =
@@ -92,35 +91,12 @@ impl LightModel for Area {
 
     #[inline(always)]
     fn sample(scene: &Scene<'_>, light: &Chosen<'_>, p: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8 {
-        let mut corners = Corners::gather(scene, light.record.map(|l| l.triangle), mask);
-        let mut area = F32x8::from_fn(|i| light.record[i].area);
-        let placed = if scene.instances.is_empty() { None } else { Some(corners.place(scene, light, mask)) };
-        let [b, c] = barycentric([words[0], words[1]].map(U32x8::to_unit));
-        let a = F32x8::ONE - b - c;
-        let point = corners.a * a + corners.b * b + corners.c * c;
-        let mut normal = corners.normal();
-        if let Some(placed) = &placed {
-            (normal, area) = in_instances(placed.condition.gt(F32x8::ZERO), placed.normal, normal, area);
+        if !scene.instances.is_empty() {
+            return sample_placed(scene, light, p, words, mask);
         }
-        let d = point - p;
-        let r = d.length();
-        let wi = d / r;
-        let pdf = density(r, -normal.dot(wi), area);
-        let bound = |v: Vec3x8| v.abs().dot(normal.abs());
-        let sample = LightSample8 {
-            wi,
-            point,
-            normal,
-            point_error: (bound(corners.a) * a + bound(corners.b) * b + bound(corners.c) * c) * OFFSET_BOUND,
-            radiance: light.emission,
-            pdf,
-            valid: pdf.gt(F32x8::ZERO),
-            ..LightSample8::NONE
-        };
-        match placed {
-            Some(placed) => widen(sample, &placed, d),
-            None => sample,
-        }
+        let corners = Corners::gather(scene, light.record.map(|l| l.triangle), mask);
+        let area = F32x8::from_fn(|i| light.record[i].area);
+        on_triangle(&corners, corners.normal(), area, light.emission, p, words)
     }
 
     /// Power of a Lambertian emitter.
@@ -172,14 +148,51 @@ fn in_instances(placed: Mask8, normal: Vec3x8, others: Vec3x8, areas: F32x8) -> 
     (Vec3x8::select(placed, normal.normalize(), others), placed.select(normal.length() * 0.5, areas))
 }
 
-/// The sample with the rounding that instances add at its end of a shadow ray along `d`: that of a ray that leaves the
-/// triangle, and for the distance that the ray is brought along.
+/// Uniform points on triangles with unit normals `normal` and areas `area`, seen from `p`.
+#[inline(always)]
+fn on_triangle(
+    corners: &Corners,
+    normal: Vec3x8,
+    area: F32x8,
+    emission: Vec3x8,
+    p: Vec3x8,
+    words: [U32x8; 3],
+) -> LightSample8 {
+    let [b, c] = barycentric([words[0], words[1]].map(U32x8::to_unit));
+    let a = F32x8::ONE - b - c;
+    let point = corners.a * a + corners.b * b + corners.c * c;
+    let d = point - p;
+    let r = d.length();
+    let wi = d / r;
+    let pdf = density(r, -normal.dot(wi), area);
+    let bound = |v: Vec3x8| v.abs().dot(normal.abs());
+    LightSample8 {
+        wi,
+        point,
+        normal,
+        point_error: (bound(corners.a) * a + bound(corners.b) * b + bound(corners.c) * c) * OFFSET_BOUND,
+        radiance: emission,
+        pdf,
+        valid: pdf.gt(F32x8::ZERO),
+        ..LightSample8::NONE
+    }
+}
+
+/// [`LightModel::sample`] in scenes with instances. What they add to the error at the end of a shadow ray is that of a ray
+/// that leaves the triangle, and that of the distance along which the ray is brought into the instance.
 #[inline(never)]
-fn widen(sample: LightSample8, placed: &Placed8, d: Vec3x8) -> LightSample8 {
+fn sample_placed(scene: &Scene<'_>, light: &Chosen<'_>, p: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8 {
+    let mut corners = Corners::gather(scene, light.record.map(|l| l.triangle), mask);
+    let area = F32x8::from_fn(|i| light.record[i].area);
+    let placed = corners.place(scene, light, mask);
+    let in_instance = placed.condition.gt(F32x8::ZERO);
+    let (normal, area) = in_instances(in_instance, placed.normal, corners.normal(), area);
+    let sample = on_triangle(&corners, normal, area, light.emission, p, words);
     let normal = sample.normal.abs();
-    let far = placed.condition * d.abs().max_component() * OFFSET_BOUND;
+    let far = placed.condition * (sample.point - p).abs().max_component() * OFFSET_BOUND;
     let more = placed.rounding.dot(normal) + far * (normal.x + normal.y + normal.z);
-    LightSample8 { point_error: sample.point_error + more, valid: sample.valid.and_not(placed.hidden), ..sample }
+    let point_error = sample.point_error + more;
+    LightSample8 { point_error, valid: sample.valid.and_not(placed.hidden), ..sample }
 }
 
 /// Density with which [`super::sample_of`] at `p`, `n` chooses the unit directions `dir` that have met the triangles of

@@ -29,9 +29,10 @@ use super::refill::{Refill, refill, samples};
 use super::roulette::roulette;
 use super::scatter::scatter;
 use super::settle::settle;
-use super::shading::{albedo, may_pass, moves, shade, surface};
+use super::shading::{albedo, may_pass, moves, places, shade};
 use super::state::State;
 use super::trace::trace;
+use crate::geometry::SurfaceHit8;
 use crate::scene::Effects;
 use crate::world::World;
 use croupier_simd::{Mask8, U32x8, Vec3x8};
@@ -94,7 +95,8 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
         return true;
     }
 
-    let (mut hit, point) = surface::<W>(world.scene(), &hit, rays.ray.time);
+    let mut hit = SurfaceHit8::gather(world.scene(), &hit);
+    let point = if places::<W>(world.scene()) { hit.place(world.scene(), rays.ray.time) } else { hit.point() };
     if W::EFFECTS.intersects(Effects::STRAIGHT) {
         hit.t += rays.travelled;
     }

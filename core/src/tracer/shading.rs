@@ -7,7 +7,7 @@ use super::relief::relief;
 use super::vertex::PathVertex8;
 use crate::bsdf::{self, Bsdf, Inputs8, Lobes, Visitor};
 use crate::extension::{Extension, TextureSamples8};
-use crate::geometry::{self, Hit8, SurfaceHit8, SurfacePoint8};
+use crate::geometry::{self, SurfaceHit8, SurfacePoint8};
 use crate::learn::cache::NO_BIN;
 use crate::scene::blob::{LAYERED_KINDS, MATERIAL_CUTOUT, MATERIAL_TWO_SIDED, MaterialKind, NONE};
 use crate::scene::{Effects, Scene};
@@ -193,14 +193,6 @@ pub(crate) fn places<W: World>(scene: &Scene<'_>) -> bool {
 #[inline(always)]
 pub(crate) fn moves<W: World>(scene: &Scene<'_>) -> bool {
     W::EFFECTS.contains(Effects::MOTION) && scene.effects.contains(Effects::MOTION)
-}
-
-/// The triangles of hits, read and where they are in the world, and the hit points.
-#[inline(always)]
-pub(crate) fn surface<W: World>(scene: &Scene<'_>, hit: &Hit8, time: F32x8) -> (SurfaceHit8, SurfacePoint8) {
-    let mut surface = SurfaceHit8::gather(scene, hit);
-    let point = if places::<W>(scene) { surface.place(scene, time) } else { surface.point() };
-    (surface, point)
 }
 
 /// Share of the light from the directions `wo` that passes the surfaces of `hit` straight on, within `media`; `ng` are
