@@ -131,6 +131,7 @@ type Corruption = (fn(&mut Parts), SceneError);
 /// Each row kills the deletion of one check: without it the row's scene is accepted or gives another error.
 #[test]
 fn every_fault_of_the_records_has_its_error() {
+    let tables = Parts::tiny().tables.len() as u32;
     use SectionKind as S;
     let tree: &[Corruption] = &[
         (|p| p.nodes[0].child[4] = 0, child(0, 4, ChildFault::Order { expected: 1, found: 0 })),
@@ -202,9 +203,12 @@ fn every_fault_of_the_records_has_its_error() {
             SceneError::Reference { of: S::Materials, index: 3, to: S::Media, found: 0, count: 0 },
         ),
         (|p| p.materials[3].texture = 1, reference(S::Materials, 3, S::Textures, 1, 1)),
-        (|p| p.materials[3].table = 0, reference(S::Materials, 3, S::Tables, 0, 64)),
-        (|p| p.materials[8].table = 1, reference(S::Materials, 8, S::Tables, 1, 64)),
-        (|p| p.materials[8].table = NONE, reference(S::Materials, 8, S::Tables, NONE, 64)),
+        (|p| p.materials[3].table = 0, reference(S::Materials, 3, S::Tables, 0, tables)),
+        (
+            |p| p.materials[8].table = p.tables.len() as u32 - 63,
+            reference(S::Materials, 8, S::Tables, tables - 63, tables),
+        ),
+        (|p| p.materials[8].table = NONE, reference(S::Materials, 8, S::Tables, NONE, tables)),
         (|p| p.tables[63] = 1.5, number(S::Materials, 8, Field::Reflectance, 1.5)),
         (|p| p.materials[0].reflectance[1] = 1.01, number(S::Materials, 0, Field::Reflectance, 1.01)),
         (|p| p.materials[0].reflectance[1] = NAN, number(S::Materials, 0, Field::Reflectance, NAN)),

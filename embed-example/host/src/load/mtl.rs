@@ -19,13 +19,15 @@
 
 use super::LoadError;
 use super::loader::Loader;
-use super::mtl_principled::MAPS;
 use crate::description::{Material, Model, Reflectance};
 use crate::text::{excerpt, number};
 use std::path::{Path, PathBuf};
 
 /// Model of faces without a material.
 pub(super) const GREY: Model = Model::Diffuse { reflectance: Reflectance::Constant([0.5; 3]) };
+
+/// Keys of textures besides `map_Kd`, which ask for the principled material (`mtl_principled.rs`).
+pub(super) const MAPS: [&str; 4] = ["map_Pr", "map_Pm", "map_Ke", "norm"];
 
 /// Widths below this are taken as smooth.
 const SMOOTH: f32 = 1e-3;

@@ -29,10 +29,8 @@ pub(super) struct Maps {
     pub normal: Option<u32>,
 }
 
-/// Keys whose files are read here, besides `map_Kd`.
-pub(super) const MAPS: [&str; 4] = ["map_Pr", "map_Pm", "map_Ke", "norm"];
-/// Numbers that make a material a principled one.
-pub(super) const NUMBERS: [&str; 3] = ["Ps", "Pc", "Pcr"];
+/// Numbers that make a material a principled one, as textures of any of [`MAPS`](super::mtl::MAPS) do.
+const NUMBERS: [&str; 3] = ["Ps", "Pc", "Pcr"];
 
 /// Is the definition mapped here?
 pub(super) fn applies(definition: &Definition) -> bool {
