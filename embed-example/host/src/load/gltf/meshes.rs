@@ -11,9 +11,6 @@ use gltf_json::mesh::{Mode, Semantic};
 use gltf_json::validation::Checked;
 use gltf_json::{Accessor, Index, Mesh, mesh};
 
-/// Most triangles of a scene: the blob holds fewer.
-pub(super) const MOST_TRIANGLES: usize = 1 << 27;
-
 /// Joints of a vertex and their weights.
 pub(super) type Influences = Vec<([u32; 4], [f32; 4])>;
 
@@ -45,8 +42,8 @@ pub(super) fn load(
         let at = format!("meshes[{}].primitives[{i}]", index.value());
         out.extend(load_primitive(loader, scene, asset, materials, primitive, &at)?);
         triangles += out.last().map_or(0, |p| p.triangles.len());
-        if triangles > MOST_TRIANGLES {
-            return Err(asset.error(at, "too many triangles"));
+        if triangles > asset.most_triangles() {
+            return Err(asset.error(at, format!("{triangles} triangles in a document of its size")));
         }
     }
     Ok(out)
