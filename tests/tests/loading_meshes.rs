@@ -406,7 +406,7 @@ fn broken_stl_files() {
         (text.replacen("  vertex 1e0 0 0\n", "", 1).into_bytes(), "@/a.stl:7: a facet of 2 vertices"),
         (text.replacen("endloop", "vertex 0 0 0", 1).into_bytes(), "@/a.stl:7: a facet of more than 3 vertices"),
         (text.replacen(" facet", " faucet", 1).into_bytes(), "@/a.stl:2: `faucet` is unexpected here"),
-        (text[..text.rfind("endloop").unwrap()].as_bytes().to_vec(), "the file ends within this facet"),
+        (text.as_bytes()[..text.rfind("endloop").unwrap()].to_vec(), "the file ends within this facet"),
     ];
     for (bytes, wanted) in cases {
         let error = try_load("a.stl", &bytes).unwrap_err();
@@ -437,7 +437,7 @@ fn hdr(size: &str, rows: &[u8]) -> Vec<u8> {
 
 /// Pixel x of the rows below: red x, green 7, blue 1 where x is 3, exponents 130 and 128.
 fn pixel(x: u8) -> [u8; 4] {
-    [x, 7, u8::from(x == 3), if x % 2 == 0 { 130 } else { 128 }]
+    [x, 7, u8::from(x == 3), if x.is_multiple_of(2) { 130 } else { 128 }]
 }
 
 fn flat_row(n: u8) -> Vec<u8> {

@@ -220,7 +220,7 @@ fn corners(
     if let Some(v) = list.iter().find(|v| **v as usize >= vertices) {
         return Err(asset.error(at, format!("there is no vertex {v}, there are {vertices}")));
     }
-    let odd = |i: usize, [a, b, c]: [u32; 3]| if i % 2 == 0 { [a, b, c] } else { [a, c, b] };
+    let odd = |i: usize, [a, b, c]: [u32; 3]| if i.is_multiple_of(2) { [a, b, c] } else { [a, c, b] };
     Ok(match mode {
         Mode::TriangleStrip => list.windows(3).enumerate().map(|(i, w)| odd(i, [w[0], w[1], w[2]])).collect(),
         Mode::TriangleFan => {
