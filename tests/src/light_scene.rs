@@ -3,8 +3,8 @@
 use crate::records::none;
 use bytemuck::Zeroable;
 use croupier::Scene;
-use croupier::unstable::scene::Records;
 use croupier::unstable::scene::blob::*;
+use croupier::unstable::scene::{Effects, Records};
 use croupier_host::{alias, environment};
 
 /// Owns what a [`Scene`] borrows.
@@ -141,6 +141,7 @@ impl LightScene {
             environment: self.environment.as_ref(),
             env_texels: &self.env_texels,
             env_alias: &self.env_alias,
+            effects: Effects(u32::MAX),
             ..none(&self.info, &self.camera)
         })
     }

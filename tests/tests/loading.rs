@@ -3,7 +3,8 @@
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::description::*;
 use croupier_host::image::Picture;
-use croupier_host::load::{LoadReport, load};
+use croupier_host::load::{LoadError, LoadReport, load, load_with};
+use croupier_host::look::Look;
 use croupier_tests::stats::SplitMix;
 use std::fs;
 use std::path::Path;
@@ -20,7 +21,13 @@ fn folder(files: &[(&str, &str)]) -> TempDir {
 
 fn load_obj(obj: &str, mtl: &str) -> (SceneDescription, LoadReport) {
     let folder = folder(&[("a.obj", obj), ("a.mtl", mtl)]);
-    load(&folder.path().join("a.obj")).unwrap_or_else(|e| panic!("{e}"))
+    plain(&folder.path().join("a.obj")).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Loads without adding ground, sun and sky.
+fn plain(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
+    let environment = Some(Environment::Constant { radiance: [1.0; 3] });
+    load_with(path, &Look { without_ground: true, environment, ..Look::default() })
 }
 
 fn positions(scene: &SceneDescription, triangle: usize) -> [[f32; 3]; 3] {
@@ -39,7 +46,7 @@ fn obj_dialects() {
         f -5/1 -4/2 -3/3\r\nf 1 2 3 4\r\np 1\r\nl 1 2\r\ng second\r\nf 1/1/1 2/2/1 3/3/1 4/3/-1 5/1/1\r\n";
     let folder = folder(&[("a.mtl", "newmtl my paint\nKd 1 0 0\n")]);
     fs::write(folder.path().join("a.obj"), obj).unwrap();
-    let (scene, report) = load(&folder.path().join("a.obj")).unwrap();
+    let (scene, report) = plain(&folder.path().join("a.obj")).unwrap();
     assert_eq!(scene.triangles.len(), 1 + 1 + 2 + 3);
     assert_eq!((report.polygons, report.skipped_elements), (2, 2));
     assert!(scene.triangles.iter().all(|t| t.material == 0) && scene.materials[0].name == "my paint");
@@ -112,7 +119,7 @@ fn mtl_materials_become_models() {
     ];
     for (text, wanted) in cases {
         let (scene, _) = load_obj(TRIANGLE, &format!("newmtl other\nKd 1 1 1\nnewmtl m\n{text}\n"));
-        assert_eq!(scene.materials.len(), 2, "its own and the added ground's");
+        assert_eq!(scene.materials.len(), 1);
         assert_eq!(scene.materials[0].model, *wanted, "{text}");
         assert_eq!(scene.materials[0].two_sided, !wanted.is_transmissive());
         assert!(scene.materials[0].compensated, "{text}");
@@ -127,7 +134,8 @@ fn mtl_materials_become_models() {
 /// Faces without a material, no light, no camera: grey, sun and sky, a ground, and all corners inside the picture.
 #[test]
 fn a_bare_obj_can_be_seen() {
-    let (scene, report) = load_obj("v 10 0 0\nv 14 0 0\nv 10 3 0\nf 1 2 3\n", "");
+    let folder = folder(&[("a.obj", "v 10 0 0\nv 14 0 0\nv 10 3 0\nf 1 2 3\n")]);
+    let (scene, report) = load(&folder.path().join("a.obj")).unwrap();
     assert_eq!(scene.materials[0].model, Model::Diffuse { reflectance: Reflectance::Constant([0.5; 3]) });
     assert!(matches!(scene.environment, Some(Environment::Map { .. })));
     assert!(matches!(scene.emitters[..], [Emitter::Sun { .. }]) && scene.triangles.len() > 1);

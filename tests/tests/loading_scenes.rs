@@ -193,7 +193,7 @@ fn every_bare_obj_bakes() {
         }
         let (scene, report) = load(&path).unwrap_or_else(|e| panic!("{e}"));
         assert!(report.notes.iter().any(|n| n.contains("camera")));
-        assert_eq!(scene.environment.is_some(), scene.emitters.is_empty(), "{}", path.display());
+        assert!(scene.environment.is_some() || !scene.emitters.is_empty(), "{}", path.display());
         let [lo, hi] = scene.bounds().unwrap();
         let outside =
             (0..3).any(|i| scene.camera.origin[i] > f64::from(hi[i]) || scene.camera.origin[i] < f64::from(lo[i]));

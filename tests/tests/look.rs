@@ -7,6 +7,8 @@ use croupier_tests::light_oracle::{cross, dot, length, luminance, sub, unit, wid
 use std::f64::consts::PI;
 
 type V = [f64; 3];
+/// Moves a point.
+type Shape = fn(V) -> V;
 
 /// A mesh of boxes (smallest and largest corner), outwards.
 fn boxes(all: &[[V; 2]]) -> SceneDescription {
@@ -64,7 +66,7 @@ fn in_picture(c: &Camera, p: V) -> [f64; 2] {
 /// Killed by: framing by a sphere, by the box of the world's axes, or with the unused vertex.
 #[test]
 fn meshes_fill_the_picture() {
-    let shapes: [(&str, fn(V) -> V); 6] = [
+    let shapes: [(&str, Shape); 6] = [
         ("as it is", |p| p),
         ("tiny", |p| p.map(|x| x * 1e-4)),
         ("huge", |p| p.map(|x| x * 1e6)),
@@ -91,7 +93,7 @@ fn meshes_fill_the_picture() {
             }
             assert!((0.84..0.875).contains(&reach), "{name}, {up:?}: reaches {reach}");
             // centred: what one side has, the other has
-            assert!((0..2).all(|i| (least[i] + most[i]).abs() < 0.02), "{name}, {up:?}: {least:?} {most:?}");
+            assert!((0..2).all(|i| (least[i] + most[i]).abs() < 0.03), "{name}, {up:?}: {least:?} {most:?}");
         }
     }
 }
@@ -156,6 +158,33 @@ fn meshes_stand_on_a_ground() {
     assert!(length(sub(s.camera.origin, [0.0, 1.0, 0.0])) < 10.0, "{:?}", s.camera);
 }
 
+/// Rooms are looked into: through the side that is open, whichever it is, else from within; closed ones without a lamp
+/// get one. Killed by: an opening that is always the front, a camera behind a wall, a black picture.
+#[test]
+fn rooms_are_looked_into() {
+    let walls: [[V; 2]; 6] = [
+        [[-2.1, 0.0, -3.0], [-2.0, 2.5, 3.0]],
+        [[2.0, 0.0, -3.0], [2.1, 2.5, 3.0]],
+        [[-2.0, 0.0, -3.1], [2.0, 2.5, -3.0]],
+        [[-2.0, 0.0, 3.0], [2.0, 2.5, 3.1]],
+        [[-2.1, -0.1, -3.1], [2.1, 0.0, 3.1]],
+        [[-2.1, 2.5, -3.1], [2.1, 2.6, 3.1]],
+    ];
+    let inside = |s: &SceneDescription| {
+        let [x, y, z] = s.camera.origin;
+        x.abs() < 2.0 && (0.0..2.5).contains(&y) && z.abs() < 3.0
+    };
+    let closed = dressed(boxes(&walls), &Look::default());
+    assert!(inside(&closed) && closed.environment.is_none(), "{:?}", closed.camera);
+    assert!(matches!(closed.emitters[..], [Emitter::Point { .. }]));
+    for (missing, axis, sign) in [(0, 0, -1.0), (1, 0, 1.0), (2, 2, -1.0), (3, 2, 1.0)] {
+        let others: Vec<[V; 2]> = (0..6).filter(|i| *i != missing).map(|i| walls[i]).collect();
+        let s = dressed(boxes(&others), &Look { up: Up::Y, ..Look::default() });
+        assert!(s.camera.origin[axis] * sign > 3.0 && s.environment.is_some(), "{missing}: {:?}", s.camera);
+        assert!(s.camera.target[axis] * sign < 0.0);
+    }
+}
+
 /// Irradiance of a level surface from sun and map.
 fn irradiance(sun: &Emitter, sky: &Environment, up: V) -> (V, V) {
     let Emitter::Sun { direction, irradiance, .. } = sun else { panic!("{sun:?}") };
@@ -195,8 +224,9 @@ fn daylight_is_white_and_placed() {
         let to_sun = axes.coordinates(wide(direction).map(|x| -x));
         let want = [0.5, 1.0, 0.75f64.sqrt()].map(|x| x * 0.5f64.sqrt());
         assert!(length(sub(to_sun, [want[0], 0.5f64.sqrt(), want[2]])) < 1e-6, "{to_sun:?}");
-        // the brightest texel of the sky is around it
-        let brightest = (0..texels.len()).max_by(|a, b| {
+        // the sky is brightest below it
+        // above the haze at the horizon
+        let brightest = (0..texels.len() * 2 / 5).max_by(|a, b| {
             let l = |k: usize| luminance(wide(texels[k]));
             l(*a).total_cmp(&l(*b))
         });
@@ -205,7 +235,8 @@ fn daylight_is_white_and_placed() {
         let (phi, polar) = (2.0 * PI * u / f64::from(*width), PI * v / f64::from(height - 1));
         let d = [polar.sin() * phi.sin(), polar.cos(), -polar.sin() * phi.cos()];
         let d: V = std::array::from_fn(|i| dot(wide(to_world[i]), d));
-        assert!(dot(d, wide(direction).map(|x| -x)) > 0.999, "{d:?}");
+        let [right, _, front] = axes.coordinates(d);
+        assert!((right.atan2(front).to_degrees() - 30.0).abs() < 3.0, "{d:?}");
     }
     let (sun, sky) = daylight(Sun { azimuth_deg: 0.0, elevation_deg: 4.0 }, &Axes::Y, 0.5);
     let (direct, diffuse) = irradiance(&sun, &sky, Axes::Y.up);
@@ -261,11 +292,11 @@ fn wishes_change_what_they_name() {
 fn exposure_follows_the_picture() {
     let image =
         |pixels: Vec<f32>| Rgb { width: pixels.len(), height: 1, pixels: pixels.iter().map(|x| [*x; 3]).collect() };
-    let plain = exposure::auto(&image(vec![0.26; 100]));
+    let plain = exposure::auto(&image(vec![0.32; 100]));
     assert!(plain.abs() < 1e-3, "{plain}");
-    let dark = exposure::auto(&image(vec![0.26 / 1024.0; 100]));
+    let dark = exposure::auto(&image(vec![0.32 / 1024.0; 100]));
     assert!((dark - 10.0).abs() < 1e-3, "{dark}");
-    let mut outliers = vec![0.26; 100];
+    let mut outliers = vec![0.32; 100];
     outliers[..2].fill(1e6);
     outliers.extend([0.0; 400]);
     assert!(exposure::auto(&image(outliers)).abs() < 1e-3);

@@ -41,7 +41,7 @@ fn scattered_once(medium: &Medium, o: V, d: V, light: &Emitter) -> [f64; 3] {
                 let v = sub(position.map(f64::from), p);
                 (unit(v), intensity.map(|x| f64::from(x) / dot(v, v)), length(v))
             }
-            Emitter::Area { .. } => panic!("no closed form"),
+            Emitter::Area { .. } | Emitter::Spot { .. } | Emitter::Sun { .. } => panic!("no closed form"),
         };
         let way = through_box(p, to, LO, HI).expect("a point inside")[1].min(most);
         (irradiance.map(|e| e * henyey_greenstein(f64::from(medium.g), dot(to, d))), to, way)

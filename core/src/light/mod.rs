@@ -204,7 +204,10 @@ macro_rules! models {
             mask: Mask8,
         ) -> LightSample8 {
             let mut out = LightSample8::NONE;
-            $(if profile.intersects(Effects::of_light(LightKind::$kind)) {
+            // the second question is one test, where looking for a kind among eight lights takes ten
+            $(if profile.intersects(Effects::of_light(LightKind::$kind))
+                && scene.effects.intersects(Effects::of_light(LightKind::$kind))
+            {
                 let mask = light.of_kind(LightKind::$kind, mask);
                 if mask.any() {
                     out.merge(mask, &<$model>::sample(scene, light, p, words, mask));

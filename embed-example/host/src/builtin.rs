@@ -1,5 +1,9 @@
 //! Scenes without files.
 
+mod showcase;
+
+pub use showcase::showcase;
+
 use crate::description::*;
 use std::collections::HashMap;
 

@@ -229,6 +229,8 @@ fn notes_about_a_scene_are_printed() {
     std::fs::write(dir.join("doubtful.mtl"), materials).unwrap();
     let said = [
         "has no camera",
+        "has no light: sun and sky were added",
+        "a ground was added",
         "`foggy`: opacity 0.75 was taken as 1",
         "`foggy`: reflectance [2.0, 0.0, 0.0] was limited",
         "more than three corners, split into triangles: 1",

@@ -16,9 +16,9 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
 }
 
-/// A render of the built-in scene, as small as can be.
+/// A render of the built-in box, as small as can be.
 fn render(folder: &Path, arguments: &[&str]) -> Output {
-    let small = ["render", "--size", "24x20", "--threads", "1", "--shards", "2"];
+    let small = ["render", "cornell", "--size", "24x20", "--threads", "1", "--shards", "2"];
     croupier(folder, &[&small, arguments].concat())
 }
 
@@ -44,8 +44,8 @@ fn without_a_command_the_built_in_scene_is_rendered_here() {
     let found = json(&croupier(dir.path(), &["--spp", "1", "--json"]));
     assert_eq!(found["written"], serde_json::json!(["croupier.exr", "croupier.png"]));
     let exr = Picture::read_exr(&dir.path().join("croupier.exr")).unwrap();
-    assert_eq!((exr.width, exr.height), (400, 400));
-    assert_eq!(png_size(&dir.path().join("croupier.png")), (400, 400));
+    assert_eq!((exr.width, exr.height), (640, 432));
+    assert_eq!(png_size(&dir.path().join("croupier.png")), (640, 432));
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
 }
 
@@ -360,7 +360,8 @@ fn all_that_is_learned_fits_in_256_kib() {
     let small =
         ["--shards", "1", "--ring", "128", "--cache-bytes", "152KiB", "--ledger", "256", "--pixel-estimator", "blocks"];
     let size = ["--size", "96x80", "--rrs", "ears"];
-    let run = |command: &str, more: &[&str]| croupier(dir.path(), &[&[command], &small[..], &size, more].concat());
+    let run =
+        |command: &str, more: &[&str]| croupier(dir.path(), &[&[command, "cornell"], &small[..], &size, more].concat());
     let found = json(&run("render", &["--spp", "32", "--threads", "1", "--json"]));
     let plan = &found["plan"];
     let bytes = |name: &str| plan[name].as_u64().unwrap();
@@ -384,7 +385,7 @@ fn all_that_is_learned_fits_in_256_kib() {
         assert!(text(&out.stdout).contains(&said), "{said}: {}", text(&out.stdout));
     }
     // nothing is learned
-    let plain = json(&croupier(dir.path(), &["info", "--rrs", "classic", "--json"]));
+    let plain = json(&croupier(dir.path(), &["info", "cornell", "--rrs", "classic", "--json"]));
     assert_eq!(plain["plan"]["learning_bytes"], 0);
 }
 
@@ -393,7 +394,8 @@ fn all_that_is_learned_fits_in_256_kib() {
 #[test]
 fn everything_is_saved_after_ctrl_c() {
     let dir = tempfile::tempdir().unwrap();
-    let arguments = ["render", "--size", "16x16", "--threads", "1", "--rrs", "ears", "--seconds", "1000000", "--json"];
+    let arguments =
+        ["render", "cornell", "--size", "16x16", "--threads", "1", "--rrs", "ears", "--seconds", "1000000", "--json"];
     let mut child = Command::new(env!("CARGO_BIN_EXE_croupier"))
         .args(arguments)
         .args(["--cache-out", "a.cache"])

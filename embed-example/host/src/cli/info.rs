@@ -14,7 +14,7 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder with scene.json, .obj file, or baked .crp file; the built-in Cornell box if absent
+    /// Folder with scene.json, .obj file, or baked .crp file; `cornell` for the built-in Cornell box; a built-in still life if absent
     scene: Option<PathBuf>,
     #[command(flatten)]
     scene_flags: scene::SceneFlags,

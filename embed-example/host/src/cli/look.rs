@@ -41,6 +41,9 @@ pub(crate) struct LookFlags {
     /// Constant environment in place of the scene's, which lights it: #rrggbb, or linear R,G,B from 0 to 1e6
     #[arg(long, value_name = "COLOR", value_parser = color, conflicts_with = "env", allow_hyphen_values = true)]
     background: Option<Color>,
+    /// Add no ground below a mesh
+    #[arg(long)]
+    no_ground: bool,
 }
 
 /// [`Up`] with a default for the command line.
@@ -63,11 +66,12 @@ impl LookFlags {
             ("--env", self.env.is_some()),
             ("--sun", self.sun.is_some()),
             ("--background", self.background.is_some()),
+            ("--no-ground", self.no_ground),
         ];
         given.into_iter().find(|(_, given)| *given).map(|(name, _)| name)
     }
 
-    /// The wishes for the library, and notes of reading the environment map.
+    /// The requests for the library, and notes of reading the environment map.
     pub(crate) fn look(&self) -> Result<(Look, Vec<String>), Box<dyn Error>> {
         let (mut environment, mut notes) = (None, Vec::new());
         if let Some(path) = &self.env {
@@ -86,6 +90,7 @@ impl LookFlags {
             up: self.up.0,
             sun: self.sun,
             environment,
+            without_ground: self.no_ground,
         };
         Ok((look, notes))
     }

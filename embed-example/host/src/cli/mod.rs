@@ -20,7 +20,7 @@ mod values;
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
-/// Path tracer with Russian roulette and splitting. Without a command it renders the built-in scene.
+/// Path tracer with Russian roulette and splitting. Without a command it renders a built-in still life.
 #[derive(Parser)]
 #[command(name = "croupier", version, args_conflicts_with_subcommands = true)]
 struct Cli {

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder with scene.json, .obj file, or baked .crp file; the built-in Cornell box if absent
+    /// Folder with scene.json, .obj file, or baked .crp file; `cornell` for the built-in Cornell box; a built-in still life if absent
     pub(crate) scene: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) flags: Flags,
@@ -39,11 +39,11 @@ pub(crate) struct Flags {
     /// Threads, 0 for one per processor; the image does not depend on their number
     #[arg(long, value_name = "N", default_value_t = RenderOptions::default().threads)]
     threads: usize,
-    /// Exposure of the PNG in stops, -100 to 100, or auto: from the picture. Absent: auto for a scene without a camera, 1
-    /// for the built-in scene, else 0. The EXR stays as it is
+    /// Exposure of the PNG in stops, -100 to 100, or auto: from the picture. Absent: auto for the built-in
+    /// still life and scenes without a camera, 1 for the Cornell box, else 0. The EXR stays as it is
     #[arg(long, value_name = "STOPS", value_parser = exposure, allow_negative_numbers = true)]
     exposure: Option<Exposure>,
-    /// Add the denoised picture as layer `denoised`, and tone-map it for the PNG
+    /// Add the denoised picture as layer `denoised`, and tone-map it for the PNG; always for the built-in still life
     #[arg(long)]
     denoise: bool,
     /// Also write roulette factors, rays per sample and paths per sample as false-colour pictures with legends:
@@ -128,6 +128,8 @@ struct Report<'a> {
     false_color: &'a [PathBuf],
     #[serde(skip_serializing_if = "Option::is_none")]
     cache_out: Option<&'a Path>,
+    /// The PNG shows the denoised picture.
+    denoised: bool,
     /// Complete files.
     written: &'a [PathBuf],
 }
@@ -137,8 +139,10 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
     let outputs = Outputs::new(&flags.output, flags.cache.cache_out.as_deref(), flags.false_color);
     // Said now, not after an hour of rendering.
     outputs.check()?;
-    let options = flags.options()?;
-    let scene::Opened { bytes, mut notes, framed } = scene::open(path, &flags.scene)?;
+    let mut options = flags.options()?;
+    // the first picture that anyone sees
+    options.denoise |= path.is_none();
+    let scene::Opened { bytes, mut notes, exposure } = scene::open(path, &flags.scene)?;
     let validated = Scene::from_bytes(&bytes).map_err(|e| about(path)(&e))?;
     if let Some(text) = shortened(&validated, options.settings.max_depth) {
         notes.add(path, text);
@@ -152,10 +156,8 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
         let count = stats.counters.get("non_finite").unwrap_or(&1);
         notes.add(path, format!("{count} contributions were not finite and left out, the first in pixel ({x}, {y})"));
     }
-    // Its area light brings the walls to about a fifth of white.
-    let usual = if path.is_none() { Exposure::Stops(1.0) } else { Exposure::Stops(0.0) };
-    let exposure = flags.exposure.unwrap_or(if framed { Exposure::Auto } else { usual });
-    let image = if flags.denoise { "denoised" } else { "" };
+    let exposure = flags.exposure.unwrap_or(exposure);
+    let image = if options.denoise { "denoised" } else { "" };
     let written = outputs.write(picture, cache.as_deref(), image, exposure);
     let report = Report {
         stats,
@@ -171,6 +173,7 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Outcome {
         png: &outputs.png,
         false_color: &outputs.false_color,
         cache_out: outputs.cache,
+        denoised: options.denoise,
         written: &written.files,
     };
     // The figures are worth having even if a file is missing.
@@ -210,5 +213,8 @@ fn print(r: &Report<'_>) -> Outcome {
         say(&format!("\n{statistics}"))?;
     }
     let names: Vec<_> = r.written.iter().map(|p| p.display().to_string()).collect();
+    if r.denoised {
+        say("the PNG shows the denoised picture, the EXR has both")?;
+    }
     if names.is_empty() { Ok(()) } else { say(&format!("wrote {}", names.join(", "))) }
 }

@@ -3,6 +3,7 @@
 use super::look::LookFlags;
 use super::notes::{Notes, about};
 use super::progress;
+use super::values::Exposure;
 use croupier_host::bake::{self, BakeError};
 use croupier_host::builtin;
 use croupier_host::description::SceneDescription;
@@ -13,6 +14,9 @@ use std::error::Error;
 use std::fs::File;
 use std::ops::Deref;
 use std::path::Path;
+
+/// Name of the built-in Cornell box.
+pub(crate) const CORNELL: &str = "cornell";
 
 /// A scene blob, in memory or on disk.
 pub(crate) enum SceneBytes {
@@ -48,12 +52,12 @@ pub(crate) struct SceneFlags {
 pub(crate) struct Opened {
     pub(crate) bytes: SceneBytes,
     pub(crate) notes: Notes,
-    /// The picture was composed here, and wants an exposure to suit it.
-    pub(crate) framed: bool,
+    /// Exposure, unless a flag gives one.
+    pub(crate) exposure: Exposure,
 }
 
-/// Opens a scene: a baked `.crp` file, anything that loads and bakes (a folder with `scene.json`, an `.obj`), or,
-/// without a path, the built-in one. What had to be assumed, ignored or left out is printed and returned.
+/// Opens a scene: a baked `.crp` file, anything that loads and bakes (a folder with `scene.json`, an `.obj`),
+/// `cornell` for the built-in Cornell box, or, without a path, the built-in still life. What had to be assumed, ignored or left out is printed and returned.
 pub(crate) fn open(path: Option<&Path>, flags: &SceneFlags) -> Result<Opened, Box<dyn Error>> {
     let baked_file = path.is_some_and(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")));
     if let Some(path) = path.filter(|_| baked_file) {
@@ -61,14 +65,14 @@ pub(crate) fn open(path: Option<&Path>, flags: &SceneFlags) -> Result<Opened, Bo
         if let Some(flag) = flag {
             return Err(format!("{}: `{flag}` is for baking, not for baked files", path.display()).into());
         }
-        return Ok(Opened { bytes: map(path)?, notes: Notes::default(), framed: false });
+        return Ok(Opened { bytes: map(path)?, notes: Notes::default(), exposure: Exposure::Stops(0.0) });
     }
     let (look, notes) = flags.look.look()?;
     let (mut description, mut loaded) = match path {
-        Some(path) => load::load_with(path, &look)?,
-        None => {
-            let mut scene = builtin::cornell_box();
-            let notes = dress(&mut scene, &Given::SCENE, &look).map_err(|e| about(None)(&e))?;
+        Some(path) if !is_cornell(path) => load::load_with(path, &look)?,
+        _ => {
+            let mut scene = if path.is_some() { builtin::cornell_box() } else { builtin::showcase() };
+            let notes = dress(&mut scene, &Given::SCENE, &look).map_err(|e| about(path)(&e))?;
             (scene, LoadReport { notes, ..LoadReport::default() })
         }
     };
@@ -79,7 +83,18 @@ pub(crate) fn open(path: Option<&Path>, flags: &SceneFlags) -> Result<Opened, Bo
     let baked = bake(&description).map_err(|e| about(path)(&e))?;
     let notes = Notes::of(&loaded, &baked.report);
     notes.print(path);
-    Ok(Opened { bytes: SceneBytes::Baked(baked), notes, framed: loaded.framed })
+    let exposure = match path {
+        // its area light brings the walls to about a fifth of white
+        Some(path) if is_cornell(path) => Exposure::Stops(1.0),
+        Some(_) if !loaded.framed => Exposure::Stops(0.0),
+        _ => Exposure::Auto,
+    };
+    Ok(Opened { bytes: SceneBytes::Baked(baked), notes, exposure })
+}
+
+/// The built-in box, unless there is a file of that name.
+fn is_cornell(path: &Path) -> bool {
+    path == Path::new(CORNELL) && !path.exists()
 }
 
 fn bake(description: &SceneDescription) -> Result<bake::Baked, BakeError> {

@@ -68,7 +68,7 @@ pub enum LoadError {
         /// Fault, in words.
         what: String,
     },
-    /// A wish that the scene cannot follow.
+    /// A request that the scene cannot follow.
     Look {
         /// Scene.
         path: PathBuf,

@@ -44,14 +44,14 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// As [`load_with`], without wishes.
+/// As [`load_with`], without requests.
 pub fn load(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
     load_with(path, &Look::default())
 }
 
 /// Loads a folder with a `scene.json`, that `scene.json` itself, or a file of another kind by its extension: `.gltf`,
 /// `.glb`, `.obj`, `.ply`, `.stl`. A file that begins like `.glb` or PLY is one, whatever its name is. What it leaves open
-/// is completed, and the wishes of `look` are followed ([`dress`]).
+/// is completed, and the requests of `look` are followed ([`dress`]).
 pub fn load_with(path: &Path, look: &Look) -> Result<(SceneDescription, LoadReport), LoadError> {
     let mut loader = Loader::default();
     let extension = path.extension().map(|e| e.to_ascii_lowercase());

@@ -46,9 +46,9 @@ const ALBEDO: f64 = 0.3;
 /// Steps of an integral along a ray.
 const STEPS: usize = 40;
 /// Entries of the table of transmittances: cosines, heights.
-const TRANSMITTANCE: [usize; 2] = [128, 32];
+const TRANSMITTANCE: [usize; 2] = [96, 24];
 /// Entries of the table of multiple scattering: cosines of the sun, heights.
-const MULTIPLE: [usize; 2] = [24, 16];
+const MULTIPLE: [usize; 2] = [16, 8];
 /// Directions of an integral over the sphere: polar angles, azimuths.
 const SPHERE: [usize; 2] = [8, 8];
 
@@ -221,8 +221,8 @@ impl Atmosphere {
             let q = along(p, d, t);
             let mu_sun = dot(q, sun) / GROUND;
             let lit = self.to_space(GROUND, mu_sun);
-            for c in 0..N {
-                out.radiance[c] += out.transmittance[c] * lit[c] * mu_sun.max(0.0) * ALBEDO / PI;
+            for ((radiance, passes), lit) in out.radiance.iter_mut().zip(out.transmittance).zip(lit) {
+                *radiance += passes * lit * mu_sun.max(0.0) * ALBEDO / PI;
             }
         }
         out
@@ -277,13 +277,14 @@ fn cosine_of(x: f64) -> f64 {
 fn optical(air: &Spectrum, r: f64, mu: f64) -> Spectrum {
     let (p, d) = ([0.0, r, 0.0], [(1.0 - mu * mu).max(0.0).sqrt(), mu, 0.0]);
     let length = sphere(p, d, TOP).unwrap_or(0.0);
-    let n = 200;
     let mut depth = [0.0; N];
-    for k in 0..n {
-        let q = along(p, d, length * (f64::from(k) + 0.5) / f64::from(n));
+    for k in 0..2 * STEPS {
+        // shorter steps at the start, where the air is densest
+        let [a, b] = [k, k + 1].map(|k| length * (k as f64 / (2 * STEPS) as f64).powi(2));
+        let q = along(p, d, (a + b) / 2.0);
         // below the ground as at the ground, so that the table is smooth across the horizon
         let (_, _, extinction) = coefficients(air, (dot(q, q).sqrt() - GROUND).max(0.0));
-        (0..N).for_each(|c| depth[c] += extinction[c] * length / f64::from(n));
+        (0..N).for_each(|c| depth[c] += extinction[c] * (b - a));
     }
     depth.map(|t| (-t).exp())
 }

@@ -1,12 +1,13 @@
 //! What scene files leave open and users ask for: which way is up, camera, light, ground, exposure.
 //!
-//! [`dress`] completes a scene that was loaded, and follows the wishes of a [`Look`]. A bare mesh becomes a picture: its
+//! [`dress`] completes a scene that was loaded, and follows the requests of a [`Look`]. A bare mesh becomes a picture: its
 //! up axis is guessed, it is framed from the front, the right and above, it stands on a matte ground under sun and sky.
 //! Scenes that bring camera and light along stay as they are, but for what is asked for.
 //!
 //! | file | has |
 //! |---|---|
-//! | `axes` | up and front, guessed or chosen |
+//! | `axes` | up and front |
+//! | `up` | the guess which axis points up |
 //! | `framing` | the camera that shows everything |
 //! | `room` | whether a mesh brings a ground or walls along |
 //! | `atmosphere`, `sky` | sun and sky |
@@ -18,6 +19,7 @@ pub mod exposure;
 mod framing;
 mod room;
 mod sky;
+mod up;
 
 pub use atmosphere::Atmosphere;
 pub use axes::{Axes, Up};
@@ -48,7 +50,7 @@ impl Given {
     pub const MESH: Self = Self { camera: false, light: false, up: Up::Y, up_is_known: false };
 }
 
-/// Wishes; the default has none.
+/// Requests; the default has none.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Look {
     /// Camera of the file to use, by name.
@@ -65,9 +67,11 @@ pub struct Look {
     pub sun: Option<Sun>,
     /// Environment in place of the scene's, a map with y up; with `sun` the sky is left out.
     pub environment: Option<Environment>,
+    /// No ground is added below meshes.
+    pub without_ground: bool,
 }
 
-/// A wish that cannot be followed.
+/// A request that cannot be followed.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LookError {
@@ -104,11 +108,11 @@ impl std::error::Error for LookError {}
 /// Radius of the added ground, in radii of what stands on it; beyond it the environment continues the ground.
 const GROUND_RADII: f64 = 10.0;
 /// Albedo of the added ground.
-const GROUND_ALBEDO: f32 = 0.45;
+const GROUND_ALBEDO: f32 = 0.4;
 /// Corners of the added ground.
 const GROUND_CORNERS: u32 = 64;
 
-/// Completes a scene and follows the wishes; returns notes on what was assumed, one sentence each.
+/// Completes a scene and follows the requests; returns notes on what was assumed, one sentence each.
 pub fn dress(scene: &mut SceneDescription, given: &Given, look: &Look) -> Result<Vec<String>, LookError> {
     let mut notes = Vec::new();
     let has_camera = choose_camera(scene, look)? || given.camera;
@@ -118,23 +122,24 @@ pub fn dress(scene: &mut SceneDescription, given: &Given, look: &Look) -> Result
     }
     let (axes, guessed) = match (look.up, has_camera) {
         (Up::Auto, true) => (axes_of(&scene.camera), false),
-        (Up::Auto, false) if given.up_is_known => axes::axes(scene, given.up, given.up),
-        (up, _) => axes::axes(scene, up, given.up),
+        (Up::Auto, false) if given.up_is_known => up::axes(scene, given.up, given.up),
+        (choice, _) => up::axes(scene, choice, given.up),
     };
     let surroundings = Surroundings::of(scene, &axes).unwrap_or_default();
     if !has_camera {
         let base =
-            Camera { size: [960, 720], vfov_deg: look.fov_deg.unwrap_or(framing::VFOV_DEG), ..Camera::default() };
+            Camera { size: [800, 600], vfov_deg: look.fov_deg.unwrap_or(framing::VFOV_DEG), ..Camera::default() };
         scene.camera = camera(scene, &surroundings, &axes, &base);
         let up = if axes == Axes::Z { "z" } else { "y" };
         let why = if guessed { " (--up chooses)" } else { "" };
-        let what = if surroundings.room && !surroundings.open_front { "placed in the room" } else { "framed" };
+        let what = if surroundings.room && surroundings.open_side.is_none() { "placed in the room" } else { "framed" };
         notes.push(format!("the file has no camera: {what}, {up} taken as up{why}"));
     }
     aim(&mut scene.camera, look, &axes)?;
     let lit = given.light || (surroundings.room && !scene.emitters.is_empty());
     light(scene, look, &axes, &surroundings, lit, &mut notes);
-    if !given.camera && !given.light && !surroundings.ground && !surroundings.room && !scene.triangles.is_empty() {
+    let bare = !given.camera && !given.light && !surroundings.ground && !surroundings.room;
+    if bare && !look.without_ground && !scene.triangles.is_empty() {
         add_ground(scene, &surroundings, &axes);
         notes.push("a ground was added below the mesh".into());
     }
@@ -158,19 +163,11 @@ fn axes_of(camera: &Camera) -> Axes {
 
 /// A camera for a scene without one.
 fn camera(scene: &SceneDescription, around: &Surroundings, axes: &Axes, base: &Camera) -> Camera {
+    if let Some(camera) = around.open_side.map(|side| framing::through(side, around.bounds, axes, base)) {
+        return camera;
+    }
     if around.room {
-        if !around.open_front {
-            return framing::inside(around.bounds, axes, base);
-        }
-        // through the missing wall
-        let [lo, hi] = around.bounds;
-        let middle = around.middle();
-        let half = [hi[0] - middle[0], hi[1] - middle[1]];
-        let reach = (base.vfov_deg.to_radians() / 2.0).tan() * 0.95;
-        let aspect = f64::from(base.size[0]) / f64::from(base.size[1]);
-        let distance = (half[1] / reach).max(half[0] / (reach * aspect));
-        let origin = axes.vector([middle[0], middle[1], hi[2] + distance]);
-        return Camera { origin, target: axes.vector([middle[0], middle[1], lo[2]]), up: axes.up, ..*base };
+        return framing::inside(around.bounds, axes, base);
     }
     let all = || scene.triangles.iter().filter_map(|t| corners(scene, t.vertices));
     // What stands on a ground, if it is small on it.
@@ -229,7 +226,7 @@ fn light(
     lit: bool,
     notes: &mut Vec<String>,
 ) {
-    let closed = around.room && !around.open_front;
+    let closed = around.room && around.open_side.is_none();
     let needs = !lit && look.environment.is_none() && look.sun.is_none();
     if needs && closed && scene.emitters.is_empty() {
         // no sky reaches it: a lamp below the ceiling, as bright as daylight on the floor

@@ -30,10 +30,10 @@ impl Default for Sun {
 const DIAMETER_DEG: f32 = 0.53;
 /// Elevation at which sun and sky are white.
 const WHITE_DEG: f64 = 45.0;
-/// Columns and rows of the map: steps of 1.4 and 0.7 degrees. The middle row is the horizon.
-const SIZE: [usize; 2] = [256, 257];
+/// Columns and rows of the map: steps of 2.8 and 1.4 degrees. The middle row is the horizon.
+const SIZE: [usize; 2] = [128, 129];
 /// Below the horizon the haze of the sky fades into the ground over this many rows.
-const FADE: usize = 3;
+const FADE: usize = 2;
 /// Steps in polar angle and azimuth of integrals over the sky.
 const STEPS: usize = 24;
 
