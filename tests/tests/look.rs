@@ -7,6 +7,8 @@ use croupier_tests::light_oracle::{cross, dot, length, luminance, sub, unit, wid
 use std::f64::consts::PI;
 
 type V = [f64; 3];
+/// Moves a point.
+type Shape = fn(V) -> V;
 
 /// A mesh of boxes (smallest and largest corner), outwards.
 fn boxes(all: &[[V; 2]]) -> SceneDescription {
@@ -64,7 +66,7 @@ fn in_picture(c: &Camera, p: V) -> [f64; 2] {
 /// Killed by: framing by a sphere, by the box of the world's axes, or with the unused vertex.
 #[test]
 fn meshes_fill_the_picture() {
-    let shapes: [(&str, fn(V) -> V); 6] = [
+    let shapes: [(&str, Shape); 6] = [
         ("as it is", |p| p),
         ("tiny", |p| p.map(|x| x * 1e-4)),
         ("huge", |p| p.map(|x| x * 1e6)),

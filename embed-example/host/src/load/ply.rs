@@ -303,7 +303,7 @@ impl Polygons {
         for strip in strips.split(|i| *i < 0) {
             for (k, t) in strip.windows(3).enumerate() {
                 let [a, b, c] = [t[0], t[1], t[2]];
-                self.push(&if k % 2 == 0 { [a, b, c] } else { [b, a, c] }, &[])?;
+                self.push(&if k.is_multiple_of(2) { [a, b, c] } else { [b, a, c] }, &[])?;
             }
         }
         Ok(())

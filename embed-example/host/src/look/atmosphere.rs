@@ -221,8 +221,8 @@ impl Atmosphere {
             let q = along(p, d, t);
             let mu_sun = dot(q, sun) / GROUND;
             let lit = self.to_space(GROUND, mu_sun);
-            for c in 0..N {
-                out.radiance[c] += out.transmittance[c] * lit[c] * mu_sun.max(0.0) * ALBEDO / PI;
+            for ((radiance, passes), lit) in out.radiance.iter_mut().zip(out.transmittance).zip(lit) {
+                *radiance += passes * lit * mu_sun.max(0.0) * ALBEDO / PI;
             }
         }
         out

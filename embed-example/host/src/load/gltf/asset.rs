@@ -45,6 +45,12 @@ impl<'b> Asset<'b> {
         Ok(Self { path, root, buffers })
     }
 
+    /// Most triangles that may be made of the document. A triangle takes two bytes or more, of indices that it does not
+    /// share, or of a node that places it again; small documents may repeat themselves more often.
+    pub(super) fn most_triangles(&self) -> usize {
+        self.buffers.iter().map(|b| b.len()).sum::<usize>().saturating_mul(2).max(1 << 22)
+    }
+
     pub(super) fn error(&self, at: impl Into<String>, what: impl Into<String>) -> LoadError {
         LoadError::json(self.path, at, what)
     }
@@ -140,7 +146,8 @@ impl<'b> Asset<'b> {
         at: &str,
     ) -> Result<Elements<'_>, LoadError> {
         let (bytes, stride) = self.view(view, at)?;
-        let stride = stride.unwrap_or(size);
+        // 0 would let a count be anything
+        let stride = stride.filter(|s| *s > 0).unwrap_or(size);
         let length = match count.checked_sub(1) {
             None => Some(0),
             Some(last) => stride.checked_mul(last).and_then(|n| n.checked_add(size)),

@@ -11,9 +11,6 @@ use gltf_json::mesh::{Mode, Semantic};
 use gltf_json::validation::Checked;
 use gltf_json::{Accessor, Index, Mesh, mesh};
 
-/// Most triangles of a scene: the blob holds fewer.
-pub(super) const MOST_TRIANGLES: usize = 1 << 27;
-
 /// Joints of a vertex and their weights.
 pub(super) type Influences = Vec<([u32; 4], [f32; 4])>;
 
@@ -45,8 +42,8 @@ pub(super) fn load(
         let at = format!("meshes[{}].primitives[{i}]", index.value());
         out.extend(load_primitive(loader, scene, asset, materials, primitive, &at)?);
         triangles += out.last().map_or(0, |p| p.triangles.len());
-        if triangles > MOST_TRIANGLES {
-            return Err(asset.error(at, "too many triangles"));
+        if triangles > asset.most_triangles() {
+            return Err(asset.error(at, format!("{triangles} triangles in a document of its size")));
         }
     }
     Ok(out)
@@ -223,7 +220,7 @@ fn corners(
     if let Some(v) = list.iter().find(|v| **v as usize >= vertices) {
         return Err(asset.error(at, format!("there is no vertex {v}, there are {vertices}")));
     }
-    let odd = |i: usize, [a, b, c]: [u32; 3]| if i % 2 == 0 { [a, b, c] } else { [a, c, b] };
+    let odd = |i: usize, [a, b, c]: [u32; 3]| if i.is_multiple_of(2) { [a, b, c] } else { [a, c, b] };
     Ok(match mode {
         Mode::TriangleStrip => list.windows(3).enumerate().map(|(i, w)| odd(i, [w[0], w[1], w[2]])).collect(),
         Mode::TriangleFan => {

@@ -37,7 +37,7 @@ use glam::{DMat3, DMat4, DVec3};
 use gltf_json::accessor::Type;
 use gltf_json::{Index, Mesh, Root, Skin};
 use materials::{Materials, Volume};
-use meshes::{MOST_TRIANGLES, Primitive};
+use meshes::Primitive;
 use nodes::{Placed, Placement};
 use std::collections::HashMap;
 use std::path::Path;
@@ -162,8 +162,9 @@ fn place(
         let instanced = (rigid.len().max(1) - 1).saturating_mul(triangles) > SAVED_TRIANGLES;
         let copies = if instanced { uses.len() - rigid.len() + 1 } else { uses.len() };
         let total = copies.saturating_mul(triangles).saturating_add(scene.triangles.len());
-        if total > MOST_TRIANGLES {
-            return Err(asset.error(format!("meshes[{}]", mesh.value()), format!("{total} triangles are too many")));
+        if total > asset.most_triangles() {
+            let what = format!("{total} triangles in a document of its size");
+            return Err(asset.error(format!("meshes[{}]", mesh.value()), what));
         }
         if instanced {
             let name = asset.root.meshes.get(mesh.value()).and_then(|m| m.name.clone());
@@ -294,9 +295,14 @@ fn joints(asset: &Asset<'_>, placed: &Placed, index: Index<Skin>) -> Result<Vec<
 
 /// Gives solids that absorb their media. What is open has no inside: it becomes a sheet.
 fn solids(loader: &mut Loader, scene: &mut SceneDescription, volumes: &[Volume]) {
+    let mut bounds: HashMap<u32, Vec<u32>> = volumes.iter().map(|v| (v.material, Vec::new())).collect();
+    for (i, t) in (0..).zip(&scene.triangles) {
+        if let Some(list) = bounds.get_mut(&t.material) {
+            list.push(i);
+        }
+    }
     for volume in volumes {
-        let triangles: Vec<u32> =
-            (0..).zip(&scene.triangles).filter(|(_, t)| t.material == volume.material).map(|(i, _)| i).collect();
+        let triangles = bounds.remove(&volume.material).unwrap_or_default();
         if triangles.is_empty() {
             continue;
         }

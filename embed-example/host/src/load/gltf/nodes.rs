@@ -12,6 +12,8 @@ use gltf_json::validation::Checked;
 use gltf_json::{Accessor, Index, Mesh, Node, Skin};
 use std::collections::HashMap;
 
+/// Most meshes in a scene, those of `EXT_mesh_gpu_instancing` included.
+const MOST_PLACEMENTS: usize = 1 << 22;
 /// Rows of pictures.
 const HEIGHT: u32 = 480;
 /// Lumens of a watt, with which Blender writes lights.
@@ -52,7 +54,11 @@ pub(super) fn walk(loader: &mut Loader, scene: &mut SceneDescription, asset: &As
         if let Some(mesh) = node.mesh {
             let mesh_name = asset.root.meshes.get(mesh.value()).and_then(|m| m.name.clone());
             let name = node.name.clone().or(mesh_name).unwrap_or_else(|| at.clone());
-            for world in instances(asset, node, world, &at)? {
+            let worlds = instances(asset, node, world, &at)?;
+            if worlds.len() + placed.placements.len() > MOST_PLACEMENTS {
+                return Err(asset.error(at, format!("more than {MOST_PLACEMENTS} meshes in the scene")));
+            }
+            for world in worlds {
                 placed.placements.push(Placement { name: name.clone(), mesh, skin: node.skin, world });
             }
         }
