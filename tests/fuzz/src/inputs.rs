@@ -6,8 +6,8 @@ use croupier::unstable::scene::blob::{Header, content_hash};
 use croupier::{Budget, Plan, Scene, Session, Settings, Shard, StepResult};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
-use croupier_host::builtin;
 use croupier_host::checkpoint;
+use croupier_host::description::{Camera, Emitter, Environment, Model, Reflectance, SceneDescription, Vertex};
 use croupier_host::image::Picture;
 use croupier_host::load::{LoadOptions, load_with};
 use croupier_host::look::Look;
@@ -64,7 +64,7 @@ pub const FORMATS: &[Format] = &[
         seeds: exr_seeds,
         words: &["channels", "dataWindow", "box2i", "R", "B", "G"],
     },
-    Format { name: "blob", run: Workbench::blob, seeds: || vec![box_blob().to_vec()], words: &[] },
+    Format { name: "blob", run: Workbench::blob, seeds: || vec![small_blob().to_vec()], words: &[] },
     Format { name: "cache", run: Workbench::cache, seeds: cache_seeds, words: &[] },
     Format { name: "checkpoint", run: Workbench::checkpoint, seeds: checkpoint_seeds, words: &["ears", "=", "\n"] },
 ];
@@ -93,7 +93,7 @@ impl Default for Workbench {
         let thread: String = thread.chars().filter(char::is_ascii_digit).collect();
         let folder = std::env::temp_dir().join(format!("croupier-fuzz-{}-{thread}", std::process::id()));
         fs::create_dir_all(&folder).expect("a temporary folder");
-        let bench = Self { folder, scene: box_blob() };
+        let bench = Self { folder, scene: small_blob() };
         bench.restore();
         bench
     }
@@ -236,8 +236,21 @@ fn iterate(session: &mut Session<'_, '_>, plan: &Plan) {
     let _ = session.film().error_estimate();
 }
 
-fn box_blob() -> AlignedBytes {
-    bake(&builtin::cornell_box(), &BakeOptions::default(), |_, _| {}).expect("the built-in scene").bytes
+/// The smallest scene with all kinds of records: a floor, a lamp, a constant environment.
+fn small_blob() -> AlignedBytes {
+    let mut scene = SceneDescription { camera: Camera { size: [4, 3], ..Camera::default() }, ..Default::default() };
+    for (name, z, y) in [("floor", 0.5, [0.2; 3]), ("lamp", 0.9, [0.0; 3])] {
+        let material = scene.add_material(name, Model::Diffuse { reflectance: Reflectance::Constant(y) });
+        let corners = [[-1.0, -1.0, z], [1.0, -1.0, z], [1.0, 1.0, z], [-1.0, 1.0, z]];
+        let corners = corners.map(|position| Vertex { position, ..Vertex::default() });
+        scene.add_mesh(name, material, &corners, &[[0, 1, 2], [0, 2, 3]], false);
+    }
+    scene.materials.iter_mut().for_each(|m| m.two_sided = true);
+    scene.camera =
+        Camera { origin: [0.0, 0.0, 3.0], target: [0.0; 3], up: [0.0, 1.0, 0.0], size: [4, 3], ..scene.camera };
+    scene.emitters.push(Emitter::Area { material: 1, radiance: [3.0; 3] });
+    scene.environment = Some(Environment::Constant { radiance: [0.5; 3] });
+    bake(&scene, &BakeOptions::default(), |_, _| {}).expect("a valid scene").bytes
 }
 
 fn png_seeds() -> Vec<Vec<u8>> {
@@ -306,7 +319,7 @@ fn exr_seeds() -> Vec<Vec<u8>> {
 }
 
 fn cache_seeds() -> Vec<Vec<u8>> {
-    let blob = box_blob();
+    let blob = small_blob();
     let scene = Scene::from_bytes(&blob).expect("a valid scene");
     let plan = Plan::new(&settings(&scene)).expect("valid settings");
     let mut block = AlignedBytes::zeroed(plan.session().size);
@@ -319,7 +332,7 @@ fn cache_seeds() -> Vec<Vec<u8>> {
 }
 
 fn checkpoint_seeds() -> Vec<Vec<u8>> {
-    let blob = box_blob();
+    let blob = small_blob();
     let scene = Scene::from_bytes(&blob).expect("a valid scene");
     let settings = settings(&scene);
     let plan = Plan::new(&settings).expect("valid settings");

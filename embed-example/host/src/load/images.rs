@@ -30,6 +30,12 @@ pub(super) fn texture(bytes: &[u8], free: u64) -> Result<Decoded, String> {
     }
 }
 
+/// The beginning of a decoder's message, in one line: it may quote the file.
+fn said(e: &dyn std::fmt::Display) -> String {
+    let words = e.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+    text::excerpt(&words).into_owned()
+}
+
 /// Fails unless an image whose decoding takes `bytes_per_pixel` fits.
 pub(super) fn fits(width: u64, height: u64, bytes_per_pixel: u64, free: u64) -> Result<(), String> {
     match width.checked_mul(height).and_then(|n| n.checked_mul(bytes_per_pixel)) {
@@ -56,7 +62,7 @@ fn png(bytes: &[u8], free: u64) -> Result<Texture, String> {
     let limits = png::Limits { bytes: usize::try_from(free).unwrap_or(usize::MAX) };
     let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), limits);
     decoder.set_transformations(Transformations::EXPAND);
-    let mut reader = decoder.read_info().map_err(|e| format!("not a readable PNG or JPEG: {e}"))?;
+    let mut reader = decoder.read_info().map_err(|e| format!("not a readable PNG or JPEG: {}", said(&e)))?;
     let (width, height) = reader.info().size();
     let (color, depth) = reader.output_color_type();
     // as decoded, reduced to 8 bits, as texels
@@ -64,7 +70,7 @@ fn png(bytes: &[u8], free: u64) -> Result<Texture, String> {
     let reduced = if depth == BitDepth::Sixteen { 3 * samples } else { samples };
     fits(width.into(), height.into(), reduced + 4, free)?;
     let mut data = zeros(reader.output_buffer_size().ok_or("too large")?)?;
-    let info = reader.next_frame(&mut data).map_err(|e| format!("not a readable PNG: {e}"))?;
+    let info = reader.next_frame(&mut data).map_err(|e| format!("not a readable PNG: {}", said(&e)))?;
     data.truncate(info.buffer_size());
     if info.bit_depth == BitDepth::Sixteen {
         let reduced = |b: &[u8]| ((u32::from(b[0]) << 8 | u32::from(b[1])) * 255 + 32767) / 65535;
@@ -88,7 +94,7 @@ const JPEG_BYTES: u64 = 2 * 4 + 4 * 2;
 /// early are refused (strict mode), which would fill up with grey; if only their last bytes are missing that may go
 /// unnoticed. Bytes behind the end of the picture (cameras' previews, downloads' padding) are ignored.
 fn jpeg(bytes: &[u8], free: u64) -> Result<Decoded, String> {
-    let unreadable = |e: &dyn std::fmt::Display| format!("not a readable JPEG: {e}");
+    let unreadable = |e: &dyn std::fmt::Display| format!("not a readable JPEG: {}", said(e));
     let options = DecoderOptions::default().jpeg_set_out_colorspace(ColorSpace::RGBA).set_strict_mode(true);
     let end = jpeg_end(bytes).unwrap_or(bytes.len());
     let picture = bytes.get(..end).unwrap_or(bytes);
@@ -148,7 +154,7 @@ pub(super) fn environment(bytes: &[u8], free: u64) -> Result<(Environment, usize
 
 /// The RGB picture of an EXR.
 fn exr(bytes: &[u8], free: u64) -> Result<Rgb, String> {
-    let unreadable = |e: &dyn std::fmt::Display| format!("not a readable EXR: {e}");
+    let unreadable = |e: &dyn std::fmt::Display| format!("not a readable EXR: {}", said(e));
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| unreadable(&e))?;
     for header in &meta.headers {
         let channels = &header.channels.list;
