@@ -2,7 +2,7 @@
 
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::description::*;
-use croupier_host::load::{load, load_with};
+use croupier_host::load::{LoadOptions, load, load_with};
 use croupier_host::look::Look;
 use croupier_tests::stats::SplitMix;
 use std::fs;
@@ -14,7 +14,8 @@ fn try_load(name: &str, bytes: &[u8]) -> Result<SceneDescription, String> {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join(name), bytes).unwrap();
     let shown = folder.path().display().to_string();
-    let loaded = load_with(&folder.path().join(name), &Look { environment, ..Look::default() });
+    let loaded =
+        load_with(&folder.path().join(name), &LoadOptions::default(), &Look { environment, ..Look::default() });
     loaded.map(|(scene, _)| without_ground(scene)).map_err(|e| e.to_string().replace(&shown, "@"))
 }
 

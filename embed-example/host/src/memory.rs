@@ -2,7 +2,7 @@
 
 use crate::render::PlanSummary;
 use crate::text;
-use croupier::unstable::film::{PixelAov, PixelStats};
+use croupier::unstable::film::{Aov, AovSet, PixelStats};
 use std::fs;
 
 /// Bytes of a render from which on they are stated before it begins: 4 GiB, or half of the machine's memory if that is
@@ -22,12 +22,12 @@ pub struct Demand {
 
 impl Demand {
     /// Demand of a render of so many pixels.
-    pub fn new(scene_bytes: u64, plan: &PlanSummary, [width, height]: [u32; 2], aovs: bool) -> Self {
+    pub fn new(scene_bytes: u64, plan: &PlanSummary, [width, height]: [u32; 2], aovs: AovSet) -> Self {
         let pixels = u64::from(width) * u64::from(height);
-        // picture, standard error, cost, samples; albedo, normal, depth, paths, four factors: once in the picture and
-        // once in the file's encoder
-        let floats: u64 = if aovs { 8 + 12 } else { 8 };
-        let sums = size_of::<PixelStats>() + if aovs { size_of::<PixelAov>() } else { 0 };
+        // picture, standard error, cost, samples and auxiliary values: once in the picture and once in the file's encoder
+        let channels: usize = Aov::ALL.into_iter().filter(|aov| aovs.has(*aov)).map(|aov| aov.channels().len()).sum();
+        let floats = 8 + channels as u64;
+        let sums = size_of::<PixelStats>() + 4 * channels;
         Self {
             scene: scene_bytes,
             plan: plan.shared_bytes.saturating_add(plan.shard_bytes.saturating_mul(plan.shards.into())),

@@ -8,7 +8,7 @@ mod nodes;
 
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::description::*;
-use croupier_host::load::{LoadReport, load, load_with};
+use croupier_host::load::{LoadOptions, LoadReport, load, load_with};
 use croupier_host::look::Look;
 use document::Document;
 use std::fs;
@@ -20,7 +20,8 @@ fn try_load(name: &str, bytes: &[u8]) -> Result<(SceneDescription, LoadReport), 
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join(name), bytes).unwrap();
     let shown = folder.path().display().to_string();
-    let loaded = load_with(&folder.path().join(name), &Look { environment, ..Look::default() });
+    let loaded =
+        load_with(&folder.path().join(name), &LoadOptions::default(), &Look { environment, ..Look::default() });
     loaded.map(|(scene, report)| (without_ground(scene), report)).map_err(|e| e.to_string().replace(&shown, "@"))
 }
 
