@@ -177,7 +177,7 @@ fn energy(model: &dyn Model, layered: &Layered, wo: V, side: usize) -> V {
 }
 
 /// White furnace over roughness x metalness x transmission x coat x sheen. Nothing gains more than 1 %, a white surface
-/// loses no more than 1 %, a sheet 4 %, with coat or sheen 12 %: what the minimum of the layers' transmittances loses.
+/// loses no more than 1 %, a sheet 4 %, with coat or sheen 17 %: what the minimum of the layers' transmittances loses.
 /// Killed by: layers that are not scaled by what those above reflect, compensation left out, T instead of its product.
 #[test]
 fn white_materials_neither_gain_nor_lose_energy() {
@@ -228,7 +228,7 @@ fn white_materials_neither_gain_nor_lose_energy() {
     assert!(most.0 < 1.01, "{most:?}");
     assert!(least[0].0 > 0.99, "{:?}", least[0]);
     assert!(least[1].0 > 0.96, "{:?}", least[1]);
-    assert!(least[2].0 > 0.88, "{:?}", least[2]);
+    assert!(least[2].0 > 0.83, "{:?}", least[2]);
 }
 
 /// f(wo, wi) = f(wi, wo) where nothing solid is transmitted. Killed by: scaling by the transmittance of one direction.

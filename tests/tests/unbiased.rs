@@ -12,11 +12,11 @@ use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier::{Budget, Plan, Scene, Session, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin;
-use croupier_host::description::Emitter;
+use croupier_host::description::{Emitter, Encoding, Model, Principled, Texture, TextureRef};
 use croupier_host::load::load;
 use croupier_tests::runner::{Image, render, settings};
 use croupier_tests::scenes::{blob, cornell};
-use croupier_tests::stats::equivalent;
+use croupier_tests::stats::{SplitMix, equivalent};
 use std::path::Path;
 
 /// Half-width of what counts as equal, relative to the mean.
@@ -70,6 +70,34 @@ fn fixed_factors_agree_on_the_box() {
     let case = Case::new(&scene, 2);
     let one = case.render("fixed:1", 3, 12_000, |_| ());
     assert_equivalent("fixed:0.05", &case.render("fixed:0.05", 4, 320_000, |_| ()), &one);
+}
+
+/// Floor, ceiling and back wall of layers with a strong normal map. Killed by: a factor that forgets the words that hold a
+/// vertex's parameters, a density of folded directions that light samples do not share.
+#[test]
+fn fixed_factors_agree_on_layers_with_normal_maps() {
+    let mut s = cornell([16, 16]);
+    let mut rng = SplitMix(8);
+    let texels = (0..64).map(|_| [40 + (rng.word() % 176) as u8, 40 + (rng.word() % 176) as u8, 200, 255]).collect();
+    let map = Texture { name: "bumps".into(), width: 8, height: 8, texels, ..Texture::default() };
+    s.textures.push(Texture { encoding: Encoding::Linear, ..map });
+    s.materials[0].model = Model::Principled(Principled {
+        base_color: [0.6, 0.55, 0.5],
+        metalness: 0.25,
+        roughness: 0.6,
+        coat: 0.5,
+        coat_roughness: 0.5,
+        sheen_color: [0.2; 3],
+        sheen_roughness: 0.7,
+        normal_texture: Some(TextureRef::new(0)),
+        ..Principled::default()
+    });
+    let scene = blob(&s);
+    let case = Case::new(&scene, 3);
+    let one = case.render("fixed:1", 21, 16_000, |_| ());
+    for (strategy, spp) in [("fixed:0.7", 20_000), ("fixed:3.3", 1800)] {
+        assert_equivalent(strategy, &case.render(strategy, 22, spp, |_| ()), &one);
+    }
 }
 
 /// A factor of 1 is no roulette at all, to the bit. Killed by: a comb that does not give exactly 1 for 1.

@@ -270,11 +270,11 @@ impl Principled<'_> {
             let (h, c) = halves.coat;
             let r = self.coat_ggx.reflection_at(wo, wr, h, c);
             let fresnel = grazing(r.cos) * (1.0 - COAT_F0) + COAT_F0;
-            f = f + Vec3x8::grey(self.coat * fresnel * r.g1 * r.pdf * to.below_sheen.min(ti.below_sheen));
+            f += Vec3x8::grey(self.coat * fresnel * r.g1 * r.pdf * to.below_sheen.min(ti.below_sheen));
             pdf += shares.coat * r.pdf;
         }
         if self.sheen.gt(F32x8::ZERO).any() {
-            f = f + self.sheen_color * self.fibres.eval(wo, wr);
+            f += self.sheen_color * self.fibres.eval(wo, wr);
             pdf += shares.sheen * (1.0 / TAU);
         }
         let mut out = Eval8 { f, pdf }.zero_unless(reflect & shown);

@@ -81,7 +81,7 @@ impl<'s> Scene<'s> {
     /// The record of a material, if it is a principled one.
     #[inline(always)]
     pub fn principled(&self, m: &Material) -> Option<&'s PrincipledRecord> {
-        if m.kind != MaterialKind::Principled as u32 {
+        if m.kind >= u32::BITS || LAYERED_KINDS >> m.kind & 1 == 0 {
             return None;
         }
         PrincipledRecord::read::<1>(self.0.tables, m.table).map(|[r]| r)

@@ -8,7 +8,7 @@ use super::vertex::PathVertex8;
 use crate::bsdf::{self, Bsdf, Inputs8, Lobes, Visitor};
 use crate::geometry::{SurfaceHit8, SurfacePoint8};
 use crate::learn::cache::NO_BIN;
-use crate::scene::blob::{MATERIAL_CUTOUT, MATERIAL_TWO_SIDED, MaterialKind, NONE};
+use crate::scene::blob::{LAYERED_KINDS, MATERIAL_CUTOUT, MATERIAL_TWO_SIDED, MaterialKind, NONE};
 use crate::scene::{Effects, Scene};
 use crate::texture;
 use crate::world::World;
@@ -126,7 +126,7 @@ impl Materials8 {
             }
         }
         if W::EFFECTS.contains(Effects::PRINCIPLED) && scene.effects.contains(Effects::PRINCIPLED) {
-            let layered = hit.mask & bsdf::lanes_of(Effects::PRINCIPLED.0, &kind);
+            let layered = hit.mask & bsdf::lanes_of(LAYERED_KINDS, &kind);
             if layered.any() {
                 let r = relief::<W>(scene, hit, wo, ng, ns, layered);
                 reflectance = Vec3x8::select(layered, r.packed, reflectance);

@@ -239,6 +239,7 @@ macro_rules! models {
         /// Scattering models; their parameters are those of [`ModelParameters`], present.
         #[derive(Clone, Copy, Debug, PartialEq)]
         #[expect(missing_docs, reason = "the fields are described at `ModelParameters`, their formulas in the core")]
+        #[expect(clippy::large_enum_variant, reason = "models are copied while a scene is loaded, and never in a loop")]
         pub enum Model { $($(#[$doc])* $kind $({ $($parameter: $type),* })? $(($all))?),* }
 
         impl Model {

@@ -8,7 +8,7 @@ use croupier::unstable::Effects;
 use croupier::unstable::profile::AnyProfile;
 use croupier::unstable::scene::blob::{
     CameraKind, LightKind, MATERIAL_COMPENSATED, MATERIAL_CUTOUT, Material, MaterialKind, MediumKind, NONE,
-    TRIANGLE_SMOOTH,
+    PrincipledTexture, TRIANGLE_SMOOTH,
 };
 use serde::{Serialize, Serializer};
 use std::collections::BTreeSet;
@@ -128,9 +128,18 @@ impl<'a> Census<'a> {
         vec![materials(found.len()), triangles(found.iter().map(|(_, triangles)| triangles).sum())]
     }
 
-    fn textures(&self, holds: impl Fn(&Material) -> bool) -> Vec<Fact> {
-        let found = self.materials(|m| m.texture != NONE && holds(m));
-        let images: BTreeSet<u32> = found.iter().map(|(m, _)| m.texture).collect();
+    /// Textures that materials have, among those that `holds`; of principled ones only that of `which`, if it is given.
+    fn textures(&self, which: Option<PrincipledTexture>, holds: impl Fn(&Material) -> bool) -> Vec<Fact> {
+        let of = |m: &Material| -> Vec<u32> {
+            let own = (which.is_none() && m.texture != NONE).then_some(m.texture);
+            let records = self.scene.principled(m).map_or(&[][..], |r| match which {
+                None => &r.textures,
+                Some(which) => &r.textures[which as usize..][..1],
+            });
+            own.into_iter().chain(records.iter().map(|t| t.texture).filter(|t| *t != NONE)).collect()
+        };
+        let found = self.materials(|m| holds(m) && !of(m).is_empty());
+        let images: BTreeSet<u32> = found.iter().flat_map(|(m, _)| of(m)).collect();
         vec![materials(found.len()), Fact::Count(["image", "images"], images.len())]
     }
 
@@ -163,7 +172,7 @@ type Facts = fn(&Census<'_>) -> Vec<Fact>;
 
 /// Facts by effect; effects of materials are counted by their kind.
 const REASONS: &[(Effects, Facts)] = &[
-    (Effects::TEXTURES, |c| c.textures(|_| true)),
+    (Effects::TEXTURES, |c| c.textures(None, |_| true)),
     (Effects::AREA_LIGHTS, |c| vec![triangles(c.lights(LightKind::Area))]),
     (Effects::ENVIRONMENT, |c| c.scene.environment.iter().map(|e| Fact::Size("size", [e.width, e.height])).collect()),
     (Effects::CONSTANT, |c| c.scene.environment.iter().map(|e| Fact::Colour("radiance", e.radiance)).collect()),
@@ -187,8 +196,9 @@ const REASONS: &[(Effects, Facts)] = &[
         homogeneous.into_iter().chain(of(grids, ["grid", "grids"])).collect()
     }),
     (Effects::GRID_MEDIA, |c| vec![Fact::Sizes("cells", c.grids())]),
-    (Effects::ALPHA, |c| c.textures(|m| m.flags & MATERIAL_CUTOUT != 0)),
+    (Effects::ALPHA, |c| c.textures(None, |m| m.flags & MATERIAL_CUTOUT != 0)),
     (Effects::MULTIPLE_SCATTERING, |c| c.surfaces(|m| m.flags & MATERIAL_COMPENSATED != 0)),
+    (Effects::NORMAL_MAPS, |c| c.textures(Some(PrincipledTexture::Normal), |_| true)),
     (Effects::PROJECTIONS, |c| match CameraKind::from_u32(c.scene.camera.kind) {
         Some(CameraKind::Orthographic) => vec![Fact::Count(["orthographic camera", "orthographic cameras"], 1)],
         Some(CameraKind::Panoramic) => vec![Fact::Count(["panoramic camera", "panoramic cameras"], 1)],

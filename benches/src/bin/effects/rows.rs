@@ -23,12 +23,14 @@ pub(crate) enum Base {
     Fog,
     /// The same as `Diffuse`, with a texture on the left sphere and most walls.
     Textured,
+    /// The same as `Textured`, with a principled left sphere.
+    Principled,
 }
 
 impl Base {
     /// Every base.
-    pub(crate) const ALL: [Self; 6] =
-        [Self::Diffuse, Self::Metal, Self::Open, Self::Boundary, Self::Fog, Self::Textured];
+    pub(crate) const ALL: [Self; 7] =
+        [Self::Diffuse, Self::Metal, Self::Open, Self::Boundary, Self::Fog, Self::Textured, Self::Principled];
 
     /// Name in tables.
     pub(crate) const fn name(self) -> &'static str {
@@ -39,6 +41,7 @@ impl Base {
             Self::Boundary => "boundary box",
             Self::Fog => "fog box",
             Self::Textured => "textured box",
+            Self::Principled => "principled box",
         }
     }
 
@@ -51,6 +54,7 @@ impl Base {
             Self::Boundary => Self::Diffuse.effects().with(Effects::NULL),
             Self::Fog => Self::Boundary.effects().with(Effects::MEDIA),
             Self::Textured => Self::Diffuse.effects().with(Effects::TEXTURES),
+            Self::Principled => Self::Textured.effects().with(Effects::PRINCIPLED),
         }
     }
 
@@ -63,6 +67,7 @@ impl Base {
             Self::Boundary => Instance::of::<Custom<{ Base::Boundary.effects().0 }>>(),
             Self::Fog => Instance::of::<Custom<{ Base::Fog.effects().0 }>>(),
             Self::Textured => Instance::of::<Custom<{ Base::Textured.effects().0 }>>(),
+            Self::Principled => Instance::of::<Custom<{ Base::Principled.effects().0 }>>(),
         }
     }
 
@@ -87,6 +92,10 @@ impl Base {
                 textured(&mut scene);
                 scene.materials[SPHERE].model = scene.materials[0].model;
             }
+            Self::Principled => {
+                textured(&mut scene);
+                sphere(&mut scene, Model::Principled(layered()));
+            }
         }
         scene
     }
@@ -94,6 +103,11 @@ impl Base {
 
 fn diffuse() -> Model {
     Model::Diffuse { reflectance: Reflectance::Constant([0.7; 3]) }
+}
+
+/// A material with a texture for the base colour.
+fn layered() -> Principled {
+    Principled { base_texture: Some(TextureRef::new(0)), ..Principled::default() }
 }
 
 fn metal(alpha: f32) -> Model {
@@ -190,6 +204,7 @@ rows! {
         sphere(s, Model::RoughPlastic { reflectance: WHITE, int_ior: GLASS.0, ext_ior: GLASS.1, alpha: 0.3 });
     };
     NULL: Diffuse, |s| sphere(s, Model::Null);
+    PRINCIPLED: Diffuse, |s| sphere(s, Model::Principled(Principled::default()));
     TEXTURES: Diffuse, textured;
     AREA_LIGHTS: Open, |s| s.emitters.push(Emitter::Area { material: 3, radiance: [17.0, 12.0, 4.0] });
     ENVIRONMENT: Diffuse, |s| s.environment = Some(builtin::sky());
@@ -204,4 +219,10 @@ rows! {
     ALPHA: Textured, |s| s.materials[SPHERE].cutout = true;
     PROJECTIONS: Diffuse, |s| s.camera.projection = Projection::Orthographic { height: 2.4 };
     MULTIPLE_SCATTERING: Metal, |s| s.materials.iter_mut().for_each(|m| m.compensated = true);
+    NORMAL_MAPS: Principled, |s| {
+        let texels = (0..64 * 64).map(|i: u32| [100 + (i % 56) as u8, 100 + (i / 64 % 56) as u8, 250, 255]).collect();
+        let bumps = Texture { name: "bumps".into(), width: 64, height: 64, texels, ..Texture::default() };
+        s.textures.push(Texture { encoding: Encoding::Linear, ..bumps });
+        sphere(s, Model::Principled(Principled { normal_texture: Some(TextureRef::new(1)), ..layered() }));
+    };
 }

@@ -143,7 +143,7 @@ pub fn textured(
     s.coat *= rgb.x;
     if normal_maps {
         let (mapped, rgb) = fetch(scene, &records, PrincipledTexture::Normal, uv);
-        let n = rgb.map(|x| decoded(x));
+        let n = rgb.map(decoded);
         let scale = get(|r| r.normal_scale);
         // normals from behind have no meaning in a map
         let n = Vec3x8::new(n.x * scale, n.y * scale, n.z.max(F32x8::splat(1e-3)));

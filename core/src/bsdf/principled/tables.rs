@@ -9,8 +9,8 @@ use croupier_simd::{F32x8, Mask8};
 /// Squared cosines of the Gauss-Legendre rule on [0, 1] with [`PRINCIPLED_NODES`] points, and their weights: twice the
 /// cosine-weighted mean over the hemisphere is the mean over the squared cosine.
 pub const NODES: [(f32, f32); PRINCIPLED_NODES] = [
-    (0.069_431_844, 0.173_927_42),
-    (0.330_009_48, 0.326_072_58),
+    (0.069_431_84, 0.173_927_42),
+    (0.330_009_5, 0.326_072_58),
     (0.669_990_52, 0.326_072_58),
     (0.930_568_16, 0.173_927_42),
 ];

@@ -132,6 +132,20 @@ pub enum Parameter {
     Principled,
 }
 
+/// Bits of the kinds that have a [`PrincipledRecord`](super::PrincipledRecord).
+pub const LAYERED_KINDS: u32 = {
+    let (mut bits, mut rest) = (0, MaterialKind::ALL);
+    while let [kind, others @ ..] = rest {
+        let mut parameters = kind.facts().parameters;
+        while let [parameter, more @ ..] = parameters {
+            bits |= (matches!(parameter, Parameter::Principled) as u32) << *kind as u32;
+            parameters = more;
+        }
+        rest = others;
+    }
+    bits
+};
+
 impl Parameter {
     /// Every parameter.
     pub const ALL: &'static [Self] = &[

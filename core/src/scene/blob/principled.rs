@@ -135,15 +135,10 @@ pub struct EnergyRow {
     pub sides: [[f32; PRINCIPLED_COLUMNS]; 2],
 }
 
-/// Entries of a record type in the tables section.
-const fn entries<T>() -> usize {
-    size_of::<T>() / size_of::<f32>()
-}
-
 /// A record that the tables section holds.
 pub trait TableRecord: Pod {
     /// Entries that it takes.
-    const ENTRIES: usize = entries::<Self>();
+    const ENTRIES: usize = size_of::<Self>().div_ceil(size_of::<f32>());
 
     /// `N` of them from entry `first` of `tables` on.
     #[inline(always)]

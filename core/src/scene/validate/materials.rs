@@ -93,7 +93,7 @@ pub(super) fn effects(scene: &Records<'_>, m: &Material) -> Effects {
     let compensates = known.is_some_and(|k| k.facts().compensates());
     let kind = known.map(Effects::of_material).unwrap_or_default();
     let textured = m.texture != NONE;
-    let principled = known == Some(MaterialKind::Principled);
+    let principled = known.is_some_and(|k| k.facts().parameters.contains(&Parameter::Principled));
     let [by_record, mapped] = if principled { has_textures(scene, m) } else { [false; 2] };
     let also = [
         (textured || by_record, Effects::TEXTURES),

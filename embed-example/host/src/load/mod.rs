@@ -6,7 +6,7 @@
 //! | `obj` | geometry: Wavefront OBJ |
 //! | `gltf` | glTF 2.0, with materials and textures of its own |
 //! | `ply`, `stl` | geometry: PLY, STL; `bare` makes a scene of it |
-//! | `mtl` | materials of a bare OBJ |
+//! | `mtl`, `mtl_principled` | materials of a bare OBJ |
 //! | `media` | participating media of a `scene.json`, density grids |
 //! | `principled` | principled materials of a `scene.json` |
 //! | `presets` | nothing: media by name |
@@ -26,6 +26,7 @@ mod json;
 mod loader;
 mod media;
 mod mtl;
+mod mtl_principled;
 mod obj;
 mod ply;
 mod polygon;

@@ -1,6 +1,7 @@
 //! MTL materials of a bare OBJ, through `tobj`, mapped to the models of this renderer.
 //!
-//! The first row that fits decides:
+//! Materials with more keys of the extension for physically based rendering are mapped in `mtl_principled.rs`. Of the
+//! others the first row that fits decides:
 //!
 //! | if | model |
 //! |---|---|
@@ -23,6 +24,9 @@ use std::path::{Path, PathBuf};
 /// Model of faces without a material.
 pub(super) const GREY: Model = Model::Diffuse { reflectance: Reflectance::Constant([0.5; 3]) };
 
+/// Keys of textures besides `map_Kd`, which ask for the principled material (`mtl_principled.rs`).
+pub(super) const MAPS: [&str; 4] = ["map_Pr", "map_Pm", "map_Ke", "norm"];
+
 /// Widths below this are taken as smooth.
 const SMOOTH: f32 = 1e-3;
 
@@ -31,6 +35,8 @@ pub(super) struct Definition {
     pub material: tobj::Material,
     /// File of `map_Kd`, without its options, and the line that names it.
     pub texture: Option<(String, u32)>,
+    /// Key, file and line of the other textures ([`MAPS`]).
+    pub maps: Vec<(String, String, u32)>,
 }
 
 /// Material and emission of a definition.
@@ -46,22 +52,33 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<Definition>, LoadErro
     let mut plain = String::with_capacity(text.len() + 16);
     // of each definition: the line of its texture
     let mut texture_lines = Vec::new();
+    let mut maps: Vec<Vec<(String, String, u32)>> = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
         check(line.trim(), &mut plain).map_err(|what| LoadError::line(path, number, what))?;
         plain.push('\n');
         match line.split_whitespace().next() {
-            Some("newmtl") => texture_lines.push(0),
+            Some("newmtl") => {
+                texture_lines.push(0);
+                maps.push(Vec::new());
+            }
+            Some(key) if MAPS.contains(&key) => {
+                let file = without_options(&line.trim()[key.len()..]);
+                if file.is_empty() {
+                    return Err(LoadError::line(path, number, format!("`{key}` needs a file")));
+                }
+                maps.iter_mut().next_back().into_iter().for_each(|m| m.push((key.into(), file.clone(), number)));
+            }
             Some("map_Kd") => texture_lines.iter_mut().next_back().into_iter().for_each(|l| *l = number),
             _ => {}
         }
     }
     let (materials, _) = tobj::load_mtl_buf(&mut plain.as_bytes())
         .map_err(|e| LoadError::line(path, 0, format!("refused by the MTL parser: {e}")))?;
-    let define = |(material, line): (tobj::Material, u32)| {
+    let define = |((material, line), maps): ((tobj::Material, u32), _)| {
         let texture = material.diffuse_texture.as_deref().map(|t| (without_options(t), line));
-        Definition { material, texture }
+        Definition { material, texture, maps }
     };
-    Ok(materials.into_iter().zip(texture_lines).map(define).collect())
+    Ok(materials.into_iter().zip(texture_lines).zip(maps).map(define).collect())
 }
 
 /// Writes the line in the form that `tobj` takes; lines of no use here become empty.
@@ -85,7 +102,7 @@ fn check(line: &str, out: &mut String) -> Result<(), String> {
                 _ => return Err(format!("`{keyword}` needs 1 or 3 numbers")),
             }
         }
-        "Ns" | "Ni" | "d" | "Tr" | "Pr" | "Pm" => {
+        "Ns" | "Ni" | "d" | "Tr" | "Pr" | "Pm" | "Ps" | "Pc" | "Pcr" => {
             let word = words.iter().find(|w| **w != "-halo").copied().unwrap_or("");
             number(word)?;
             words = vec![word];

@@ -7,9 +7,10 @@
 //! out then has normals for all faces or for none, and `tobj` has nothing left to refuse.
 
 use super::json::Place;
-use super::loader::Loader;
+use super::loader::{Decoding, Loader};
+use super::mtl_principled::{self, Maps};
 use super::{LoadError, mtl};
-use crate::description::{Emitter, Object, SceneDescription, Triangle, Vertex};
+use crate::description::{Emitter, Encoding, Object, SceneDescription, Triangle, Vertex};
 use crate::look::Given;
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -326,10 +327,17 @@ pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescrip
                     let referrer = format!("{}:{line} (material `{name}`)", file.display());
                     loader.texture(&mut scene, &mtl::sibling(file, texture), &referrer)
                 });
-                let mapped = mtl::map(definition, texture.transpose()?);
-                loader.report.notes.extend(mapped.notes);
-                scene.materials.push(mapped.material);
-                if let Some(radiance) = mapped.radiance {
+                let texture = texture.transpose()?;
+                let (material, radiance) = if mtl_principled::applies(definition) {
+                    let maps = Maps { base: texture, ..maps(loader, &mut scene, definition, file)? };
+                    mtl_principled::map(&mut scene, definition, maps)
+                } else {
+                    let mapped = mtl::map(definition, texture);
+                    loader.report.notes.extend(mapped.notes);
+                    (mapped.material, mapped.radiance)
+                };
+                scene.materials.push(material);
+                if let Some(radiance) = radiance {
                     scene.emitters.push(Emitter::Area { material: index, radiance });
                 }
             }
@@ -347,4 +355,28 @@ pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescrip
     append(path, &mut scene, prepared, &materials)?;
     loader.given = Given::MESH;
     Ok(scene)
+}
+
+/// The textures of a definition besides that of its colour.
+fn maps(
+    loader: &mut Loader,
+    scene: &mut SceneDescription,
+    definition: &mtl::Definition,
+    file: &Path,
+) -> Result<Maps, LoadError> {
+    let mut maps = Maps::default();
+    for (key, texture, line) in &definition.maps {
+        let encoding = if key == "map_Ke" { Encoding::Srgb } else { Encoding::Linear };
+        let decoding = Decoding { encoding, ..Decoding::default() };
+        let referrer = format!("{}:{line} (material `{}`)", file.display(), definition.material.name);
+        let index = loader.texture_as(scene, &mtl::sibling(file, texture), &referrer, decoding)?;
+        let slot = match key.as_str() {
+            "map_Pr" => &mut maps.roughness,
+            "map_Pm" => &mut maps.metalness,
+            "map_Ke" => &mut maps.emission,
+            _ => &mut maps.normal,
+        };
+        *slot = Some(index);
+    }
+    Ok(maps)
 }

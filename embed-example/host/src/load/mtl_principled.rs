@@ -1,0 +1,103 @@
+//! MTL materials with keys of the extension for physically based rendering, mapped to the principled material: those with
+//! `Ps`, `Pc`, `Pcr`, `norm`, `map_Pr`, `map_Pm` or `map_Ke`.
+//!
+//! | key | field |
+//! |---|---|
+//! | `Kd`, `map_Kd` | base colour; the texture replaces `Kd` |
+//! | `Pr`, `map_Pr`, else `Ns` | roughness; the texture replaces the number |
+//! | `Pm`, `map_Pm` | metalness, likewise |
+//! | `Ps` | sheen, white, of roughness 0.5 |
+//! | `Pc`, `Pcr` | coat and its roughness |
+//! | `Ni` | index |
+//! | `norm` | normal map |
+//! | `Ke`, `map_Ke` | emission; the texture multiplies `Ke`, 1 if that is black or not stated |
+//! | opacity below 0.5, or `illum` 4, 6, 7 or 9 | transmission 1; thin-walled with `Ni` 1 |
+//! | `d`, `Tr` from 0.5 | opacity |
+//!
+//! `aniso` and `anisor` are ignored.
+
+use super::mtl::Definition;
+use crate::description::{Encoding, Material, Model, Principled, SceneDescription, Texture, TextureRef};
+
+/// Textures of a definition, by their key: indices in the scene.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Maps {
+    pub base: Option<u32>,
+    pub roughness: Option<u32>,
+    pub metalness: Option<u32>,
+    pub emission: Option<u32>,
+    pub normal: Option<u32>,
+}
+
+/// Numbers that make a material a principled one, as textures of any of [`MAPS`](super::mtl::MAPS) do.
+const NUMBERS: [&str; 3] = ["Ps", "Pc", "Pcr"];
+
+/// Is the definition mapped here?
+pub(super) fn applies(definition: &Definition) -> bool {
+    let parameters = &definition.material.unknown_param;
+    !definition.maps.is_empty() || NUMBERS.iter().any(|key| parameters.contains_key(*key))
+}
+
+/// A texture with the roughness in green and the metalness in blue, each the red of its own or 1.
+fn combined(scene: &SceneDescription, roughness: Option<u32>, metalness: Option<u32>) -> Option<Texture> {
+    let of = |i: Option<u32>| i.and_then(|i| scene.textures.get(i as usize));
+    let (rough, metal) = (of(roughness), of(metalness));
+    let larger = [rough, metal].into_iter().flatten().max_by_key(|t| u64::from(t.width) * u64::from(t.height))?;
+    let [width, height] = [larger.width, larger.height];
+    // the nearest texel of a smaller one
+    let red = |t: Option<&Texture>, x: u32, y: u32| {
+        t.map_or(255, |t| {
+            let column = u64::from(x) * u64::from(t.width) / u64::from(width);
+            let row = u64::from(y) * u64::from(t.height) / u64::from(height);
+            t.texels.get((row * u64::from(t.width) + column) as usize).map_or(255, |t| t[0])
+        })
+    };
+    let texel = |i: u32| [255, red(rough, i % width, i / width), red(metal, i % width, i / width), 255];
+    Some(Texture {
+        name: larger.name.clone(),
+        width,
+        height,
+        texels: (0..width * height).map(texel).collect(),
+        encoding: Encoding::Linear,
+        ..Texture::default()
+    })
+}
+
+/// The mapping of the table above, and the radiance of its emitter.
+pub(super) fn map(scene: &mut SceneDescription, definition: &Definition, maps: Maps) -> (Material, Option<[f32; 3]>) {
+    let m = &definition.material;
+    let parameter = |key: &str| m.unknown_param.get(key).and_then(|v| v.parse::<f32>().ok());
+    let share = |x: f32| x.clamp(0.0, 1.0);
+    let texture = |index: Option<u32>| index.map(TextureRef::new);
+    let from_ns = m.shininess.map(|n| (2.0 / (n.max(0.0) + 2.0)).sqrt().sqrt());
+    let opacity = m.dissolve.or(parameter("Tr").map(|t| 1.0 - t)).unwrap_or(1.0);
+    let clear = matches!(m.illumination_model, Some(4 | 6 | 7 | 9)) || opacity < 0.5;
+    let thin = m.optical_density.is_some_and(|n| (n - 1.0).abs() <= 1e-3);
+    let metal_rough = combined(scene, maps.roughness, maps.metalness);
+    let metal_rough_texture = metal_rough.map(|t| {
+        scene.textures.push(t);
+        TextureRef::new(scene.textures.len() as u32 - 1)
+    });
+    let default = Principled::default();
+    let given = m.emissive.filter(|c| c.iter().any(|x| *x > 1e-3)).map(|c| c.map(|x| x.max(0.0)));
+    let radiance = given.or(maps.emission.map(|_| [1.0; 3]));
+    let p = Principled {
+        base_color: if maps.base.is_some() { [1.0; 3] } else { m.diffuse.unwrap_or([0.5; 3]).map(share) },
+        base_texture: texture(maps.base),
+        metalness: if maps.metalness.is_some() { 1.0 } else { share(parameter("Pm").unwrap_or(0.0)) },
+        roughness: if maps.roughness.is_some() { 1.0 } else { share(parameter("Pr").or(from_ns).unwrap_or(0.5)) },
+        metal_rough_texture,
+        ior: m.optical_density.filter(|n| *n > 0.1 && (n - 1.0).abs() > 1e-3).map_or(default.ior, |n| n.min(10.0)),
+        transmission: if clear { 1.0 } else { 0.0 },
+        thin_walled: clear && thin,
+        coat: share(parameter("Pc").unwrap_or(0.0)),
+        coat_roughness: share(parameter("Pcr").unwrap_or(0.0)),
+        sheen_color: [share(parameter("Ps").unwrap_or(0.0)); 3],
+        sheen_roughness: 0.5,
+        emission_texture: texture(maps.emission),
+        normal_texture: texture(maps.normal),
+        opacity: if clear { 1.0 } else { share(opacity) },
+        ..default
+    };
+    (Material::new(&m.name, Model::Principled(p)), radiance)
+}
