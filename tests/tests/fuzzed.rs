@@ -12,7 +12,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Inputs of each format of scene files.
-const INPUTS: usize = 20_000;
+const INPUTS: usize = 4_000;
 
 /// Inputs of each format that is rendered from with learned roulette, which takes longer: whole sessions.
 const SESSIONS: usize = 2_000;
