@@ -88,8 +88,9 @@ fn longest_call_finish<P: Profile>(
 pub fn count(folder: &Folder, args: &[&str]) -> Result<Vec<(u64, u64)>, Box<dyn Error>> {
     let out = folder.path().join("longest.out");
     let mut valgrind = Command::new("valgrind");
-    valgrind.args(["--tool=callgrind", "--quiet", "--compress-strings=no", "--collect-atstart=no"]);
-    valgrind.args(["--toggle-collect=*longest_call_*", "--dump-after=*longest_call_*"]);
+    // a profile before a call ends what is counted until then, the one after it has the call alone
+    valgrind.args(["--tool=callgrind", "--quiet", "--compress-strings=no"]);
+    valgrind.args(["--dump-before=*longest_call_*", "--dump-after=*longest_call_*"]);
     valgrind.arg(format!("--callgrind-out-file={}", out.display()));
     let output = valgrind.arg(std::env::current_exe()?).args(args).output()?;
     if !output.status.success() {
@@ -103,7 +104,8 @@ pub fn count(folder: &Folder, args: &[&str]) -> Result<Vec<(u64, u64)>, Box<dyn 
         }
         let profile = std::fs::read_to_string(&path)?;
         let summary = profile.lines().find_map(|l| l.strip_prefix("summary: ")?.trim().parse::<u64>().ok());
-        let call = CALLS.iter().position(|c| profile.lines().any(|l| l.starts_with("fn=") && l.contains(c)));
+        let trigger = profile.lines().find(|l| l.starts_with("desc: Trigger: --dump-after=")).unwrap_or("");
+        let call = CALLS.iter().position(|c| trigger.contains(c));
         if let (Some(n), Some(call)) = (summary, call) {
             longest[call] = (longest[call].0 + 1, longest[call].1.max(n));
         }
