@@ -5,7 +5,6 @@ pub mod callgrind;
 pub mod clock;
 pub mod exit;
 pub mod figures;
-pub mod longest;
 pub mod measure;
 pub mod provenance;
 pub mod results;

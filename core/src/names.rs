@@ -8,7 +8,6 @@ macro_rules! names {
             pub(crate) const NAMES: &'static [&'static str] = &[$name $(, $more)*];
 
             /// Names of all values, with bars between them.
-            #[allow(dead_code, reason = "not every enum is a value of a setting")]
             pub(crate) const ALTERNATIVES: &'static str = concat!($name $(, "|", $more)*);
 
             /// Name of the value in texts.

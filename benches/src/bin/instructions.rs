@@ -12,13 +12,12 @@
 //! committed table and figures per ray, and it needs a runner of its own version installed beside cargo.
 
 use clap::Parser;
-use croupier::unstable::film::{Aov, AovSet};
 use croupier::{Plan, Scene, Settings};
 use croupier_benches::callgrind::{self, Counted, Folder};
 use croupier_benches::exit::exit_code;
 use croupier_benches::results::{Results, Table};
 use croupier_benches::variant::Variant;
-use croupier_benches::{longest, provenance, serial};
+use croupier_benches::{provenance, serial};
 use serde_json::{Value, json};
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -42,10 +41,6 @@ struct Args {
     /// Write benches/results/instructions.md.
     #[arg(long, conflicts_with_all = ["check", "only"])]
     write: bool,
-    /// Instead of all that: the longest single call of each kind when a picture of 1920 columns is rendered in pieces of
-    /// 10,000 rays, of the rows that `--only` leaves.
-    #[arg(long, conflicts_with_all = ["check", "write"])]
-    longest: bool,
     /// Render this blob with `--strategy` and print its rays: what the program runs under valgrind.
     #[arg(long, hide = true, requires = "strategy")]
     blob: Option<PathBuf>,
@@ -102,26 +97,6 @@ fn render(blob: &Path, strategy: &str) -> Result<Value, Box<dyn Error>> {
     Ok(json!({ "rays": counters.rays() }))
 }
 
-/// Renders in pieces; the number of calls.
-fn render_in_pieces(blob: &Path, strategy: &str) -> Result<u64, Box<dyn Error>> {
-    let bytes = callgrind::read(blob)?;
-    let scene = Scene::from_bytes(&bytes)?;
-    // as wide as usual pictures, because a piece may be a row; less high, because there are only more pieces then
-    let aovs = AovSet::of(&[Aov::Albedo, Aov::Normal, Aov::Depth]);
-    let settings = Settings { size: [1920, 96], max_depth: 3, aovs, ..Settings::for_scene(&scene) };
-    let plan = Plan::new(&Variant::parse(strategy)?.apply(settings))?;
-    longest::render(scene, &plan, &[1, 1], 10_000)
-}
-
-/// Prints the longest call of each kind.
-fn longest_calls(folder: &Folder, blob: &Path, scene: &str, strategy: &str) -> Result<(), Box<dyn Error>> {
-    let calls = longest::count(folder, &["--longest", "--blob", &blob.to_string_lossy(), "--strategy", strategy])?;
-    for (name, (calls, most)) in longest::CALLS.iter().zip(calls) {
-        println!("{scene} {strategy} {name}: {calls} calls, at most {most} instructions");
-    }
-    Ok(())
-}
-
 /// Counts one row under callgrind.
 fn count(folder: &Folder, blob: &Path, scene: &'static str, strategy: &'static str) -> Result<Row, Box<dyn Error>> {
     let args = ["--blob", &blob.to_string_lossy(), "--strategy", strategy];
@@ -174,10 +149,7 @@ fn check(rows: &[Row], tolerance: f64, results: &Results) -> Result<usize, Box<d
 
 fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
     if let (Some(blob), Some(strategy)) = (&args.blob, &args.strategy) {
-        match args.longest {
-            true => println!("{}", render_in_pieces(blob, strategy)?),
-            false => println!("{}", render(blob, strategy)?),
-        }
+        println!("{}", render(blob, strategy)?);
         return Ok(true);
     }
     let mut results = Results::of_this_run(NAME);
@@ -197,18 +169,11 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         let Some(found) = found else { continue };
         let blob = folder.bake(scene, &found)?;
         for strategy in wanted {
-            if args.longest {
-                longest_calls(&folder, &blob, scene, strategy)?;
-                continue;
-            }
             let row = count(&folder, &blob, scene, strategy)?;
             eprintln!("{}", row.cells().join(", "));
             table.add(row.cells());
             rows.push(row);
         }
-    }
-    if args.longest {
-        return Ok(true);
     }
     if rows.is_empty() {
         return Err("no row fits".into());

@@ -198,6 +198,13 @@ impl<'m> AovSums<'m> {
         self.values.get(pixel * n..pixel * n + n).unwrap_or(&[])
     }
 
+    /// Values of a pixel, to be changed.
+    #[inline]
+    pub(crate) fn row_mut(&mut self, pixel: usize) -> &mut [f32] {
+        let n = self.layout.planes;
+        self.values.get_mut(pixel * n..pixel * n + n).unwrap_or(&mut [])
+    }
+
     /// Empties a pixel.
     pub(crate) fn clear(&mut self, pixel: usize) {
         let n = self.layout.planes;

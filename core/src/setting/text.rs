@@ -43,7 +43,7 @@ impl Value for bool {
 
 /// `albedo,depth`, `true`, `false`.
 impl Value for AovSet {
-    const PLACEHOLDER: &'static str = "true|false|LIST";
+    const PLACEHOLDER: &'static str = Aov::ALTERNATIVES;
     const RANGE: SettingRange = SettingRange::Set(Aov::NAMES);
 
     fn parse(text: &str) -> Result<Self, Unreadable> {

@@ -33,15 +33,32 @@ impl Bookkeeping<'_> {
         for i in first.and_not(good).lanes() {
             self.count_non_finite(root[i]);
         }
+        // what is not asked for lies beyond every row
+        let first_of = |aov| self.aovs.layout.first(aov).unwrap_or(usize::MAX);
+        let [a, n, d, h, m] = [
+            first_of(Aov::Albedo),
+            first_of(Aov::Normal),
+            first_of(Aov::Depth),
+            first_of(Aov::Alpha),
+            first_of(Aov::Material),
+        ];
+        let [albedo, normal] = [albedo, normal].map(|v| [v.x.to_array(), v.y.to_array(), v.z.to_array()]);
+        let t = t.to_array();
         for i in good.lanes() {
             let target = self.roots.get(root[i]).target;
-            let pixel = target.pixel();
-            self.aovs.add(pixel, Aov::Albedo, albedo.lane(i));
-            self.aovs.add(pixel, Aov::Normal, normal.lane(i));
-            self.aovs.add(pixel, Aov::Depth, [t.lane(i)]);
-            self.aovs.add(pixel, Aov::Alpha, [1.0]);
+            let row = self.aovs.row_mut(target.pixel());
+            for (first, x) in [(a, &albedo), (n, &normal)] {
+                if let Some(sums) = row.get_mut(first..).and_then(|r| r.first_chunk_mut::<3>()) {
+                    *sums = [sums[0] + x[0][i], sums[1] + x[1][i], sums[2] + x[2][i]];
+                }
+            }
+            for (first, x) in [(d, t[i]), (h, 1.0)] {
+                if let Some(sum) = row.get_mut(first) {
+                    *sum += x;
+                }
+            }
             if target.is_first()
-                && let Some(id) = self.aovs.get(pixel, Aov::Material, 0)
+                && let Some(id) = row.get_mut(m)
             {
                 *id = material[i] as i32 as f32;
             }
@@ -50,15 +67,14 @@ impl Bookkeeping<'_> {
 
     /// Adds the factors `s` of the vertices in the lanes of `active`.
     pub(super) fn record_factors(&mut self, active: Mask8, path: &Path8, s: F32x8) {
-        if self.aovs.layout.first(Aov::Factors).is_none() {
-            return;
-        }
+        let Some(first) = self.aovs.layout.first(Aov::Factors) else { return };
         let (s, root, depth) = (s.to_array(), path.root.to_array(), path.depth.to_array());
         for i in active.lanes() {
             let pixel = self.roots.get(root[i]).target.pixel();
-            let d = (depth[i].clamp(1, 4) - 1) as usize;
-            for (channel, x) in [(d, s[i]), (4 + d, 1.0)] {
-                if let Some(sum) = self.aovs.get(pixel, Aov::Factors, channel) {
+            let d = first + (depth[i].clamp(1, 4) - 1) as usize;
+            let row = self.aovs.row_mut(pixel);
+            for (plane, x) in [(d, s[i]), (4 + d, 1.0)] {
+                if let Some(sum) = row.get_mut(plane) {
                     *sum += x;
                 }
             }
