@@ -118,7 +118,9 @@ each_effect!(
     MEDIA,
     GRID_MEDIA,
     ALPHA,
-    MULTIPLE_SCATTERING
+    MULTIPLE_SCATTERING,
+    INSTANCES,
+    MOTION
 );
 
 /// Killed by: an effect that a session does not look for, a message without its name.
