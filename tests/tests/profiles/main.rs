@@ -120,6 +120,8 @@ each_effect!(
     GRID_MEDIA,
     ALPHA,
     MULTIPLE_SCATTERING,
+    INSTANCES,
+    MOTION,
     NORMAL_MAPS,
     PROJECTIONS
 );

@@ -55,6 +55,15 @@ const AREA_LIGHTS_ONLY: u32 = !(Effects::ENVIRONMENT.0 | Effects::CONSTANT.0 | E
 const NO_MEDIA: u32 = !(Effects::MEDIA.0 | Effects::GRID_MEDIA.0);
 
 scenes! {
+    "moving instance", [DIFFUSE, AREA_LIGHTS, INSTANCES, MOTION], || {
+        let mut s = cornell(SIZE);
+        let first = s.triangles.len() as u32;
+        add_quad(&mut s, "sheet", 0, facing_y(0.5, 0.0, 1.0));
+        let sheet = croupier_tests::placed::add_prototype(&mut s, "sheet", first, vec![]);
+        let up = |y| croupier_tests::placed::translation([0.0, y, 0.0]);
+        s.instances.push(Instance { to_world_end: Some(up(0.5)), ..Instance::new("sheet", sheet, up(-0.5)) });
+        blob(&s)
+    };
     "diffuse", [DIFFUSE, AREA_LIGHTS], || blob(&cornell(SIZE));
     "mirror", [DIFFUSE, MIRROR, AREA_LIGHTS], || with(Model::Mirror { reflectance: WHITE });
     "conductor", [DIFFUSE, CONDUCTOR, AREA_LIGHTS], || with(Model::Conductor { eta: ETA, k: K, reflectance: WHITE });
