@@ -290,7 +290,7 @@ fn what_cannot_be_baked_is_named() {
     let cases: &[(Break, &[&str])] = &[
         (|s| s.vertices[1].position[2] = f32::NAN, &["object `tri`", "position of vertex 1", "NaN"]),
         (|s| s.vertices[2].position[0] = f32::INFINITY, &["object `tri`", "position of vertex 2", "inf"]),
-        (|s| s.vertices[2].position[0] = 2e9, &["position of vertex 2", "2000000000"]),
+        (|s| s.vertices[2].position[0] = 2e9, &["position of vertex 2", "2e9"]),
         (|s| s.vertices[0].normal[0] = f32::NAN, &["normal of vertex 0"]),
         (|s| s.vertices[0].uv[1] = f32::NAN, &["texture coordinate of vertex 0"]),
         (|s| s.vertices.push(Vertex { uv: [f32::NAN; 2], ..Vertex::default() }), &["object `unused`", "vertex 3"]),

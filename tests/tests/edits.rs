@@ -1,10 +1,12 @@
 //! Scenes that change in memory: what an edit makes is what baking would have made, what is wrong is refused and leaves
 //! everything as it was, and a shard can be put away between any two steps.
 
+use bytemuck::Zeroable;
+use croupier::unstable::accel::Primitive;
 use croupier::unstable::scene::blob::*;
 use croupier::{Budget, EditError, EditableScene, Plan, Scene, Session, Settings, Shard, ShardError, StepResult};
 use croupier_host::blob::AlignedBytes;
-use croupier_host::description::{self, Emitter, SceneDescription};
+use croupier_host::description::{self, Emitter, Instance, Prototype, SceneDescription};
 use croupier_tests::runner::{render, settings};
 use croupier_tests::scenes::{blob, cornell, everything};
 
@@ -293,4 +295,143 @@ fn only_suspended_shards_can_be_resumed() {
         tried += usize::from(Shard::resume(&plan, 0, broken.as_mut()).is_err());
     }
     assert!(tried > 10, "{tried} faults were seen");
+}
+
+/// A box of glowing and grey sides, placed three times: turned, mirrored and nested.
+fn placed() -> SceneDescription {
+    let mut scene = cornell([24, 16]);
+    let first = scene.triangles.len() as u32;
+    let glow = scene.add_material("glow", croupier_tests::scenes::grey(0.5));
+    scene.emitters.push(Emitter::Area { material: glow, radiance: [3.0, 2.0, 1.0] });
+    croupier_tests::scenes::add_box(&mut scene, glow, [-0.1; 3], [0.1; 3], false);
+    let middle = scene.triangles.len() as u32;
+    let of = |prototype, x: f32, scale: f32| Instance {
+        name: format!("at {x}"),
+        prototype,
+        to_world: [[scale, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.1 * x], [0.0, 0.0, 1.0, 0.0]],
+        to_world_end: None,
+        visible: true,
+    };
+    scene.prototypes.push(Prototype { name: "lamp".into(), triangles: first..middle, instances: vec![] });
+    scene.prototypes.push(Prototype {
+        name: "pair".into(),
+        triangles: middle..middle,
+        instances: vec![of(0, -0.2, 1.0), of(0, 0.2, -1.5)],
+    });
+    scene.instances = vec![of(0, 0.5, 1.0), of(1, -0.3, 1.0)];
+    scene
+}
+
+/// The map of `m` moved by `d`, twice: it stands still.
+fn moved(m: [[f32; 4]; 3], d: [f32; 3]) -> [[[f32; 4]; 3]; 2] {
+    let mut to = m;
+    (0..3).for_each(|k| to[k][3] += d[k]);
+    [to, to]
+}
+
+/// Instances that were moved, in the world and within another object, look as if they had been baked there, and moved
+/// back the scene is what it was. Killed by: boxes, bounds, areas or lights that stay where they were, a nested tree that
+/// the world's boxes do not follow.
+#[test]
+fn moved_instances_are_where_baking_puts_them() {
+    let scene = placed();
+    let mut target = scene.clone();
+    for (i, d) in [[0.1, -0.4, 0.2], [0.0, 0.3, -0.2]].into_iter().enumerate() {
+        target.instances[i].to_world = moved(target.instances[i].to_world, d)[0];
+    }
+    let inner = &mut target.prototypes[1].instances[1];
+    inner.to_world[1][1] = 2.0;
+    inner.to_world[2][3] += 0.15;
+    let (inner, baked) = (inner.to_world, blob(&target));
+    let baked_scene = Scene::from_bytes(&baked).unwrap();
+
+    let mut edited = editable(&scene);
+    let (hash, before) = (edited.scene().hash, edited.scene().instances.to_vec());
+    let nested = before.len() as u32 - 1;
+    let mut edit = edited.edit();
+    edit.transform(0, moved(before[0].to_world[0], [0.1, -0.4, 0.2])).unwrap();
+    edit.transform(nested, [inner; 2]).unwrap();
+    edit.transform(1, moved(before[1].to_world[0], [0.0, 0.3, -0.2])).unwrap();
+    drop(edit);
+    let found = edited.scene();
+    assert_ne!(found.hash, hash);
+    assert_eq!(found.info.bounds_min, baked_scene.info.bounds_min);
+    assert_eq!(found.info.bounds_max, baked_scene.info.bounds_max);
+    for (a, b) in found.instances.iter().zip(baked_scene.instances) {
+        assert_eq!((a.to_world, a.inverse, a.condition), (b.to_world, b.inverse, b.condition));
+    }
+    for (a, b) in found.lights.iter().zip(baked_scene.lights) {
+        assert!((a.area / b.area - 1.0).abs() < 1e-5, "{} {}", a.area, b.area);
+    }
+    // the tables may differ, the pictures are the same in expectation; without light samples they are the same bits
+    let s = Settings { max_depth: 1, ..settings(&baked, "none") };
+    let own = sealed_copy(&edited);
+    assert_eq!(render(&own, &s, 16).bits(), render(&baked, &s, 16).bits());
+    let s = settings(&baked, "classic");
+    let (a, b) = (render(&own, &s, 200), render(&baked, &Settings { seed: 5, ..s }, 200));
+    let noise = a.error_of_mean().hypot(b.error_of_mean());
+    assert!((a.mean() - b.mean()).abs() < 4.0 * noise, "{} {} +- {noise}", a.mean(), b.mean());
+    assert!(noise < 0.02 * a.mean(), "{noise} of {}: the test could not tell", a.mean());
+
+    // built anew the tree is another one over the same
+    let mut edit = edited.edit();
+    let mut room = vec![Primitive::zeroed(); edit.rebuild_len()];
+    assert!(edit.rebuild(&mut []).is_err());
+    edit.rebuild(&mut room).unwrap();
+    drop(edit);
+    let rebuilt = sealed_copy(&edited);
+    let s = Settings { max_depth: 1, ..settings(&baked, "none") };
+    assert_eq!(render(&rebuilt, &s, 16).bits(), render(&baked, &s, 16).bits());
+
+    let mut edit = edited.edit();
+    for (i, old) in (0..).zip(&before) {
+        edit.transform(i, old.to_world).unwrap();
+    }
+    drop(edit);
+    assert_eq!(edited.scene().instances, &before[..]);
+}
+
+fn sealed_copy(scene: &EditableScene<AlignedBytes>) -> AlignedBytes {
+    // the identity stays with the original
+    let mut copy = AlignedBytes::zeroed(scene.bytes().len());
+    copy.as_mut().copy_from_slice(scene.bytes());
+    let mut header: Header = bytemuck::pod_read_unaligned(&copy[..size_of::<Header>()]);
+    header.hash = content_hash(&copy[size_of::<Header>()..header.length as usize]);
+    copy.as_mut()[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&header));
+    Scene::from_bytes(&copy).expect("a valid scene after edits");
+    copy
+}
+
+/// A hidden instance is not met and gives no light; shown again everything is back. Maps that cannot be are refused.
+/// Killed by: lights of hidden instances, a tree that forgets them, a check that is left out.
+#[test]
+fn instances_can_be_hidden() {
+    let scene = placed();
+    let mut edited = editable(&scene);
+    let bytes = sealed_copy(&edited);
+    let s = settings(&bytes, "classic");
+    edited.edit().visible(0, false).unwrap();
+    edited.edit().visible(1, false).unwrap();
+    let hidden = sealed_copy(&edited);
+    let plain = blob(&cornell([24, 16]));
+    let (a, b) = (render(&hidden, &s, 300), render(&plain, &Settings { seed: 5, ..s }, 300));
+    let noise = a.error_of_mean().hypot(b.error_of_mean());
+    assert!((a.mean() - b.mean()).abs() < 4.0 * noise, "{} {} +- {noise}", a.mean(), b.mean());
+    edited.edit().visible(0, true).unwrap();
+    edited.edit().visible(1, true).unwrap();
+    let shown = sealed_copy(&edited);
+    let (c, d) = (render(&shown, &s, 200), render(&bytes, &Settings { seed: 5, ..s }, 200));
+    let noise = c.error_of_mean().hypot(d.error_of_mean());
+    assert!((c.mean() - d.mean()).abs() < 4.0 * noise && c.mean() > 1.05 * a.mean(), "{} {}", c.mean(), d.mean());
+
+    let (hash, old) = (edited.scene().hash, edited.scene().instances[0].to_world);
+    let mut edit = edited.edit();
+    let refused = |r: Result<(), EditError>| matches!(r, Err(EditError::Transform { index: 0, .. }));
+    assert!(refused(edit.transform(0, [[[0.0; 4]; 3]; 2])));
+    assert!(refused(edit.transform(0, [[[f32::NAN; 4]; 3]; 2])));
+    assert!(refused(edit.transform(0, moved(old[0], [1e12, 0.0, 0.0]))));
+    assert!(matches!(edit.transform(99, old), Err(EditError::Missing { index: 99, .. })));
+    assert!(matches!(edit.visible(99, true), Err(EditError::Missing { .. })));
+    drop(edit);
+    assert_eq!(edited.scene().hash, hash);
 }

@@ -1,9 +1,10 @@
 //! A validated blob in the host's memory that may change between frames.
 
 use super::light_table;
+use crate::accel::{Primitive, TopLevel, set_hidden, set_transform};
 use crate::light::{self, SceneExtent, luminance};
 use crate::scene::blob::*;
-use crate::scene::{Effects, Records, Scene, SceneError, SectionTable, Sections, check};
+use crate::scene::{Effects, InstanceFault, Records, Scene, SceneError, SectionTable, Sections, check};
 use bytemuck::Pod;
 use core::fmt;
 
@@ -28,6 +29,13 @@ pub enum EditError {
         /// Index that was asked for.
         index: u32,
     },
+    /// A transform that an instance cannot have.
+    Transform {
+        /// Instance that was meant.
+        index: u32,
+        /// What is wrong.
+        fault: InstanceFault,
+    },
 }
 
 impl fmt::Display for EditError {
@@ -38,6 +46,7 @@ impl fmt::Display for EditError {
             Self::Fixed { of, index } => {
                 write!(f, "edit: record {index} of {} differs in what only baking can change", of.name())
             }
+            Self::Transform { index, fault } => write!(f, "edit: transform of instance {index}: {fault}"),
         }
     }
 }
@@ -108,6 +117,11 @@ impl<B: AsRef<[u8]>> EditableScene<B> {
         Scene::assume_valid(Records { effects: self.effects, hash: self.identity, ..records })
     }
 
+    /// The bytes as they are now; see [`Self::into_bytes`].
+    pub fn bytes(&self) -> &[u8] {
+        self.bytes.as_ref()
+    }
+
     /// The container with the bytes. Their header still has the hash from before the edits: [`Self::seal`] first to use
     /// them as a blob.
     pub fn into_bytes(self) -> B {
@@ -128,6 +142,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> EditableScene<B> {
             environment_power: self.environment_power,
             relit: &mut self.relit,
             lights_changed: false,
+            moved: None,
         }
     }
 
@@ -220,6 +235,8 @@ pub struct SceneEdit<'a> {
     environment_power: f64,
     relit: &'a mut bool,
     lights_changed: bool,
+    /// First and last object whose instances have moved.
+    moved: Option<[u32; 2]>,
 }
 
 impl SceneEdit<'_> {
@@ -326,19 +343,14 @@ impl SceneEdit<'_> {
     /// # Errors
     /// Radiance that breaks a rule of the blob.
     pub fn emission(&mut self, material: u32, radiance: [f32; 3]) -> Result<u32, EditError> {
-        let lights = self.records().map_or(0, |s| s.lights.len() as u32);
-        let mut changed = 0;
-        for index in 0..lights {
-            let of_material = self.records().is_some_and(|s| {
-                let light = s.lights.get(index as usize).filter(|l| l.kind == LightKind::Area as u32);
-                let triangle = light.and_then(|l| s.triangles.get(l.triangle as usize));
-                triangle.is_some_and(|t| t.material == material)
-            });
-            if of_material {
-                let light: Light = self.read(SectionKind::Lights, index)?;
-                self.light(index, Light { emission: radiance, ..light })?;
-                changed += 1;
-            }
+        let of_material = |s: &Records<'_>, l: &Light| {
+            let triangle = s.triangles.get(l.triangle as usize).filter(|_| l.kind == LightKind::Area as u32);
+            triangle.is_some_and(|t| t.material == material)
+        };
+        let (mut next, mut changed) = (0, 0);
+        while let Some((index, light)) = self.next_light(next, of_material) {
+            self.light(index, Light { emission: radiance, ..light })?;
+            (next, changed) = (index.saturating_add(1), changed + 1);
         }
         Ok(changed)
     }
@@ -361,31 +373,159 @@ impl SceneEdit<'_> {
         Ok(())
     }
 
+    /// Moves an instance: the maps to the space around it when the shutter opens and when it closes (the same twice if it
+    /// stands still). Its lights move along. The top-level trees around it are refitted once all edits are made, in a time
+    /// that grows with their instances; after far moves [`Self::rebuild`] makes rays faster again.
+    ///
+    /// # Errors
+    /// No such instance, or maps that cannot be: not finite, singular or nearly, or out of the range of coordinates.
+    pub fn transform(&mut self, index: u32, to_world: [[[f32; 4]; 3]; 2]) -> Result<(), EditError> {
+        let of = SectionKind::Instances;
+        let mut instance: Instance = self.read(of, index)?;
+        let object: Object = self.read(SectionKind::Objects, instance.object)?;
+        set_transform(&mut instance, to_world, &object).map_err(|fault| EditError::Transform { index, fault })?;
+        self.write(of, index, &instance);
+        if instance.flags & INSTANCE_MOVING != 0 {
+            *self.effects = self.effects.with(Effects::MOTION);
+        }
+        let around = self.object_around(index);
+        let [first, last] = self.moved.unwrap_or([around; 2]);
+        self.moved = Some([first.min(around), last.max(around)]);
+        Ok(())
+    }
+
+    /// Shows or hides an instance, with its lights.
+    ///
+    /// # Errors
+    /// No such instance.
+    pub fn visible(&mut self, index: u32, visible: bool) -> Result<(), EditError> {
+        let of = SectionKind::Instances;
+        let mut instance: Instance = self.read(of, index)?;
+        set_hidden(&mut instance, !visible);
+        self.write(of, index, &instance);
+        self.lights_changed |= self.records().is_some_and(|s| s.lights.iter().any(|l| l.instance > 0));
+        Ok(())
+    }
+
+    /// Object whose own instance this is.
+    fn object_around(&self, instance: u32) -> u32 {
+        let holds = |o: &Object| (o.first_instance..o.first_instance.saturating_add(o.instances)).contains(&instance);
+        self.records().and_then(|s| s.objects.iter().position(holds)).map_or(0, |i| i as u32)
+    }
+
+    /// Brings what follows from transforms up to date: boxes of top-level trees, the scene's bounds, areas of lights.
+    fn settle_moves(&mut self, [first, last]: [u32; 2]) {
+        // objects that instances place come before the world is refitted, whose boxes hold them
+        for object in (first.max(1)..=last).rev() {
+            self.with_top(|top| top.refit(object).is_ok());
+            let placers = self.records().map_or(0, |s| s.instances.len() as u32);
+            for index in 0..placers {
+                let Ok(mut placer) = self.read::<Instance>(SectionKind::Instances, index) else { continue };
+                let (to_world, placed) = (placer.to_world, self.read::<Object>(SectionKind::Objects, object));
+                if let (true, Ok(placed)) = (placer.object == object, placed)
+                    && set_transform(&mut placer, to_world, &placed).is_ok()
+                {
+                    self.write(SectionKind::Instances, index, &placer);
+                }
+            }
+        }
+        self.with_top(|top| top.refit(0).is_ok());
+        self.settle_world();
+    }
+
+    /// Takes over what object 0 says of the whole scene, and the areas of lights in instances.
+    fn settle_world(&mut self) {
+        let (world, info) =
+            (self.read::<Object>(SectionKind::Objects, 0), self.read::<SceneInfo>(SectionKind::Info, 0));
+        if let (Ok(world), Ok(info)) = (world, info) {
+            let (bounds_min, bounds_max) = (world.bounds_min, world.bounds_max);
+            self.write(SectionKind::Info, 0, &SceneInfo { bounds_min, bounds_max, ..info });
+        }
+        let mut next = 0;
+        while let Some((index, light)) = self.next_light(next, |_, l| l.instance > 0) {
+            next = index.saturating_add(1);
+            let Some(scene) = self.records() else { return };
+            let area = light::area_of(&Scene::assume_valid(scene), index, &light);
+            if area > 0.0 && area.is_finite() && area.to_bits() != light.area.to_bits() {
+                self.write(SectionKind::Lights, index, &Light { area, ..light });
+                self.lights_changed = true;
+            }
+        }
+    }
+
+    /// The first light from `from` on that `is` wanted.
+    fn next_light(&self, from: u32, is: impl Fn(&Records<'_>, &Light) -> bool) -> Option<(u32, Light)> {
+        let scene = self.records()?;
+        let rest = scene.lights.get(from as usize..)?;
+        let found = rest.iter().position(|l| is(&scene, l))?;
+        Some((from.saturating_add(found as u32), *rest.get(found)?))
+    }
+
+    /// Room that [`Self::rebuild`] needs.
+    pub fn rebuild_len(&mut self) -> usize {
+        let mut room = 0;
+        self.with_top(|top| {
+            room = (0..top.objects.len() as u32).map(|object| top.scratch_len(object)).max().unwrap_or(0);
+            true
+        });
+        room
+    }
+
+    /// Builds the world's top-level tree anew over its instances as they are, with this memory for them
+    /// ([`Self::rebuild_len`]): after moves that are large against the distances between instances.
+    ///
+    /// # Errors
+    /// Too little room; the tree is as it was.
+    pub fn rebuild(&mut self, scratch: &mut [Primitive]) -> Result<(), EditError> {
+        let none = EditError::Missing { of: SectionKind::Objects, index: 0 };
+        if self.rebuild_len() > scratch.len() {
+            return Err(none);
+        }
+        if let Some(moved) = self.moved.take() {
+            self.settle_moves(moved);
+        }
+        let built = self.with_top(|top| top.rebuild(0, scratch).is_ok());
+        self.settle_world();
+        if built { Ok(()) } else { Err(none) }
+    }
+
+    /// Calls `change` with the top-level trees, if the scene has any.
+    fn with_top(&mut self, change: impl FnOnce(&mut TopLevel<'_>) -> bool) -> bool {
+        let range = |kind| self.table.whole(kind);
+        let of = [SectionKind::Objects, SectionKind::Instances, SectionKind::Nodes].map(range);
+        let [Some(objects), Some(instances), Some(nodes)] = of else { return false };
+        let Ok([objects, instances, nodes]) = self.bytes.get_disjoint_mut([objects, instances, nodes]) else {
+            return false;
+        };
+        let objects = bytemuck::try_cast_slice_mut::<u8, Object>(objects);
+        let instances = bytemuck::try_cast_slice::<u8, Instance>(instances);
+        let nodes = bytemuck::try_cast_slice_mut::<u8, Node>(nodes);
+        let (Ok(objects), Ok(instances), Ok(nodes)) = (objects, instances, nodes) else { return false };
+        change(&mut TopLevel { objects, instances, nodes })
+    }
+
     /// Builds the table that chooses among lights.
     fn relight(&mut self) {
         let Some(scene) = self.records() else { return };
-        let entries = scene.light_alias.len() as u32;
         let environment = scene.environment.map_or(0.0, |e| luminance(e.radiance) * self.environment_power);
         let extent = SceneExtent { radius: radius(&scene), environment: 0.0 };
-        let whole = |kind| {
-            let (first, last) = (self.table.record(kind, 0), entries.checked_sub(1)?);
-            Some(first?.start..self.table.record(kind, last)?.end)
+        let range = |kind| self.table.whole(kind);
+        let of = [SectionKind::LightAlias, SectionKind::Lights].map(range);
+        let instances = range(SectionKind::Instances).unwrap_or(0..0);
+        let [Some(table), Some(lights)] = of else { return };
+        let Ok([table, lights, instances]) = self.bytes.get_disjoint_mut([table, lights, instances]) else { return };
+        let lights = bytemuck::try_cast_slice::<u8, Light>(lights);
+        let table = bytemuck::try_cast_slice_mut::<u8, Alias>(table);
+        let instances = bytemuck::try_cast_slice::<u8, Instance>(instances).unwrap_or(&[]);
+        let (Ok(lights), Ok(table)) = (lights, table) else { return };
+        let hidden = |l: &Light| {
+            let outer = l.instance.checked_sub(1).and_then(|i| instances.get(i as usize));
+            outer.is_some_and(|i| i.flags & INSTANCE_HIDDEN != 0)
         };
-        let (Some(table), Some(lights)) = (whole(SectionKind::LightAlias), whole(SectionKind::Lights)) else { return };
-        // two sections share no bytes
-        let (lights, table) = if table.start >= lights.end {
-            let (head, tail) = self.bytes.split_at_mut(table.start);
-            (head.get(lights), tail.get_mut(..table.end.saturating_sub(table.start)))
-        } else {
-            let (head, tail) = self.bytes.split_at_mut(lights.start);
-            (tail.get(..lights.end.saturating_sub(lights.start)), head.get_mut(table))
-        };
-        let lights = lights.and_then(|b| bytemuck::try_cast_slice::<u8, Light>(b).ok());
-        let table = table.and_then(|b| bytemuck::try_cast_slice_mut::<u8, Alias>(b).ok());
-        let (Some(lights), Some(table)) = (lights, table) else { return };
         light_table::build(table, |i| {
             lights.get(i as usize).map_or(0.0, |l| match LightKind::from_u32(l.kind) {
                 Some(LightKind::Environment) => environment,
+                _ if hidden(l) => 0.0,
                 _ => light::power(l, &extent),
             })
         });
@@ -397,6 +537,9 @@ impl SceneEdit<'_> {
 
 impl Drop for SceneEdit<'_> {
     fn drop(&mut self) {
+        if let Some(moved) = self.moved.take() {
+            self.settle_moves(moved);
+        }
         if self.lights_changed {
             self.relight();
         }

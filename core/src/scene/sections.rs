@@ -28,6 +28,13 @@ impl SectionTable {
         self.entries.get(kind as usize).copied().flatten()
     }
 
+    /// Bytes of all records of section `kind` within the blob.
+    pub(crate) fn whole(&self, kind: SectionKind) -> Option<Range<usize>> {
+        let s = self.entry(kind)?;
+        let (start, end) = (usize::try_from(s.offset).ok()?, usize::try_from(end(&s)?).ok()?);
+        Some(start..end)
+    }
+
     /// Bytes of record `index` of section `kind` within the blob.
     pub(crate) fn record(&self, kind: SectionKind, index: u32) -> Option<Range<usize>> {
         let s = self.entry(kind).filter(|s| u64::from(index) < s.count)?;

@@ -177,7 +177,14 @@ fn lathe(scene: &mut SceneDescription, name: &str, material: u32, at: V, profile
 /// Adds quads with normals that are the mean of their neighbours', weighted by area.
 fn add_smooth(scene: &mut SceneDescription, name: &str, material: u32, points: &[V], quads: &[[u32; 4]]) {
     let mut normals = vec![[0.0; 3]; points.len()];
-    let triangles: Vec<[u32; 3]> = quads.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
+    let corners = |t: &[u32; 3]| t.map(|v| points[v as usize].map(|x| x as f32));
+    // quads at a pole have two corners in one place
+    let has_area = |t: &[u32; 3]| {
+        let [a, b, c] = corners(t);
+        a != b && b != c && c != a
+    };
+    let halves = quads.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]);
+    let triangles: Vec<[u32; 3]> = halves.filter(has_area).collect();
     for t in &triangles {
         let [a, b, c] = t.map(|v| points[v as usize]);
         let n = cross(std::array::from_fn(|k| b[k] - a[k]), std::array::from_fn(|k| c[k] - a[k]));

@@ -92,6 +92,10 @@ pub fn load_with(path: &Path, options: &LoadOptions, look: &Look) -> Result<(Sce
 
 /// Whether the first bytes of a file are what `is` knows. False if it cannot be read, which its loader says better.
 fn starts(path: &Path, is: fn(&[u8]) -> bool) -> bool {
+    // Opening a pipe waits for its other end.
+    if !path.is_file() {
+        return false;
+    }
     let mut head = Vec::new();
     let read = File::open(path).and_then(|file| file.take(64).read_to_end(&mut head));
     read.is_ok() && is(&head)
