@@ -216,6 +216,29 @@ models! {
     Own => NoBsdf;
 }
 
+/// [`dispatch_in`], with `B` for materials of a host's own model if it has one.
+#[inline(always)]
+pub(crate) fn dispatch_with<'s, B: Bsdf<'s>, V: Visitor<'s>>(
+    profile: Effects,
+    own: bool,
+    kind: MaterialKind,
+    v: V,
+) -> Option<V::Out> {
+    match kind {
+        MaterialKind::Own if own => Some(v.visit::<B>()),
+        MaterialKind::Own => None,
+        _ => dispatch_in(profile, kind, v),
+    }
+}
+
+/// [`shininess`], with `B` for materials of a host's own model.
+pub(crate) fn shininess_with<B: for<'s> Bsdf<'s>>(kind: MaterialKind, material: &Material) -> f32 {
+    match kind {
+        MaterialKind::Own => B::shininess(material),
+        _ => shininess(kind, material),
+    }
+}
+
 /// A set of material kinds, a bit each, from a table of one entry per kind.
 macro_rules! kinds_where {
     (|$kind:ident| $holds:expr) => {{

@@ -8,7 +8,7 @@ use super::packets::Contribution8;
 use super::ring::RESERVE;
 use super::shading::Arrival8;
 use super::vertex::pack_samples;
-use crate::bsdf::{self, Bsdf};
+use crate::bsdf;
 use crate::extension::Extension;
 use crate::learn::cache::NO_BIN;
 use crate::rrs::{self, Learned8, MAX_FACTOR, MIN_FACTOR, Vertices8};
@@ -68,10 +68,8 @@ fn shininess<W: World>(scene: &Scene<'_>, a: &Arrival8) -> F32x8 {
     let material = a.vertex.material.to_array();
     F32x8::from_fn(|i| {
         let kind = MaterialKind::from_u32(a.kind[i]);
-        kind.zip(scene.materials.get(material[i] as usize)).map_or(0.0, |(kind, m)| match kind {
-            MaterialKind::Own => <W::Extension as Extension>::Bsdf::shininess(m),
-            _ => bsdf::shininess(kind, m),
-        })
+        kind.zip(scene.materials.get(material[i] as usize))
+            .map_or(0.0, |(kind, m)| bsdf::shininess_with::<<W::Extension as Extension>::Bsdf>(kind, m))
     })
 }
 

@@ -263,11 +263,8 @@ pub(crate) fn albedo<W: World>(world: &W, a: &Arrival8, active: Mask8) -> Vec3x8
 /// Calls `v` with the model of a kind, or the host's own; `None` for kinds outside the profile.
 #[inline(always)]
 pub(super) fn dispatch<'s, W: World, V: Visitor<'s>>(kind: MaterialKind, v: V) -> Option<V::Out> {
-    match kind {
-        MaterialKind::Own if W::Extension::BSDF => Some(v.visit::<<W::Extension as Extension>::Bsdf>()),
-        MaterialKind::Own => None,
-        _ => bsdf::dispatch_in(W::EFFECTS, kind, v),
-    }
+    let own = W::Extension::BSDF;
+    bsdf::dispatch_with::<<W::Extension as Extension>::Bsdf, V>(W::EFFECTS, own, kind, v)
 }
 
 /// What `kernel`, called with the lanes of one kind, says for its model in the lanes of `active`; 1 for kinds outside the
