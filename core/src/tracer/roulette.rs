@@ -12,8 +12,8 @@ use crate::bsdf::{self, Bsdf};
 use crate::extension::Extension;
 use crate::learn::cache::NO_BIN;
 use crate::rrs::{self, Learned8, MAX_FACTOR, MIN_FACTOR, Vertices8};
+use crate::scene::Scene;
 use crate::scene::blob::MaterialKind;
-use crate::scene::{Effects, Scene};
 use crate::settings::Settings;
 use crate::world::World;
 use croupier_simd::{F32x8, Mask8, U32x8};
@@ -68,12 +68,9 @@ fn shininess<W: World>(scene: &Scene<'_>, a: &Arrival8) -> F32x8 {
     let material = a.vertex.material.to_array();
     F32x8::from_fn(|i| {
         let kind = MaterialKind::from_u32(a.kind[i]);
-        kind.zip(scene.materials.get(material[i] as usize)).map_or(0.0, |(kind, m)| {
-            if Effects::OWN.contains(Effects::of_material(kind)) {
-                <W::Extension as Extension>::Bsdf::shininess(m)
-            } else {
-                bsdf::shininess(kind, m)
-            }
+        kind.zip(scene.materials.get(material[i] as usize)).map_or(0.0, |(kind, m)| match kind {
+            MaterialKind::HOSTS => <W::Extension as Extension>::Bsdf::shininess(m),
+            _ => bsdf::shininess(kind, m),
         })
     })
 }

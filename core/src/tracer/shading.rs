@@ -264,8 +264,8 @@ pub(crate) fn albedo<W: World>(world: &W, a: &Arrival8, active: Mask8) -> Vec3x8
 #[inline(always)]
 pub(super) fn dispatch<'s, W: World, V: Visitor<'s>>(kind: MaterialKind, v: V) -> Option<V::Out> {
     match kind {
-        MaterialKind::Own if W::Extension::BSDF => Some(v.visit::<<W::Extension as Extension>::Bsdf>()),
-        MaterialKind::Own => None,
+        MaterialKind::HOSTS if W::Extension::BSDF => Some(v.visit::<<W::Extension as Extension>::Bsdf>()),
+        MaterialKind::HOSTS => None,
         _ => bsdf::dispatch_in(W::EFFECTS, kind, v),
     }
 }
