@@ -62,7 +62,8 @@ fn merging_is_logging_both() {
         saved(&cache)
     };
     let (a, b, both) = (logged(&[6]), logged(&[7]), logged(&[6, 7]));
-    let mut blocks = Blocks::leaves(300, 1);
+    // room for as many leaves beside one shard as there is beside two
+    let mut blocks = Blocks::leaves(310, 1);
     let (mut cache, _) = blocks.carve(LO, HI);
     cache.load(&a).unwrap();
     cache.merge(&b).unwrap();

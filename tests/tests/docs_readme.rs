@@ -1,8 +1,10 @@
 //! The README: its example works, and it stays what a stranger reads first.
 
+use croupier::{Scene, Settings};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin;
+use croupier_host::renderer::{Renderer, RendererError};
 use croupier_tests::documents::document;
 
 mod example {
@@ -21,6 +23,24 @@ mod example {
     }
 }
 
+mod frames {
+    use croupier::{Budget, StepResult};
+    use croupier_host::renderer::{Keep, Renderer, RendererError};
+
+    pub(super) fn frame(renderer: &Renderer, x: f32) -> Result<f64, RendererError> {
+        let mut camera = renderer.with_scene(|scene| *scene.camera);
+        camera.origin[0] = x;
+        renderer.edit(Keep::Statistics, |scene| scene.camera(camera))?; // however large the scene is
+        renderer.begin_iteration(4);
+        // one after another, or each on a thread of yours
+        for shard in 0..renderer.plan().settings().shards {
+            while renderer.step(shard, Budget { rays: 10_000 })? == StepResult::More {}
+        }
+        renderer.end_iteration()?; // `finish_iteration` does it in pieces
+        Ok(renderer.with_film(|film| film.error_estimate().rel_mse))
+    }
+}
+
 /// The example's function renders, and refuses too little memory. Killed by: an interface that the README does not know.
 #[test]
 fn the_example_renders() {
@@ -30,15 +50,47 @@ fn the_example_renders() {
     assert!(example::render(&baked.bytes, &mut memory.as_mut()[..100_000]).is_err());
 }
 
-/// The example is the code that the test above runs. Killed by: a change to one of the two only.
+/// The example of an engine renders one frame after another, and refuses a camera that is nowhere. Killed by: an edit
+/// that needs another session, a frame that does not begin a picture anew.
 #[test]
-fn the_example_is_the_code_that_was_run() {
+fn frames_render() {
+    let baked = bake(&builtin::cornell_box(), &BakeOptions::default(), |_, _| {}).unwrap();
+    let settings =
+        Settings { size: [32, 32], ..Settings::for_scene(&Scene::from_bytes(baked.bytes.as_ref()).unwrap()) };
+    let renderer: Renderer = Renderer::new(baked.bytes, &settings).unwrap();
+    let x = renderer.with_scene(|scene| scene.camera.origin[0]);
+    for moved in [0.0, 0.05, 0.1] {
+        assert!(frames::frame(&renderer, x + moved).unwrap() > 0.0);
+        assert!(renderer.with_film(|film| film.pixels().all(|p| p.samples == 4)));
+    }
+    assert!(matches!(frames::frame(&renderer, f32::NAN), Err(RendererError::Edit(_))));
+}
+
+/// The examples are the code that the tests above run; the first is also in the package's README. Killed by: a change to
+/// one of them only.
+#[test]
+fn the_examples_are_the_code_that_was_run() {
     let squeezed = |text: &str| text.replace("pub(super) ", "").split_whitespace().collect::<Vec<_>>().join(" ");
-    let text = document("README.md");
-    let shown = text.split("```rust\n").nth(1).and_then(|t| t.split("```").next()).expect("an example");
     let run = include_str!("docs_readme.rs");
-    let run = run.split("mod example {").nth(1).and_then(|t| t.split("\n}\n").next()).expect("the module");
-    assert_eq!(squeezed(shown), squeezed(run));
+    for (file, index, module) in
+        [("README.md", 1, "mod example {"), ("README.md", 2, "mod frames {"), ("core/README.md", 1, "mod example {")]
+    {
+        let text = document(file);
+        let shown = text.split("```rust\n").nth(index).and_then(|t| t.split("```").next()).expect("an example");
+        let run = run.split(module).nth(1).and_then(|t| t.split("\n}\n").next()).expect("the module");
+        assert_eq!(squeezed(shown), squeezed(run), "{file}");
+    }
+}
+
+/// Registry pages resolve no relative links, as no repository is named. Killed by: a link to a file in a package's README.
+#[test]
+fn links_of_packages_hold_on_registry_pages() {
+    for folder in ["core", "simd", "embed-example/host"] {
+        let text = document(&format!("{folder}/README.md"));
+        for link in text.split("](").skip(1) {
+            assert!(link.starts_with("https://"), "{folder}: {}", link.split(')').next().unwrap_or(""));
+        }
+    }
 }
 
 /// The README is short, and in the order in which strangers ask. Killed by: a section that is moved, a manual that grows

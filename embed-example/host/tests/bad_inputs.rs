@@ -1,4 +1,5 @@
 //! Files that are wrong, or nearly right: for each the exit status and the message. One row an input.
+#![cfg(feature = "program")]
 
 mod common;
 

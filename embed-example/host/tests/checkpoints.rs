@@ -1,4 +1,5 @@
 //! Renders that go on from a checkpoint: the same bits as without the break; files that are refused.
+#![cfg(feature = "program")]
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! The program from outside: exit status, one clear line of error, JSON.
+#![cfg(feature = "program")]
 
 use bytemuck::{Zeroable, bytes_of};
 use croupier::unstable::scene::blob::{self, ALIGN, Camera, Header, SceneInfo, Section, SectionKind};

@@ -1,4 +1,5 @@
 //! The program's flags about learning, denoising, false colours and statistics, from outside.
+#![cfg(feature = "program")]
 
 use croupier::unstable::SettingRange;
 use croupier::{Scene, Settings};

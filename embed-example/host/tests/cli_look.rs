@@ -1,4 +1,5 @@
 //! Flags of camera and light, as a user gives them.
+#![cfg(feature = "program")]
 
 use croupier::Scene;
 use croupier::unstable::scene::blob::{CameraKind, LightKind};

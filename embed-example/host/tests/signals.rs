@@ -1,4 +1,5 @@
 //! Signals: what is saved, what is left behind, which status.
+#![cfg(feature = "program")]
 #![cfg(target_os = "linux")]
 
 mod common;

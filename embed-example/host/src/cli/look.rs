@@ -25,7 +25,7 @@ pub(crate) struct LookFlags {
     /// Axis that points up; auto guesses it for meshes and leaves it to the camera of a scene file
     #[arg(long, value_name = "AXIS", value_parser = up, default_value = "auto", hide_possible_values = true)]
     up: UpFlag,
-    /// Environment map (EXR) in place of the scene's environment
+    /// Environment map (EXR or .hdr) in place of the scene's environment
     #[arg(long, value_name = "FILE")]
     env: Option<PathBuf>,
     /// Degrees by which the environment map is turned about the up axis, counter-clockwise from above, -360 to 360

@@ -39,7 +39,7 @@ pub(super) fn decode(bytes: &[u8], free: u64) -> Result<Rgb, String> {
     if 4 * size.rows as u64 > rest.len() as u64 {
         return Err(format!("{} bytes of pixels are too few for {} rows of {}", rest.len(), size.rows, size.row));
     }
-    super::images::fits(size.row as u64, size.rows as u64, 12, free)?;
+    super::budget::fits(size.row as u64, size.rows as u64, 12, free)?;
     let mut pixels = vec![[0.0; 3]; size.row * size.rows];
     let mut row = vec![[0u8; 4]; size.row];
     for y in 0..size.rows {

@@ -2,6 +2,7 @@
 //! decoding takes is known from a header, and compared with the memory that is `free`, before anything of that size is
 //! allocated.
 
+use super::budget::fits;
 use super::hdr;
 use crate::description::{Environment, Texture};
 use crate::image::{Picture, Rgb};
@@ -34,18 +35,6 @@ pub(super) fn texture(bytes: &[u8], free: u64) -> Result<Decoded, String> {
 fn said(e: &dyn std::fmt::Display) -> String {
     let words = e.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
     text::excerpt(&words).into_owned()
-}
-
-/// Fails unless an image whose decoding takes `bytes_per_pixel` fits.
-pub(super) fn fits(width: u64, height: u64, bytes_per_pixel: u64, free: u64) -> Result<(), String> {
-    match width.checked_mul(height).and_then(|n| n.checked_mul(bytes_per_pixel)) {
-        Some(n) if n <= free => Ok(()),
-        n => {
-            let needed = n.map_or("more than 16 EiB".into(), text::bytes);
-            let free = text::bytes(free);
-            Err(format!("{width} x {height} pixels take {needed} to decode, {free} of the texture memory are free"))
-        }
-    }
 }
 
 /// Zeros, or an error where there is no memory for them.

@@ -14,11 +14,13 @@
 //! | `images` | PNG and JPEG textures, environment maps: EXR, and Radiance through `hdr` |
 //! | `colors` | nothing: colours of vertices as textures |
 //! | `loader` | the files that all of them ask for, each once |
+//! | `budget` | nothing: memory that decoding may take |
 //! | `files` | nothing but bytes: regular files of a limited size, text, names in another case |
 //! | `polygon` | nothing: polygons as triangles |
 //! | `json` | values of a JSON document with their paths |
 
 mod bare;
+mod budget;
 mod colors;
 mod error;
 mod files;
