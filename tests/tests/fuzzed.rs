@@ -12,10 +12,10 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Inputs of each format of scene files.
-const INPUTS: usize = 4_000;
+const INPUTS: usize = 2_000;
 
 /// Inputs of each format that is rendered from with learned roulette, which takes longer: whole sessions.
-const SESSIONS: usize = 2_000;
+const SESSIONS: usize = 1_000;
 
 /// Most bytes in use at a time, of all tests of this binary.
 const LIMIT: usize = 1 << 30;
