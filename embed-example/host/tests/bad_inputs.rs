@@ -388,7 +388,8 @@ fn replaced_with_a_note() {
     files[0].1 = bom(&format!("mtllib a.mtl\n{V}usemtl m\nf 1 2 3\n"));
     files[1].1 = bom("newmtl m\nKe 1 1 1\n");
     let (status, notes, _dir) = run(&files, &[&["render", "a.obj", "--strict"], &RENDER[..]].concat());
-    assert_eq!((status, notes.lines().count()), (Some(0), 1), "{notes}");
+    // camera, ground and daylight are added, and said; nothing else
+    assert_eq!((status, notes.lines().count()), (Some(0), 3), "{notes}");
     let mut files = json(r#"{"file": "a.obj", "type": "obj"}"#, "", GREY);
     files[0].1 = bom(&text(&files[0].1));
     let (status, notes, _dir) = run(&files, &[&["render", "scene.json", "--strict"], &RENDER[..]].concat());
@@ -496,7 +497,7 @@ fn endless_files_are_refused() {
     }
 }
 
-/// Four lines: scene, memory, result, files. Killed by: counters among them, a line that is left out.
+/// Four lines: scene (with its ground), memory, result, files. Killed by: counters among them, a line that is left out.
 #[test]
 fn a_render_says_four_lines() {
     let (status, _, dir) = run(&obj("newmtl m\n"), &["info", "a.obj"]);
@@ -505,7 +506,7 @@ fn a_render_says_four_lines() {
     let said = text(&out.stdout);
     let lines: Vec<&str> = said.lines().collect();
     assert_eq!(lines.len(), 4, "{said}");
-    assert!(lines[0].starts_with("a.obj: 1 triangles, ") && lines[0].ends_with("16x8 pixels"), "{said}");
+    assert!(lines[0].starts_with("a.obj: 3 triangles, ") && lines[0].ends_with("16x8 pixels"), "{said}");
     assert!(
         lines[1].starts_with("ears") && lines[1].contains("16 shards") && lines[1].contains("MiB of memory"),
         "{said}"

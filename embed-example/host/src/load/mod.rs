@@ -45,7 +45,7 @@ pub use error::LoadError;
 pub use files::{MAX_FILE_BYTES, read as read_file};
 pub use loader::{LoadOptions, LoadReport};
 
-use crate::description::{Environment, SceneDescription};
+use crate::description::{Environment, SceneDescription, Triangle};
 use crate::look::{Look, dress};
 use loader::Loader;
 use std::fs::File;
@@ -86,10 +86,24 @@ pub fn load_with(path: &Path, options: &LoadOptions, look: &Look) -> Result<(Sce
             _ => return Err(LoadError::Unknown { path: path.into() }),
         }
     };
+    // before a ground is laid below it
+    if !scene.triangles.is_empty() && !scene.triangles.iter().any(|t| has_area(&scene, t)) {
+        let count = scene.triangles.len();
+        let what = format!("none of the {count} triangles has an area: there is nothing to see");
+        return Err(LoadError::File { path: loader.report.files.first().map_or(path, |p| p).into(), what });
+    }
     let notes = dress(&mut scene, &loader.given, look);
     loader.report.notes.extend(notes.map_err(|source| LoadError::Look { path: path.into(), source })?);
     loader.report.framed = !loader.given.camera;
     Ok((scene, loader.report))
+}
+
+/// Whether a triangle spans a plane, as baking asks it.
+fn has_area(scene: &SceneDescription, t: &Triangle) -> bool {
+    let corner =
+        |v: u32| scene.vertices.get(v as usize).map_or(glam::DVec3::ZERO, |v| glam::Vec3::from(v.position).as_dvec3());
+    let [a, b, c] = t.vertices.map(corner);
+    (b - a).cross(c - a).length_squared() > 0.0
 }
 
 /// Whether the first bytes of a file are what `is` knows. False if it cannot be read, which its loader says better.
