@@ -1,6 +1,10 @@
 //! Stepping allocates nothing: an allocator that reports every call while it is forbidden. Alone in its binary, because
 //! the allocator is global.
 
+#[expect(dead_code, unreachable_pub, reason = "a program, of which the test calls the parts")]
+#[path = "../../embed-example/host/examples/frame_loop.rs"]
+mod example;
+
 use croupier::unstable::accel::WideBvh;
 use croupier::unstable::profile::{Full, Profile};
 use croupier::unstable::scene::blob::{Light, Material};
@@ -139,4 +143,24 @@ fn frames_of_an_owning_renderer_allocate_nothing() {
             assert!(renderer.with_film(|film| film.error_estimate().rel_mse > 0.0));
         }
     });
+}
+
+/// The frame loop that hosts copy: moving, resting, ending iterations, reading previews. Killed by: any call of it that
+/// allocates.
+#[test]
+fn the_frame_loop_allocates_nothing() {
+    for strategy in ["classic", "ears"] {
+        let bytes = blob(&everything([48, 32]));
+        let scene = Scene::from_bytes(&bytes).unwrap();
+        let strategy = Strategy::parse(strategy).unwrap();
+        let settings = Settings { strategy, shards: 6, aovs: true.into(), ..Settings::for_scene(&scene) };
+        let mut engine = example::FrameLoop::new(bytes, &settings).unwrap();
+        without_allocating(|| {
+            let mut frames = 0;
+            while frames <= 9 || engine.finished() < 3 {
+                engine.frame(example::input(frames, 9).as_ref()).unwrap();
+                frames += 1;
+            }
+        });
+    }
 }

@@ -65,6 +65,15 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
+    /// Rows that the next one loads before its own: the first of a pass loads all that the pass reads around it.
+    pub(crate) fn rows_to_load(&self) -> u32 {
+        match Pass::of(self.pass) {
+            Pass::Variance | Pass::Despeckle if self.row == 0 => 1,
+            Pass::Smooth(level) if self.row == 0 => STEPS.get(level as usize).map_or(1, |&step| step as u32),
+            _ => 0,
+        }
+    }
+
     /// Works on the next row; `true` when there is none. `noisy` and `work` must be the same from the first row to the
     /// last.
     pub(crate) fn row<S: NoisySource>(&mut self, size: [u32; 2], noisy: &S, work: &mut Work<'_>) -> bool {

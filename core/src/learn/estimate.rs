@@ -164,6 +164,14 @@ impl<'m> PixelEstimates<'m> {
         }
     }
 
+    /// See [`Progress::rows_to_load`].
+    pub(super) fn rows_to_load(&self) -> u32 {
+        match &self.values {
+            Values::Denoised(_) if self.state.given == 0 => self.state.progress.rows_to_load(),
+            _ => 0,
+        }
+    }
+
     /// Estimates the pixels anew from the film, a row of one pass; `true` after the last.
     pub(super) fn refresh_row(&mut self, film: &Film<'_>) -> bool {
         if self.state.given != 0 {

@@ -314,6 +314,11 @@ impl<'m> LearnedState<'m> {
         !self.needed || self.pixels.refresh_row(film)
     }
 
+    /// Rows of the film that the next row of [`Self::refresh_row`] loads before its own.
+    pub(crate) fn rows_to_load(&self) -> u32 {
+        if self.needed { self.pixels.rows_to_load() } else { 0 }
+    }
+
     /// Computes the density of the next iteration's samples in one tile; `true` after the last.
     pub(crate) fn density_of_next(&mut self, film: &Film<'_>) -> bool {
         self.allocation.density_of_next(film, &self.pixels)

@@ -33,11 +33,13 @@ const ERROR: u32 = 9;
 const DONE: u32 = 10;
 
 /// Pixels whose errors are computed in the time of a ray.
-const MEASURED_PER_RAY: u64 = 3;
-/// Pixels that are merged in the time of a ray.
-const MERGED_PER_RAY: u64 = 1;
+const MEASURED_PER_RAY: u64 = 1;
+/// Rays in the time of which a pixel is merged, with the standard auxiliary values.
+const RAYS_PER_MERGED: u64 = 3;
 /// Pixels of a denoised row in the time of a ray.
-const DENOISED_PER_RAY: u64 = 3;
+const DENOISED_PER_RAY: u64 = 1;
+/// Pixels of a row in the time of a ray that the denoiser loads before a pass.
+const LOADED_PER_RAY: u64 = 6;
 /// Bins that are discounted in the time of a ray.
 const DISCOUNTED_PER_RAY: u64 = 8;
 /// Bins that are absorbed in the time of a ray.
@@ -57,9 +59,10 @@ impl SessionState<'_> {
     /// error. All shards must be there and have finished (or have been stopped and drained), and must be the same ones
     /// until [`StepResult::Done`]; then the next iteration can begin.
     ///
-    /// The budget is in units of a ray, as that of [`Shard::step`]; many small calls and one big call give the same
-    /// bits. It is exceeded by less than one piece of work, the largest of which are 17 rows of the picture (the first of
-    /// a level of the denoiser). A budget of 0 checks the shards and does nothing. Until the end the film has the
+    /// The budget is in units of a ray of the tracer, some 300 instructions, where the rays of [`Shard::step`] take their
+    /// shading along; many small calls and one big call give the same bits. It is exceeded by a few pixels, or by a piece
+    /// of work that is larger than it: the largest is a row of the denoiser that loads 16 others, 4 units per column. A
+    /// budget of 0 checks the shards and does nothing. Until the end the film has the
     /// iteration in some pixels and not in others, and the estimates of before. [`Session::begin_iteration`] abandons
     /// what is left to do: pixels that have been merged keep the iteration, others do not.
     ///
@@ -73,6 +76,10 @@ impl SessionState<'_> {
         self.check(&shards)?;
         let mut spent = 0;
         while spent < budget.rays {
+            // rows are not divided
+            if spent > 0 && self.finishing.stage == REFRESH && self.rays_of_row() > budget.rays - spent {
+                break;
+            }
             spent += self.finish_some(&shards, budget.rays - spent);
             if self.finishing.stage == DONE {
                 self.finishing = Finishing::default();
@@ -109,6 +116,23 @@ impl SessionState<'_> {
             if done {
                 return Ok(());
             }
+        }
+    }
+
+    /// What the next piece of [`Self::finish_iteration`] does, for measurements: the name of a stage.
+    pub fn finishing_stage(&self) -> &'static str {
+        match self.finishing.stage {
+            START => "start",
+            MEASURE => "measure",
+            MERGE => "merge",
+            REFRESH => "refresh",
+            MEASURE_FIRST => "measure first",
+            DISCOUNT => "discount",
+            ABSORB => "absorb",
+            FREEZE => "freeze",
+            DENSITIES => "densities",
+            ERROR => "error",
+            _ => "done",
         }
     }
 
@@ -157,11 +181,12 @@ impl SessionState<'_> {
             MEASURE => self.measure(shards, rays, false),
             MERGE => self.merge(shards, rays),
             REFRESH => {
+                let work = self.rays_of_row();
                 if self.learned.refresh_row(&self.film) {
                     self.finishing.selection.begin(self.digits);
                     self.next_stage();
                 }
-                1 + u64::from(self.film.size()[0]) / DENOISED_PER_RAY
+                work
             }
             MEASURE_FIRST => self.measure(shards, rays, true),
             DISCOUNT => {
@@ -196,6 +221,12 @@ impl SessionState<'_> {
         }
     }
 
+    /// Units that the next row of the estimate takes.
+    fn rays_of_row(&self) -> u64 {
+        let columns = u64::from(self.film.size()[0]);
+        1 + columns / DENOISED_PER_RAY + u64::from(self.learned.rows_to_load()) * columns / LOADED_PER_RAY
+    }
+
     /// Measures the picture of the iteration; `first` if it is the first one, and the estimate its own.
     fn measure<'a, 'b: 'a>(&mut self, shards: &impl Shards<'a, 'b>, rays: u64, first: bool) -> u64 {
         if !self.learned.measures(first) {
@@ -228,14 +259,13 @@ impl SessionState<'_> {
         let Finishing { cursor, shard, counters, .. } = &mut self.finishing;
         let (film, learned) = (&mut self.film, &self.learned);
         if let Some(s) = shards.clone().into_iter().nth(*shard as usize) {
-            let limit = rays.saturating_mul(MERGED_PER_RAY);
-            let (n, done) = s.visit(cursor, limit, |i, sums, rays, aov| {
+            let (n, done) = s.visit(cursor, rays.div_ceil(RAYS_PER_MERGED), |i, sums, rays, aov| {
                 film.merge(i, sums, rays, aov, learned.weight_of(i));
             });
             if done {
                 (*shard, *cursor) = (*shard + 1, ShardCursor::default());
             }
-            return 1 + n / MERGED_PER_RAY;
+            return 1 + n * RAYS_PER_MERGED;
         }
         film.end_merge();
         self.counters.merge(counters);

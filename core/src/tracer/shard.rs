@@ -223,6 +223,11 @@ impl<'m> Shard<'m> {
         self.joined == identity && cursor.is_finished() && ring.waiting() == 0 && book.is_clear()
     }
 
+    /// Is this the iteration of the shard's last step? `world` is the session.
+    pub fn has_joined<W: World>(&self, world: &W) -> bool {
+        self.joined == world.identity()
+    }
+
     /// Calls `f(film index, mean radiance, samples)` for each pixel of the shard that has finished camera samples in the
     /// iteration of the shard's last step, which may be under way: for previews.
     ///

@@ -246,6 +246,11 @@ impl<P: Profile> Renderer<P> {
         Ok(result?)
     }
 
+    /// See [`SessionState::finishing_stage`].
+    pub fn finishing_stage(&self) -> &'static str {
+        read(&self.shared).state.borrow_dependent().finishing_stage()
+    }
+
     /// [`Self::finish_iteration`] in one call.
     ///
     /// # Errors
@@ -267,6 +272,19 @@ impl<P: Profile> Renderer<P> {
     /// Shows the picture so far.
     pub fn with_film<T>(&self, show: impl FnOnce(&Film<'_>) -> T) -> T {
         show(read(&self.shared).state.borrow_dependent().film())
+    }
+
+    /// Shows the pixels of a shard in the iteration under way: calls `show(film index, mean radiance, samples)`, see
+    /// [`Shard::for_each_pixel`]. Takes time by the pixels of the shard; waits for a step of it that is under way.
+    /// Nothing is shown of a shard that has not stepped since the scene has changed, or that does not exist.
+    pub fn with_unfinished(&self, shard: u32, show: impl FnMut(usize, [f64; 3], u32)) {
+        let shared = read(&self.shared);
+        let Ok(view) = builder::<P>(shared.scene.scene()).view(shared.state.borrow_dependent()) else { return };
+        if let Some(own) = self.shards.get(shard as usize).map(own)
+            && let Some(owned) = own.as_ref().filter(|s| s.borrow_dependent().has_joined(&view))
+        {
+            owned.borrow_dependent().for_each_pixel(show);
+        }
     }
 
     /// Shows the scene as it is now.

@@ -1,0 +1,225 @@
+//! The longest call of a host's frame loop (`embed-example/host/examples/frame_loop.rs`), in instructions: each call of
+//! the renderer is a function after which callgrind writes what it has counted, so that every single call is known.
+//!
+//! Two renders for each strategy. The end of an iteration, edits and reading are those of a picture of 1920 x 1080 with
+//! auxiliary values, whose paths end early because only the number of its pixels matters; steps are those of whole paths
+//! in a strip of that picture.
+
+use clap::Parser;
+use croupier::{Budget, Scene, Settings, StepResult, Strategy};
+use croupier_benches::callgrind::{self, Folder};
+use croupier_benches::exit::exit_code;
+use croupier_benches::provenance;
+use croupier_benches::results::{Results, Table};
+use croupier_host::builtin;
+use croupier_host::renderer::{Keep, Renderer, RendererError};
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::hint::black_box;
+use std::path::Path;
+use std::process::{Command, ExitCode};
+
+#[derive(Parser)]
+#[command(about = "The longest call of a frame loop, counted by callgrind")]
+struct Args {
+    /// Write benches/results/frame.md.
+    #[arg(long)]
+    write: bool,
+    /// Only this strategy.
+    #[arg(long)]
+    only: Option<String>,
+    /// Rows of the picture whose iterations end.
+    #[arg(long, default_value_t = 1080)]
+    rows: u32,
+    /// Make the calls on this blob and print the kind of each: what the program runs under valgrind.
+    #[arg(long, hide = true, requires = "strategy")]
+    blob: Option<std::path::PathBuf>,
+    #[arg(long, hide = true)]
+    strategy: Option<String>,
+    /// Measure steps instead of ends.
+    #[arg(long, hide = true)]
+    steps: bool,
+}
+
+const NAME: &str = "frame";
+const STRATEGIES: [&str; 2] = ["classic", "ears"];
+const COLUMNS: u32 = 1920;
+const SHARDS: u32 = 64;
+/// Rows of the picture whose steps are measured.
+const STRIP: u32 = 48;
+/// Budgets of calls, in rays or units of a ray.
+const BUDGETS: [u64; 2] = [2_000, 10_000];
+/// A millisecond at 3 G instructions a second.
+const LIMIT: u64 = 3_000_000;
+
+/// The calls, by kind in their order.
+#[derive(Default)]
+struct Calls(Vec<String>);
+
+impl Calls {
+    fn make<T>(&mut self, kind: &str, call: impl FnOnce() -> T) -> T {
+        self.0.push(kind.into());
+        let (mut call, mut result) = (Some(call), None);
+        bench_collect(&mut || result = call.take().map(|c| c()));
+        result.expect("the call was made")
+    }
+}
+
+/// What callgrind collects in; it writes no profile where it does not collect, so the end of the call is in another
+/// function. Not generic, so that both have one name.
+#[inline(never)]
+fn bench_collect(call: &mut dyn FnMut()) {
+    bench_one_call(call);
+    // no call in place of the return
+    black_box(());
+}
+
+/// What callgrind writes a profile after.
+#[inline(never)]
+fn bench_one_call(call: &mut dyn FnMut()) {
+    call();
+    black_box(());
+}
+
+/// Whole paths, in pieces of both sizes in turn.
+fn steps(renderer: &Renderer, calls: &mut Calls) -> Result<(), RendererError> {
+    for rays in BUDGETS {
+        renderer.begin_iteration(1);
+        for shard in 0..renderer.plan().settings().shards {
+            for rays in [1_500, BUDGETS[0], BUDGETS[1]].into_iter().cycle() {
+                let kind = format!("step, {rays}");
+                if calls.make(&kind, || renderer.step(shard, Budget { rays }))? == StepResult::Done {
+                    break;
+                }
+            }
+        }
+        finish(renderer, rays, calls)?;
+    }
+    Ok(())
+}
+
+/// Ends an iteration; a call is named by the stage that it begins with.
+fn finish(renderer: &Renderer, rays: u64, calls: &mut Calls) -> Result<(), RendererError> {
+    loop {
+        let kind = format!("finish_iteration ({}), {rays}", renderer.finishing_stage());
+        if calls.make(&kind, || renderer.finish_iteration(Budget { rays }))? == StepResult::Done {
+            return Ok(());
+        }
+    }
+}
+
+/// Two iterations, whose ends are in pieces of one size each, and what else a frame calls.
+fn ends(renderer: &Renderer, calls: &mut Calls) -> Result<(), RendererError> {
+    let (camera, light) = renderer.with_scene(|scene| (*scene.camera, scene.lights[0]));
+    for rays in BUDGETS {
+        calls.make("begin_iteration", || renderer.begin_iteration(1));
+        for shard in 0..SHARDS {
+            calls.make("first step of a shard, 1", || renderer.step(shard, Budget { rays: 1 }))?;
+            while renderer.step(shard, Budget { rays: u64::MAX })? == StepResult::More {}
+        }
+        calls.make("read the unfinished pixels of one of 64 shards", || {
+            renderer.with_unfinished(0, |pixel, mean, samples| {
+                black_box((pixel, mean, samples));
+            });
+        });
+        finish(renderer, rays, calls)?;
+    }
+    calls.make("error estimate", || black_box(renderer.with_film(|film| film.error_estimate())));
+    calls.make("read 16384 pixels of the film", || {
+        renderer.with_film(|film| {
+            (0..16384).for_each(|i| {
+                black_box(film.pixel(i).mean());
+            })
+        })
+    });
+    for (keep, name) in [(Keep::Statistics, "statistics"), (Keep::Nothing, "nothing")] {
+        calls.make(&format!("edit the camera, keep {name}"), || renderer.edit(keep, |s| s.camera(camera)))?;
+        calls.make(&format!("edit a light, keep {name}"), || renderer.edit(keep, |s| s.light(0, light)))?;
+        calls.make("begin_iteration", || renderer.begin_iteration(1));
+    }
+    Ok(())
+}
+
+/// Makes the calls.
+fn run_calls(args: &Args, blob: &Path, strategy: &str) -> Result<Calls, Box<dyn Error>> {
+    let bytes = callgrind::read(blob)?;
+    let scene = Settings::for_scene(&Scene::from_bytes(&bytes)?);
+    let strategy = Strategy::parse(strategy)?;
+    let settings = Settings { strategy, shards: SHARDS, aovs: true.into(), ..scene };
+    let mut calls = Calls::default();
+    match args.steps {
+        true => {
+            let s = Settings { size: [COLUMNS, STRIP], shards: 2, ..settings };
+            steps(&Renderer::new(bytes, &s)?, &mut calls)?;
+        }
+        false => {
+            let s = Settings { size: [COLUMNS, args.rows], max_depth: 1, ..settings };
+            ends(&Renderer::new(bytes, &s)?, &mut calls)?;
+        }
+    }
+    Ok(calls)
+}
+
+/// For each kind of call how many there were, and the instructions of the longest.
+type Longest = BTreeMap<String, (u64, u64)>;
+
+/// Runs this program with `args` under callgrind.
+fn count(folder: &Folder, args: &[&str], longest: &mut Longest) -> Result<(), Box<dyn Error>> {
+    let out = folder.path().join("calls.out");
+    let mut valgrind = Command::new("valgrind");
+    valgrind.args(["--tool=callgrind", "--quiet", "--collect-atstart=no", "--dump-line=no"]);
+    valgrind.args(["--toggle-collect=*bench_collect*", "--dump-after=*bench_one_call*"]);
+    valgrind.arg(format!("--callgrind-out-file={}", out.display()));
+    let output = valgrind.arg(std::env::current_exe()?).args(args).output()?;
+    if !output.status.success() {
+        return Err(String::from_utf8_lossy(&output.stderr).into());
+    }
+    let kinds = String::from_utf8(output.stdout)?;
+    for (kind, number) in kinds.lines().zip(1..) {
+        let path = folder.path().join(format!("calls.out.{number}"));
+        let profile = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        std::fs::remove_file(&path)?;
+        let total = profile.lines().find_map(|l| l.strip_prefix("totals: ")?.trim().parse::<u64>().ok());
+        let n = total.filter(|&n| n > 0).ok_or("callgrind counted nothing in a call")?;
+        let (calls, most) = longest.entry(kind.into()).or_default();
+        (*calls, *most) = (*calls + 1, n.max(*most));
+    }
+    Ok(())
+}
+
+fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
+    if let (Some(blob), Some(strategy)) = (&args.blob, &args.strategy) {
+        run_calls(args, blob, strategy)?.0.iter().for_each(|kind| println!("{kind}"));
+        return Ok(true);
+    }
+    let mut results = Results::of_this_run(NAME);
+    let folder = Folder::new(NAME)?;
+    let blob = folder.bake("built-in", &builtin::cornell_box())?;
+    for strategy in STRATEGIES.into_iter().filter(|s| args.only.as_deref().is_none_or(|only| only == *s)) {
+        let (blob, rows) = (blob.to_string_lossy(), args.rows.to_string());
+        let child = ["--blob", &blob, "--strategy", strategy, "--rows", &rows];
+        let mut longest = Longest::new();
+        count(&folder, &[&child[..], &["--steps"]].concat(), &mut longest)?;
+        count(&folder, &child, &mut longest)?;
+        let mut table = Table::new(strategy, "call and its budget, calls, instructions of the longest, below 1 ms");
+        for (kind, (calls, most)) in &longest {
+            let below = if *most < LIMIT { "yes" } else { "no" };
+            table.add([kind.replace(',', ":"), calls.to_string(), most.to_string(), below.into()]);
+        }
+        print!("{table}");
+        results.tables.push(table);
+    }
+    if args.write {
+        results
+            .header
+            .push(("picture".into(), format!("built-in scene, {COLUMNS} x {} pixels, {SHARDS} shards", args.rows)));
+        results.header.push(("1 ms".into(), format!("{LIMIT} instructions")));
+        results.header.push(("valgrind".into(), provenance::version_of("valgrind")));
+        println!("wrote {}", results.write(NAME)?.display());
+    }
+    Ok(true)
+}
+
+fn main() -> ExitCode {
+    exit_code(NAME, run(&Args::parse()))
+}
