@@ -91,6 +91,8 @@ impl AovSet {
     pub const STANDARD: Self = Self((1 << (Aov::Cost as u32 + 1)) - 1);
     /// What is known of first hits.
     pub(crate) const FIRST_HITS: Self = Self::of(&[Aov::Albedo, Aov::Normal, Aov::Depth, Aov::Alpha, Aov::Material]);
+    /// Those of first hits that are the first planes if a set has all of them, eight in a row.
+    pub(crate) const FIRST_EIGHT: Self = Self::of(&[Aov::Albedo, Aov::Normal, Aov::Depth, Aov::Alpha]);
     /// Parts of the radiance.
     pub(crate) const LIGHT: Self = Self::of(&[Aov::Emission, Aov::Direct, Aov::Indirect]);
 
@@ -174,6 +176,13 @@ impl AovLayout {
         self.set.intersects(other)
     }
 
+    /// Is all of `other` in the set?
+    #[inline(always)]
+    pub(crate) fn all(&self, other: AovSet) -> bool {
+        self.set.contains(other)
+    }
+
+    #[inline(always)]
     fn is_id(&self, plane: usize) -> bool {
         self.ids >> plane & 1 != 0
     }
@@ -205,11 +214,19 @@ impl<'m> AovSums<'m> {
         self.values.get_mut(pixel * n..pixel * n + n).unwrap_or(&mut [])
     }
 
+    /// Number of values of a pixel, and all values.
+    #[inline(always)]
+    pub(crate) fn rows_mut(&mut self) -> (usize, &mut [f32]) {
+        (self.layout.planes, self.values)
+    }
+
     /// Empties a pixel.
     pub(crate) fn clear(&mut self, pixel: usize) {
-        let n = self.layout.planes;
-        for (plane, x) in self.values.get_mut(pixel * n..pixel * n + n).unwrap_or(&mut []).iter_mut().enumerate() {
-            *x = if self.layout.is_id(plane) { -1.0 } else { 0.0 };
+        let layout = self.layout;
+        let row = self.row_mut(pixel);
+        row.fill(0.0);
+        if layout.ids != 0 {
+            row.iter_mut().enumerate().filter(|(plane, _)| layout.is_id(*plane)).for_each(|(_, x)| *x = -1.0);
         }
     }
 
@@ -261,17 +278,18 @@ impl<'m> AovPlanes<'m> {
 
     /// Adds the sums of `more` samples to the means over `before` samples of a pixel.
     pub(crate) fn merge(&mut self, pixel: usize, before: u32, more: u32, sums: &[f32]) {
-        let total = f64::from(before) + f64::from(more);
-        for plane in 0..self.layout.planes {
-            let Some(mean) = self.values.get_mut(plane * self.pixels + pixel) else { return };
-            let empty = if self.layout.is_id(plane) { -1.0 } else { 0.0 };
+        let (more, total) = (f64::from(more), f64::from(before) + f64::from(more));
+        let means = self.values.get_mut(pixel..).unwrap_or(&mut []).iter_mut().step_by(self.pixels.max(1));
+        if more == 0.0 {
             if before == 0 {
-                *mean = empty;
+                means.zip(0..).for_each(|(mean, plane)| *mean = if self.layout.is_id(plane) { -1.0 } else { 0.0 });
             }
-            let Some(sum) = sums.get(plane).filter(|_| more > 0) else { continue };
+            return;
+        }
+        for ((mean, sum), plane) in means.zip(sums).zip(0..) {
             if !self.layout.is_id(plane) {
-                let old = f64::from(*mean);
-                *mean = (old + (f64::from(*sum) - f64::from(more) * old) / total) as f32;
+                let old = if before == 0 { 0.0 } else { f64::from(*mean) };
+                *mean = (old + (f64::from(*sum) - more * old) / total) as f32;
             } else if before == 0 {
                 *mean = *sum;
             }

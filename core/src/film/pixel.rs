@@ -32,8 +32,14 @@ impl PixelSums {
     /// Adds a camera sample of weight 1.
     #[inline]
     pub(crate) fn add(&mut self, radiance: [f64; 3]) {
+        if self.samples == 0 {
+            // a single sample has no deviation
+            self.sum.iter_mut().zip(radiance).for_each(|(sum, x)| *sum += x);
+            self.samples = 1;
+            return;
+        }
         let n = f64::from(self.samples);
-        let scale = if self.samples == 0 { 0.0 } else { 1.0 / (n * (n + 1.0)) };
+        let scale = 1.0 / (n * (n + 1.0));
         for (c, x) in radiance.into_iter().enumerate() {
             // n (x - mean of the samples before)
             let d = n * x - self.sum[c];

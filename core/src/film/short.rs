@@ -6,12 +6,11 @@
 /// Nearest short number; 0 for negative numbers and NaN.
 #[inline(always)]
 pub(super) fn short(x: f64) -> u32 {
-    if x > 0.0 {
-        // the largest finite number stays finite
-        ((x.min(LARGEST).to_bits() + (1 << 30)) >> 31) as u32
-    } else {
-        0
-    }
+    // one instruction each, where `f64::max` and `f64::min` would ask which of the two is a NaN
+    let x = if x > 0.0 { x } else { 0.0 };
+    // the largest finite number stays finite
+    let x = if x < LARGEST { x } else { LARGEST };
+    ((x.to_bits() + (1 << 30)) >> 31) as u32
 }
 
 /// Largest number that is not rounded to infinity.

@@ -91,7 +91,7 @@ impl LightModel for Area {
 
     #[inline(always)]
     fn sample(scene: &Scene<'_>, light: &Chosen<'_>, p: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8 {
-        if !scene.instances.is_empty() {
+        if light.placed {
             return sample_placed(scene, light, p, words, mask);
         }
         let corners = Corners::gather(scene, light.record.map(|l| l.triangle), mask);

@@ -154,13 +154,15 @@ struct Chosen<'s> {
     record: [&'s Light; 8],
     /// Times at which they are seen.
     time: F32x8,
+    /// May triangles be in instances?
+    placed: bool,
     emission: Vec3x8,
     vector: Vec3x8,
 }
 
 impl<'s> Chosen<'s> {
     #[inline(always)]
-    fn gather(scene: &Scene<'s>, light: U32x8, time: F32x8, mask: Mask8) -> Self {
+    fn gather(scene: &Scene<'s>, light: U32x8, time: F32x8, placed: bool, mask: Mask8) -> Self {
         let index = light.to_array();
         let mut record = [IDLE; 8];
         for i in mask.lanes() {
@@ -172,6 +174,7 @@ impl<'s> Chosen<'s> {
             index: light,
             record,
             time,
+            placed,
         }
     }
 
@@ -302,7 +305,9 @@ pub fn sample_at<S: LightSelector>(
     active: Mask8,
 ) -> LightSample8 {
     let (light, probability) = selector.select(at.p, at.n, words[0]);
-    let chosen = Chosen::gather(scene, light, at.time, active);
+    // constant in profiles without instances
+    let placed = profile.contains(Effects::INSTANCES) && scene.effects.contains(Effects::INSTANCES);
+    let chosen = Chosen::gather(scene, light, at.time, placed, active);
     let possible = active & probability.gt(F32x8::ZERO);
     let mut out = sample_chosen(profile, scene, &chosen, at.p, [words[1], words[2], words[3]], possible);
     if profile.contains(TEXTURED_EMISSION) && scene.effects.contains(TEXTURED_EMISSION) {

@@ -33,32 +33,45 @@ impl Bookkeeping<'_> {
         for i in first.and_not(good).lanes() {
             self.count_non_finite(root[i]);
         }
-        // what is not asked for lies beyond every row
-        let first_of = |aov| self.aovs.layout.first(aov).unwrap_or(usize::MAX);
-        let [a, n, d, h, m] = [
-            first_of(Aov::Albedo),
-            first_of(Aov::Normal),
-            first_of(Aov::Depth),
-            first_of(Aov::Alpha),
-            first_of(Aov::Material),
-        ];
-        let [albedo, normal] = [albedo, normal].map(|v| [v.x.to_array(), v.y.to_array(), v.z.to_array()]);
-        let t = t.to_array();
+        // what is written to each of eight planes, by lane
+        let [a, n] = [albedo, normal];
+        let rows = F32x8::transpose([a.x, a.y, a.z, n.x, n.y, n.z, t, F32x8::ONE]);
+        if self.aovs.layout.all(AovSet::FIRST_EIGHT) {
+            let (planes, values) = self.aovs.rows_mut();
+            for i in good.lanes() {
+                let pixel = self.roots.get(root[i]).target.pixel();
+                if let Some(sums) = values.get_mut(pixel * planes..).and_then(|row| row.first_chunk_mut::<8>()) {
+                    *sums = (F32x8::new(*sums) + rows[i]).to_array();
+                }
+            }
+        } else {
+            self.add_some_of_eight(good, &root, &rows);
+        }
+        if self.aovs.layout.first(Aov::Material).is_some() {
+            self.record_material(good, &root, material);
+        }
+    }
+
+    /// Adds those of the eight values of [`AovSet::FIRST_EIGHT`] that are asked for.
+    #[cold]
+    fn add_some_of_eight(&mut self, good: Mask8, root: &[u32; 8], rows: &[F32x8; 8]) {
+        for i in good.lanes() {
+            let pixel = self.roots.get(root[i]).target.pixel();
+            let [ax, ay, az, nx, ny, nz, t, one] = rows[i].to_array();
+            self.aovs.add(pixel, Aov::Albedo, [ax, ay, az]);
+            self.aovs.add(pixel, Aov::Normal, [nx, ny, nz]);
+            self.aovs.add(pixel, Aov::Depth, [t]);
+            self.aovs.add(pixel, Aov::Alpha, [one]);
+        }
+    }
+
+    /// Notes the materials of the first camera samples of pixels.
+    #[cold]
+    fn record_material(&mut self, good: Mask8, root: &[u32; 8], material: &[u32; 8]) {
         for i in good.lanes() {
             let target = self.roots.get(root[i]).target;
-            let row = self.aovs.row_mut(target.pixel());
-            for (first, x) in [(a, &albedo), (n, &normal)] {
-                if let Some(sums) = row.get_mut(first..).and_then(|r| r.first_chunk_mut::<3>()) {
-                    *sums = [sums[0] + x[0][i], sums[1] + x[1][i], sums[2] + x[2][i]];
-                }
-            }
-            for (first, x) in [(d, t[i]), (h, 1.0)] {
-                if let Some(sum) = row.get_mut(first) {
-                    *sum += x;
-                }
-            }
             if target.is_first()
-                && let Some(id) = row.get_mut(m)
+                && let Some(id) = self.aovs.get(target.pixel(), Aov::Material, 0)
             {
                 *id = material[i] as i32 as f32;
             }
@@ -66,17 +79,24 @@ impl Bookkeeping<'_> {
     }
 
     /// Adds the factors `s` of the vertices in the lanes of `active`.
+    #[inline(always)]
     pub(super) fn record_factors(&mut self, active: Mask8, path: &Path8, s: F32x8) {
-        let Some(first) = self.aovs.layout.first(Aov::Factors) else { return };
+        if let Some(first) = self.aovs.layout.first(Aov::Factors) {
+            self.add_factors(first, active, path, s);
+        }
+    }
+
+    /// [`Self::record_factors`], plane `first` being the first of the eight.
+    #[inline(never)]
+    fn add_factors(&mut self, first: usize, active: Mask8, path: &Path8, s: F32x8) {
         let (s, root, depth) = (s.to_array(), path.root.to_array(), path.depth.to_array());
+        let (planes, values) = self.aovs.rows_mut();
         for i in active.lanes() {
-            let pixel = self.roots.get(root[i]).target.pixel();
-            let d = first + (depth[i].clamp(1, 4) - 1) as usize;
-            let row = self.aovs.row_mut(pixel);
-            for (plane, x) in [(d, s[i]), (4 + d, 1.0)] {
-                if let Some(sum) = row.get_mut(plane) {
-                    *sum += x;
-                }
+            let at = self.roots.get(root[i]).target.pixel() * planes + first;
+            if let Some(sums) = values.get_mut(at..).and_then(|row| row.first_chunk_mut::<8>()) {
+                let d = (depth[i].clamp(1, 4) - 1) as usize & 3;
+                sums[d] += s[i];
+                sums[4 + d] += 1.0;
             }
         }
     }
