@@ -7,7 +7,6 @@ use croupier::{Budget, Plan, Scene, Session, Settings, Shard, StepResult};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::checkpoint;
-use croupier_host::description::Environment;
 use croupier_host::description::{Camera, Emitter, Environment, Model, Reflectance, SceneDescription, Vertex};
 use croupier_host::image::Picture;
 use croupier_host::load::{LoadOptions, load_with};
