@@ -181,7 +181,7 @@ fn media_that_cannot_be_baked_are_named() {
         (|s| grid(s, |c, _, v| (c[1], *v) = (0, vec![])), &["2 x 0 x 4 cells", "0 values"]),
         (|s| grid(s, |c, _, _| *c = [1 << 31; 3]), &["2147483648 x"]),
         (|s| grid(s, |_, _, v| v[7] = f32::NAN), &["medium `fog`", "density is NaN"]),
-        (|s| grid(s, |_, _, v| v[7] = -1e-9), &["medium `fog`", "density is -0.000000001"]),
+        (|s| grid(s, |_, _, v| v[7] = -1e-9), &["medium `fog`", "density is -1e-9"]),
         (|s| grid(s, |_, b, _| b[0][1] = f32::NAN), &["medium `fog`", "bound of the grid is NaN"]),
         (|s| grid(s, |_, b, _| b[0][1] = 1.0), &["medium `fog`", "width of the grid is 0"]),
         (|s| grid(s, |_, b, _| b[0][1] = 1.5), &["medium `fog`", "width of the grid is -0.5"]),

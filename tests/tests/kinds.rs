@@ -266,7 +266,7 @@ fn baking_checks_every_parameter() {
         (
             Parameter::Alpha,
             Model::RoughDielectric { int_ior: 1.5, ext_ior: 1.0, alpha: ALPHA_RANGE[0].next_down() },
-            "alpha is 0.0000999",
+            "alpha is 9.99999",
         ),
         (Parameter::RelativeEta, Model::Dielectric { int_ior: ETA_RANGE[1].next_up(), ext_ior: 1.0 }, "is 100.00001"),
         (

@@ -225,8 +225,8 @@ pub(crate) fn dispatch_with<'s, B: Bsdf<'s>, V: Visitor<'s>>(
     v: V,
 ) -> Option<V::Out> {
     match kind {
-        MaterialKind::Own if own => Some(v.visit::<B>()),
-        MaterialKind::Own => None,
+        MaterialKind::HOSTS if own => Some(v.visit::<B>()),
+        MaterialKind::HOSTS => None,
         _ => dispatch_in(profile, kind, v),
     }
 }
@@ -234,7 +234,7 @@ pub(crate) fn dispatch_with<'s, B: Bsdf<'s>, V: Visitor<'s>>(
 /// [`shininess`], with `B` for materials of a host's own model.
 pub(crate) fn shininess_with<B: for<'s> Bsdf<'s>>(kind: MaterialKind, material: &Material) -> f32 {
     match kind {
-        MaterialKind::Own => B::shininess(material),
+        MaterialKind::HOSTS => B::shininess(material),
         _ => shininess(kind, material),
     }
 }

@@ -3,9 +3,10 @@
 //!
 //! | parameter | unit | range |
 //! |---|---|---|
-//! | `reflectance` | per channel, or a texture | 0 to 1 |
-//! | `alpha` | as the model takes it | 1e-4 to 1 |
-//! | `eta`, `k`, `fdr` | as the model takes them | finite |
+//! | `reflectance` | per channel, or a texture | `REFLECTANCE_RANGE` |
+//! | `alpha` | as the model takes it | `ALPHA_RANGE` |
+//!
+//! The other numbers of the record are the model's to use; they are finite.
 //!
 //! What the tracer knows of such a material without asking the model: it scatters to both sides, is no delta lobe, lets
 //! nothing pass straight on, and its statistics are keyed by the mirror direction.

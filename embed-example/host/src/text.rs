@@ -80,14 +80,17 @@ pub fn path(path: &Path) -> String {
     format!("{ELLIPSIS}{}", text.get(start..).unwrap_or_default())
 }
 
-/// A number with up to seven significant digits, with an exponent below 1e-4 and from 1e7.
+/// A number with up to seven significant digits, those of `f32` with as many as tell them from their neighbours; with an
+/// exponent below 1e-4 and from 1e7.
 ///
 /// ```
 /// use croupier_host::text::number;
 /// assert_eq!([0.25, -3.0, 1e30, 0.1 + 0.2].map(number), ["0.25", "-3", "1e30", "0.3"]);
 /// ```
 pub fn number(x: f64) -> String {
-    let rounded: f64 = format!("{x:.6e}").parse().unwrap_or(x);
+    let narrow = x as f32;
+    let text = if f64::from(narrow) == x { format!("{narrow:e}") } else { format!("{x:.6e}") };
+    let rounded: f64 = text.parse().unwrap_or(x);
     let size = rounded.abs();
     if !rounded.is_finite() || size == 0.0 || (1e-4..1e7).contains(&size) {
         format!("{rounded}")

@@ -506,7 +506,7 @@ fn a_render_says_four_lines() {
     let said = text(&out.stdout);
     let lines: Vec<&str> = said.lines().collect();
     assert_eq!(lines.len(), 4, "{said}");
-    assert!(lines[0].starts_with("a.obj: 3 triangles, ") && lines[0].ends_with("16x8 pixels"), "{said}");
+    assert!(lines[0].starts_with("a.obj: 65 triangles, ") && lines[0].ends_with("16x8 pixels"), "{said}");
     assert!(
         lines[1].starts_with("ears") && lines[1].contains("16 shards") && lines[1].contains("MiB of memory"),
         "{said}"

@@ -134,6 +134,11 @@ pub enum Parameter {
     Principled,
 }
 
+impl MaterialKind {
+    /// The kind whose scattering model a host brings.
+    pub const HOSTS: Self = Self::Own;
+}
+
 /// Bits of the kinds that have a [`PrincipledRecord`](super::PrincipledRecord).
 pub const LAYERED_KINDS: u32 = {
     let (mut bits, mut rest) = (0, MaterialKind::ALL);
