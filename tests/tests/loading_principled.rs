@@ -172,7 +172,7 @@ fn mtl_keys_become_fields() {
     let Model::Principled(p) = scene.materials[0].model else { panic!("{:?}", scene.materials) };
     assert_eq!((p.base_color, p.base_texture), ([1.0; 3], Some(TextureRef::new(0))));
     assert_eq!(scene.textures[p.emission_texture.unwrap().texture as usize].encoding, Encoding::Srgb);
-    assert_eq!(scene.emitters, [Emitter::Area { material: 0, radiance: [2.0, 3.0, 4.0] }]);
+    assert_eq!(scene.emitters[0], Emitter::Area { material: 0, radiance: [2.0, 3.0, 4.0] });
     assert!(
         matches!(load_mtl("Kd 1 1 1\nPr 0.5").materials[0].model, Model::RoughPlastic { .. }),
         "the mapping of before"

@@ -183,7 +183,7 @@ fn loading_keeps_every_corner_in_order() {
     }
 }
 
-/// A bare OBJ of every scene, with its preview materials. Killed by: no sky; a camera inside the bounds.
+/// A bare OBJ of every scene, with its preview materials. Killed by: no sky; a camera inside what is no room.
 #[test]
 fn every_bare_obj_bakes() {
     for folder in scenes() {
@@ -197,7 +197,8 @@ fn every_bare_obj_bakes() {
         let [lo, hi] = scene.bounds().unwrap();
         let outside =
             (0..3).any(|i| scene.camera.origin[i] > f64::from(hi[i]) || scene.camera.origin[i] < f64::from(lo[i]));
-        assert!(outside, "{}: {:?}", path.display(), scene.camera);
+        let in_room = report.notes.iter().any(|n| n.contains("placed in the room"));
+        assert!(outside || in_room, "{}: {:?}", path.display(), scene.camera);
         let baked = bake(&scene, &BakeOptions::default(), |_, _| {}).unwrap_or_else(|e| panic!("{e}"));
         assert!(Scene::from_bytes(&baked.bytes).is_ok());
     }
