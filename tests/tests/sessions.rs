@@ -45,7 +45,7 @@ fn blocks_must_fit_to_the_byte() {
         assert!(start(&scene, &plan, &mut memory[..needed]).is_ok());
         assert!(start(&scene, &plan, memory).is_ok(), "more than needed will do");
 
-        let needed = plan.shard().size;
+        let needed = plan.shard_of(0).size;
         for given in [0, 1, needed - 1] {
             let error = ShardError::Memory(MemoryError::TooSmall { needed, given });
             assert_eq!(Shard::new(&plan, 0, &mut memory[..given]).err(), Some(error));
@@ -55,7 +55,7 @@ fn blocks_must_fit_to_the_byte() {
             let error = ShardError::Memory(MemoryError::Misaligned);
             assert_eq!(Shard::new(&plan, 0, &mut memory[shift..shift + needed]).err(), Some(error));
         }
-        assert!(Shard::new(&plan, 2, &mut memory[..needed]).is_ok());
+        assert!(Shard::new(&plan, 2, &mut memory[..plan.shard_of(2).size]).is_ok());
         for index in [3, u32::MAX] {
             let error = ShardError::Index { index, shards: 3 };
             assert_eq!(Shard::new(&plan, index, &mut memory[..needed]).err(), Some(error));
