@@ -149,8 +149,6 @@ fn the_start_touches_no_memory_of_pixels() {
             session.restart(false);
             session.begin_iteration(3);
             let _ = shard.step(&session, Budget { rays: 1 });
-            drop(session);
-            drop(shard);
             let count = |b: &AlignedBytes| b.as_ref().iter().filter(|b| **b != 0xa5).count();
             count(&block) + count(&own)
         };

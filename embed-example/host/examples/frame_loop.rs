@@ -164,7 +164,7 @@ fn turned(camera: &Camera, angle: f32) -> Camera {
 
 /// The script of this program: the camera turns for `moving` frames, the lamp flickers now and then, then all rests.
 pub fn input(frame: u32, moving: u32) -> Option<Input> {
-    (frame <= moving).then(|| Input {
+    (frame <= moving).then_some(Input {
         angle: 0.005 * frame as f32,
         lamp: if frame % 7 == 3 { 0.5 } else { 1.0 },
         keep: if frame < moving { Keep::Statistics } else { Keep::Nothing },
