@@ -123,6 +123,7 @@ fn referenced_textures_are_wrapped_and_transformed() {
             };
             let (x, y) = (at[0] * w as f64 - 0.5, at[1] * h as f64 - 0.5);
             let (fx, fy) = (x - x.floor(), y - y.floor());
+            #[expect(clippy::needless_range_loop, reason = "the channel of several texels")]
             for c in 0..3 {
                 let texel = |dx: i64, dy: i64| {
                     let column = wrapped(x.floor() as i64 + dx, w, mode_u);
