@@ -152,7 +152,7 @@ fn other_blocks_are_refused() {
         |plan: &Plan, block: &mut AlignedBytes| Session::resume(scene, plan, block.as_mut()).map(Session::suspend);
     let refused = |e| Err(SessionError::Resume(e));
     assert_eq!(resume(&plan, &mut block), refused(ResumeError::NotSuspended));
-    drop(Session::new(scene, &plan, block.as_mut()).unwrap());
+    let _ = Session::new(scene, &plan, block.as_mut()).unwrap();
     assert_eq!(resume(&plan, &mut block), refused(ResumeError::NotSuspended));
     Session::new(scene, &plan, block.as_mut()).unwrap().suspend();
     for other in [Settings { seed: 1, ..s }, Settings { split_budget: 7, ..s }, Settings { max_depth: 3, ..s }] {
@@ -165,7 +165,7 @@ fn other_blocks_are_refused() {
         block.as_mut()[byte] ^= 4;
     }
     assert_eq!(resume(&plan, &mut block), Ok(()));
-    drop(Session::resume(scene, &plan, block.as_mut()).unwrap());
+    let _ = Session::resume(scene, &plan, block.as_mut()).unwrap();
     assert_eq!(resume(&plan, &mut block), refused(ResumeError::NotSuspended));
 }
 
