@@ -279,12 +279,12 @@ fn only_suspended_shards_can_be_resumed() {
         assert_eq!(error, Some(ShardError::NotSuspended { index }));
     };
     refused(&plan, 0, &mut block);
-    drop(Shard::new(&plan, 0, block.as_mut()).unwrap());
+    let _ = Shard::new(&plan, 0, block.as_mut()).unwrap();
     refused(&plan, 0, &mut block);
     Shard::new(&plan, 0, block.as_mut()).unwrap().suspend();
     refused(&plan, 1, &mut block);
     refused(&other, 0, &mut block);
-    drop(Shard::resume(&plan, 0, block.as_mut()).unwrap());
+    let _ = Shard::resume(&plan, 0, block.as_mut()).unwrap();
     refused(&plan, 0, &mut block);
     // numbers that no shard has
     Shard::new(&plan, 0, block.as_mut()).unwrap().suspend();

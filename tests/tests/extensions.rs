@@ -235,7 +235,7 @@ fn scattering_models_of_the_host_scatter() {
     let opened = Scene::from_bytes(&chalk).unwrap();
     let plan = Plan::new(&settings(&chalk, "classic")).unwrap();
     let mut block = AlignedBytes::zeroed(plan.session().size);
-    let error = Session::new(opened, &plan, block.as_mut()).err().expect("no kernel");
+    let error = Session::new(opened, &plan, block.as_mut()).expect_err("no kernel");
     assert!(matches!(error, SessionError::Profile { .. }));
     assert!(error.to_string().ends_with(" own"), "{error}");
     let _ = description::Material::new("own", Model::Own { reflectance: Reflectance::Constant([0.5; 3]), alpha: 0.1 });

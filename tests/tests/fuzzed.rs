@@ -92,7 +92,7 @@ fn mutate(seed: &[u8], other: &[u8], words: &[&str], rng: &mut SplitMix) -> Vec<
                 let bytes = numbers[rng.word() as usize % numbers.len()].to_le_bytes();
                 out[at..at + 4].copy_from_slice(&bytes);
             }
-            _ if rng.word() % 8 == 0 => out.truncate(at),
+            _ if rng.word().is_multiple_of(8) => out.truncate(at),
             _ => {}
         }
     }
