@@ -253,10 +253,10 @@ fn given_camera() -> SceneDescription {
     s
 }
 
-/// Scenes that leave nothing open stay as they are; wishes change what they name, and nothing else. Killed by: a light or
+/// Scenes that leave nothing open stay as they are; requests change what they name, and nothing else. Killed by: a light or
 /// ground added to a scene file, a camera by another's name, a target that moves along with the place.
 #[test]
-fn wishes_change_what_they_name() {
+fn requests_change_what_they_name() {
     let scene = |look: &Look| {
         let mut s = given_camera();
         dress(&mut s, &Given::SCENE, look).map(|_| s)

@@ -2,26 +2,25 @@
 //! editor's events. It can be stored in a struct, its scene changes between frames without baking, and any number of
 //! persistent threads step it; nothing is allocated after [`Renderer::new`].
 //!
-//! ```no_run
-//! use croupier::Settings;
-//! use croupier::{Budget, Scene, StepResult};
+//! ```
+//! use croupier::{Budget, Scene, Settings, StepResult};
+//! use croupier_host::bake::{BakeOptions, bake};
+//! use croupier_host::builtin;
 //! use croupier_host::renderer::{Keep, Renderer};
-//! # fn blob() -> croupier_host::blob::AlignedBytes { unimplemented!() }
 //!
-//! let blob = blob();
-//! let settings = Settings::for_scene(&Scene::from_bytes(&blob)?);
+//! let blob = bake(&builtin::cornell_box(), &BakeOptions::default(), |_, _| {})?.bytes;
+//! let settings = Settings { size: [32, 32], ..Settings::for_scene(&Scene::from_bytes(&blob)?) };
 //! let renderer: Renderer = Renderer::new(blob, &settings)?;
-//! loop {
+//! for _frame in 0..2 {
 //!     // in each frame: what has changed, and as many rays as there is time for
 //!     let mut camera = renderer.with_scene(|scene| *scene.camera);
 //!     camera.origin[0] += 0.01;
 //!     renderer.edit(Keep::Statistics, |scene| scene.camera(camera))?;
-//!     renderer.begin_iteration(1);
+//!     renderer.begin_iteration(2);
 //!     while renderer.step(0, Budget { rays: 10_000 })? == StepResult::More {}
-//!     renderer.end_iteration()?;
-//!     renderer.with_film(|film| println!("relMSE {}", film.error_estimate().rel_mse));
+//!     while renderer.finish_iteration(Budget { rays: 10_000 })? == StepResult::More {}
+//!     assert!(renderer.with_film(|film| film.error_estimate().rel_mse) > 0.0);
 //! }
-//! # #[expect(unreachable_code, reason = "the type of the example")]
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

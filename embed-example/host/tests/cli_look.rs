@@ -70,9 +70,9 @@ fn flags_out_of_range_are_status_2_and_named() {
     }
 }
 
-/// Killed by: wishes that a baked file cannot follow and are ignored, an error without its names.
+/// Killed by: requests that a baked file cannot follow and are ignored, an error without its names.
 #[test]
-fn wishes_that_cannot_be_followed_are_one_line() {
+fn requests_that_cannot_be_followed_are_one_line() {
     let dir = folder();
     let dir = dir.path();
     baked(dir, "mesh.obj", &[], |_| {});

@@ -1,7 +1,7 @@
 //! What scene files leave open and users ask for: which way is up, camera, light, ground, exposure.
 //!
 //! [`dress`] completes a scene that was loaded, and follows the requests of a [`Look`]. A bare mesh becomes a picture: its
-//! up axis is guessed, it is framed from the front, the right and above, it stands on a matte ground under sun and sky.
+//! up axis is guessed, it is framed from the front, the right and above, it stands on a diffuse ground in daylight.
 //! Scenes that bring camera and light along stay as they are, but for what is asked for.
 //!
 //! | file | has |
@@ -10,7 +10,7 @@
 //! | `up` | the guess which axis points up |
 //! | `framing` | the camera that shows everything |
 //! | `room` | whether a mesh brings a ground or walls along |
-//! | `atmosphere`, `sky` | sun and sky |
+//! | `atmosphere`, `sky` | daylight: sun and environment |
 //! | `exposure` | exposure from a picture |
 
 mod atmosphere;
