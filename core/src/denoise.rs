@@ -45,7 +45,7 @@ pub fn scratch_len(size: [u32; 2]) -> usize {
     columns.saturating_mul(rows).saturating_mul(2).saturating_add(window_len(size))
 }
 
-/// Denoises into `out`, three planes like those of [`Noisy::color`]. What `scratch` and `out` hold before does not
+/// Denoises into `out`, three planes of linear rgb. What `scratch` and `out` hold before does not
 /// matter. A picture without noise comes back as it is, but for rounding; what comes back is finite, always.
 pub fn denoise(noisy: &Noisy<'_>, scratch: &mut [f32], out: [&mut [f32]; 3]) -> Result<(), DenoiseError> {
     let size = noisy.size;

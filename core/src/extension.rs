@@ -33,7 +33,7 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 /// Everything here is a function of its arguments alone, lane by lane: pictures are the same for any number of threads
 /// only then.
 pub trait Extension {
-    /// Scattering model of materials of kind `own` ([`crate::bsdf`] has the contract); [`NoBsdf`] without one.
+    /// Scattering model of materials of kind `own` (`bsdf`'s module documentation has the contract); [`NoBsdf`] without one.
     type Bsdf: for<'s> Bsdf<'s>;
 
     /// Is there a scattering model? Without it, scenes with materials of kind `own` are refused.

@@ -8,8 +8,8 @@ use crate::settings::{Settings, SettingsError};
 use crate::tiles::Tiles;
 use crate::tracer::{Job, Shard, ShardError};
 
-/// Stack that [`Shard::step`] and [`Session::finish_iteration`](crate::Session::finish_iteration) need at most, with any
-/// profile and optimised code, bytes: tested by threads that have no more.
+/// Stack that [`Shard::step`] and [`SessionState::finish_iteration`](crate::SessionState::finish_iteration) need at most,
+/// with any profile and optimised code, bytes: tested by threads that have no more.
 pub const STACK_BYTES: usize = 64 << 10;
 
 /// Sizes of the memory blocks of a render.

@@ -145,8 +145,8 @@ pub struct SessionState<'m> {
     camera_media: u32,
 }
 
-/// The state of a session together with a scene, for as long as shards step: what [`Shard::step`] takes in place of a
-/// [`Session`].
+/// The state of a session together with a scene, for as long as shards step: what [`Shard::step`](crate::Shard::step)
+/// takes in place of a [`Session`].
 #[derive(Clone, Copy, Debug)]
 pub struct SessionView<
     'a,
@@ -429,7 +429,7 @@ impl<'s, 'm, P: Profile, I: Intersector, L: LightSelector, X: Extension> Session
 }
 
 impl<'m> SessionState<'m> {
-    /// Leaves the session in its block, to be resumed ([`Self::resume`]) later, in another place, or by another process:
+    /// Leaves the session in its block, to be resumed ([`Session::resume`]) later, in another place, or by another process:
     /// the block holds no addresses. Whatever state it is in goes along, an iteration that is under way included. A
     /// session that is dropped instead cannot be resumed.
     pub fn suspend(self) {

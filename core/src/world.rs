@@ -26,7 +26,7 @@ pub struct Iteration {
 pub struct Identity {
     /// Content hash of the scene.
     pub scene: u64,
-    /// Number of restarts of the session ([`crate::Session::restart`]).
+    /// Number of restarts of the session ([`crate::SessionState::restart`]).
     pub epoch: u64,
     /// Iteration that runs.
     pub iteration: Iteration,

@@ -1,6 +1,6 @@
 //! Scalar f64 oracle of the principled material, from its published parts (glTF 2.0's extensions, Walter et al. 2007,
 //! Estevez & Kulla 2017), written without looking at the vector code; albedos of layers are read from the baked tables,
-//! which [`reflected`] and others check by quadrature of their own.
+//! which tests/tests/bsdf_principled.rs checks by quadrature of its own.
 
 use crate::bsdf::{V, Value, combine, dot, fresnel_dielectric, ggx_d, ggx_g1, unit};
 use crate::model::Model;

@@ -23,7 +23,7 @@
 //!   of four nodes ([`NODES`]): its albedo is exactly rho T(wo), so that a white base loses nothing. E of the specular
 //!   interface is that of single scattering: what its facets lose enters the base.
 //! - All lobes but solid transmission at high roughness are reciprocal: Turquin's factor depends on wo alone, as that of
-//!   the rough dielectric does ([`compensation`](super::compensation)).
+//!   the rough dielectric does (`bsdf::compensation`).
 //! - Lobes are chosen by their albedos, the sheen's direction uniform, the diffuse one by the cosine, all others by visible
 //!   normals; value and density are those of the mixture. No lobe is a delta lobe: widths are at least `ALPHA_RANGE`'s.
 //! - From behind, solids show the inside of their interface; everything else scatters as from the front if the material is

@@ -36,7 +36,7 @@ pub const COLOR_LIMIT: f32 = 1e15;
 /// Slice that has too few values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// A plane of [`Noisy::color`].
+    /// A plane of the noisy picture.
     Color,
     /// A plane of [`Noisy::variance`].
     Variance,

@@ -9,7 +9,7 @@ use crate::film::{PixelAov, PixelStats};
 #[derive(Debug)]
 pub struct Planes<'m> {
     size: [u32; 2],
-    /// Mean radiance, linear rgb; see [`Noisy::color`].
+    /// Mean radiance, linear rgb.
     pub color: [&'m mut [f32]; 3],
     /// Squared standard error of the mean; see [`Noisy::variance`].
     pub variance: [&'m mut [f32]; 3],

@@ -142,7 +142,7 @@ impl<'m> Film<'m> {
 
     /// Statistics of a pixel by its index, row by row from the top left; without samples before the end of the first
     /// iteration and for pixels that do not exist. While an iteration is being finished
-    /// ([`crate::Session::finish_iteration`]), some pixels have it and others do not.
+    /// ([`crate::SessionState::finish_iteration`]), some pixels have it and others do not.
     #[inline]
     pub fn pixel(&self, index: usize) -> PixelStats {
         match self.pixels.get(index) {

@@ -63,7 +63,7 @@ impl SessionState<'_> {
     /// shading along; many small calls and one big call give the same bits. It is exceeded by a few pixels, or by a piece
     /// of work that is larger than it: the largest is a row of the denoiser that loads 16 others, 4 units per column. A
     /// budget of 0 checks the shards and does nothing. Until the end the film has the
-    /// iteration in some pixels and not in others, and the estimates of before. [`Session::begin_iteration`] abandons
+    /// iteration in some pixels and not in others, and the estimates of before. [`Self::begin_iteration`] abandons
     /// what is left to do: pixels that have been merged keep the iteration, others do not.
     ///
     /// # Errors

@@ -233,7 +233,7 @@ impl<'m> Shard<'m> {
     ///
     /// The means are biased while samples of the pixel are in flight: those that take long (long paths, split paths)
     /// finish last, so a pixel of few samples shows the short ones. When the shard is done the means are unbiased. The
-    /// picture as of the iterations before is in [`crate::Session::film`].
+    /// picture as of the iterations before is in [`crate::SessionState::film`].
     pub fn for_each_pixel(&self, mut f: impl FnMut(usize, [f64; 3], u32)) {
         let mut at = ShardCursor::default();
         while !self

@@ -77,13 +77,16 @@ fn run(files: &[File], arguments: &[&str]) -> (Option<i32>, String, tempfile::Te
 
 const RENDER: [&str; 6] = ["--size", "8x8", "--spp", "1", "-o", "x.exr"];
 
+/// Name of the case, files, arguments, and what the last line must contain.
+type Refused = (&'static str, Vec<File>, Vec<&'static str>, Vec<&'static str>);
+
 /// What is no scene, or asks for what the machine has not, is an error before anything is rendered: status 1, one last
 /// line that says what is wrong, no file written. Killed by: any of these inputs rendered, refused without its reason,
 /// or refused by a panic.
 #[test]
 fn refused() {
     let zeros = |n: usize| vec![0u8; n];
-    let rows: Vec<(&str, Vec<File>, Vec<&str>, Vec<&str>)> = vec![
+    let rows: Vec<Refused> = vec![
         (
             "nothing",
             vec![t("a.obj", "")],
