@@ -140,8 +140,10 @@ fn interpolated<const ANY_WRAP: bool>(
     let mut corner = [[[0.0f32; 3]; 8]; 4];
     for i in active.lanes() {
         let t = &record[i];
-        let columns = [x[i], x[i].wrapping_add(1)].map(|x| neighbour(x, t.width, modes[0][i]));
-        let rows = [y[i], y[i].wrapping_add(1)].map(|y| neighbour(y, t.height, modes[1][i]));
+        // a constant where all textures repeat
+        let mode = |axis: usize| if ANY_WRAP { modes[axis][i] } else { TEXTURE_REPEAT };
+        let columns = [x[i], x[i].wrapping_add(1)].map(|x| neighbour(x, t.width, mode(0)));
+        let rows = [y[i], y[i].wrapping_add(1)].map(|y| neighbour(y, t.height, mode(1)));
         for (c, out) in corner.iter_mut().enumerate() {
             // The file's row 0 is the top.
             let row = t.height.saturating_sub(1).saturating_sub(rows[c >> 1]) as usize;

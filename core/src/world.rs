@@ -1,12 +1,14 @@
 //! What paths read while they are traced: one name for scene, kernels, learned state and iteration. All of it is frozen
 //! while an iteration runs.
 
-use crate::accel::Intersector;
+use crate::accel::{Intersector, Occlusion8};
 use crate::extension::Extension;
+use crate::geometry::{Hit8, Ray8};
 use crate::learn::LearnedState;
 use crate::light::LightSelector;
 use crate::scene::{Effects, Scene};
 use bytemuck::{Pod, Zeroable};
+use croupier_simd::Mask8;
 
 /// One round of camera samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
@@ -62,6 +64,39 @@ pub trait World: sealed::Sealed {
 
     /// Number of restarts.
     fn epoch(&self) -> u64;
+
+    /// [`Intersector::closest`] of the kernels' profile.
+    #[inline(always)]
+    fn closest(&self, rays: &Ray8, active: Mask8) -> Hit8 {
+        let all = self.intersector();
+        if Self::EFFECTS.contains(Effects::INSTANCES) {
+            all.closest(rays, active)
+        } else {
+            all.flat().closest(rays, active)
+        }
+    }
+
+    /// [`Intersector::occluded`] of the kernels' profile.
+    #[inline(always)]
+    fn occluded(&self, rays: &Ray8, active: Mask8) -> Mask8 {
+        let all = self.intersector();
+        if Self::EFFECTS.contains(Effects::INSTANCES) {
+            all.occluded(rays, active)
+        } else {
+            all.flat().occluded(rays, active)
+        }
+    }
+
+    /// [`Intersector::occluded_by`] of the kernels' profile.
+    #[inline(always)]
+    fn occluded_by(&self, rays: &Ray8, active: Mask8, blocks: &dyn Fn(u32) -> bool) -> Occlusion8 {
+        let all = self.intersector();
+        if Self::EFFECTS.contains(Effects::INSTANCES) {
+            all.occluded_by(rays, active, blocks)
+        } else {
+            all.flat().occluded_by(rays, active, blocks)
+        }
+    }
 
     /// What tells a shard that its sums belong here.
     fn identity(&self) -> Identity {

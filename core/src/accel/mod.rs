@@ -51,6 +51,30 @@ pub trait Intersector {
         let met = self.occluded(rays, active);
         Occlusion8 { blocked: Mask8::NONE, passed: U32x8::select(met, U32x8::splat(u32::MAX), U32x8::splat(0)) }
     }
+
+    /// The same for scenes without instances: what kernels ask whose profile does not have
+    /// [`Effects::INSTANCES`](crate::unstable::Effects::INSTANCES), so that they do without the code for them. Provided:
+    /// the intersector itself.
+    fn flat(&self) -> impl Intersector
+    where
+        Self: Sized,
+    {
+        self
+    }
+}
+
+impl<I: Intersector> Intersector for &I {
+    fn closest(&self, rays: &Ray8, active: Mask8) -> Hit8 {
+        (*self).closest(rays, active)
+    }
+
+    fn occluded(&self, rays: &Ray8, active: Mask8) -> Mask8 {
+        (*self).occluded(rays, active)
+    }
+
+    fn occluded_by(&self, rays: &Ray8, active: Mask8, blocks: &dyn Fn(u32) -> bool) -> Occlusion8 {
+        (*self).occluded_by(rays, active, blocks)
+    }
 }
 
 /// What eight rays meet that some triangles do not block; see [`Intersector::occluded_by`].

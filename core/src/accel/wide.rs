@@ -51,12 +51,6 @@ impl<'s> WideBvh<'s> {
         Self { nodes, leaves, extent, objects: &[], instances: &[] }
     }
 
-    /// Traces the valid rays of `s` through a scene without instances.
-    #[inline(always)]
-    fn trace<const ANY: bool, B: Blocking>(&self, s: &Setup, hits: &mut Hits, blocking: &mut B) -> u32 {
-        trace::<ANY, B>((self.nodes, self.leaves), 0, (s, s.valid), hits, &mut [0; STACK], blocking)
-    }
-
     /// Searches everything in the world of a scene with instances.
     #[inline(never)]
     fn search<const ANY: bool, B: Blocking>(&self, rays: &Ray8, active: Mask8, blocking: &mut B) -> (Found, u32) {
@@ -96,39 +90,66 @@ fn hit8(hits: &Hits, instance: [U32x8; 2], rays: &Ray8) -> Hit8 {
 
 impl Intersector for WideBvh<'_> {
     fn closest(&self, rays: &Ray8, active: Mask8) -> Hit8 {
-        if !self.objects.is_empty() {
-            return self.closest_placed(rays, active);
+        if self.objects.is_empty() { Flat(self).closest(rays, active) } else { self.closest_placed(rays, active) }
+    }
+
+    fn occluded(&self, rays: &Ray8, active: Mask8) -> Mask8 {
+        if self.objects.is_empty() {
+            return Flat(self).occluded(rays, active);
         }
-        let s = Setup::new(rays, active, F32x8::splat(self.extent));
+        Mask8::from_bits(self.search::<true, _>(rays, active, &mut Everything).1)
+    }
+
+    fn occluded_by(&self, rays: &Ray8, active: Mask8, blocks: &dyn Fn(u32) -> bool) -> Occlusion8 {
+        if self.objects.is_empty() {
+            return Flat(self).occluded_by(rays, active, blocks);
+        }
+        let mut asked = Asked { blocks, passed: [0; 8] };
+        let (_, blocked) = self.search::<true, _>(rays, active, &mut asked);
+        Occlusion8 { blocked: Mask8::from_bits(blocked), passed: U32x8::new(asked.passed) }
+    }
+
+    fn flat(&self) -> impl Intersector {
+        Flat(self)
+    }
+}
+
+/// The tree of a scene without instances.
+struct Flat<'a, 's>(&'a WideBvh<'s>);
+
+impl Flat<'_, '_> {
+    #[inline(always)]
+    fn setup(&self, rays: &Ray8, active: Mask8) -> Setup {
+        Setup::new(rays, active, F32x8::splat(self.0.extent))
+    }
+
+    /// Traces the valid rays of `s`. Closest: improves `hits`. Any: returns the lanes with a hit that blocks.
+    #[inline(always)]
+    fn trace<const ANY: bool, B: Blocking>(&self, s: &Setup, hits: &mut Hits, blocking: &mut B) -> u32 {
+        if self.0.nodes.is_empty() || s.valid == 0 {
+            return 0;
+        }
+        trace::<ANY, B>((self.0.nodes, self.0.leaves), 0, (s, s.valid), hits, &mut [0; STACK], blocking)
+    }
+}
+
+impl Intersector for Flat<'_, '_> {
+    fn closest(&self, rays: &Ray8, active: Mask8) -> Hit8 {
+        let s = self.setup(rays, active);
         let mut hits = Hits::none(s.limit);
-        if !self.nodes.is_empty() && s.valid != 0 {
-            self.trace::<false, _>(&s, &mut hits, &mut Everything);
-        }
+        self.trace::<false, _>(&s, &mut hits, &mut Everything);
         hit8(&hits, NO_INSTANCE, rays)
     }
 
     fn occluded(&self, rays: &Ray8, active: Mask8) -> Mask8 {
-        if !self.objects.is_empty() {
-            return Mask8::from_bits(self.search::<true, _>(rays, active, &mut Everything).1);
-        }
-        let s = Setup::new(rays, active, F32x8::splat(self.extent));
-        if self.nodes.is_empty() || s.valid == 0 {
-            return Mask8::NONE;
-        }
+        let s = self.setup(rays, active);
         Mask8::from_bits(self.trace::<true, _>(&s, &mut Hits::none(s.limit), &mut Everything))
     }
 
     fn occluded_by(&self, rays: &Ray8, active: Mask8, blocks: &dyn Fn(u32) -> bool) -> Occlusion8 {
+        let s = self.setup(rays, active);
         let mut asked = Asked { blocks, passed: [0; 8] };
-        if !self.objects.is_empty() {
-            let (_, blocked) = self.search::<true, _>(rays, active, &mut asked);
-            return Occlusion8 { blocked: Mask8::from_bits(blocked), passed: U32x8::new(asked.passed) };
-        }
-        let s = Setup::new(rays, active, F32x8::splat(self.extent));
-        let mut blocked = 0;
-        if !self.nodes.is_empty() && s.valid != 0 {
-            blocked = self.trace::<true, _>(&s, &mut Hits::none(s.limit), &mut asked);
-        }
+        let blocked = self.trace::<true, _>(&s, &mut Hits::none(s.limit), &mut asked);
         Occlusion8 { blocked: Mask8::from_bits(blocked), passed: U32x8::new(asked.passed) }
     }
 }

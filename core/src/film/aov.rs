@@ -286,11 +286,19 @@ impl<'m> AovPlanes<'m> {
             }
             return;
         }
+        let first = before == 0;
+        let merged = |mean: f32, sum: f32| {
+            let old = if first { 0.0 } else { f64::from(mean) };
+            (old + (f64::from(sum) - more * old) / total) as f32
+        };
+        if self.layout.ids == 0 {
+            means.zip(sums).for_each(|(mean, sum)| *mean = merged(*mean, *sum));
+            return;
+        }
         for ((mean, sum), plane) in means.zip(sums).zip(0..) {
             if !self.layout.is_id(plane) {
-                let old = if before == 0 { 0.0 } else { f64::from(*mean) };
-                *mean = (old + (f64::from(*sum) - more * old) / total) as f32;
-            } else if before == 0 {
+                *mean = merged(*mean, *sum);
+            } else if first {
                 *mean = *sum;
             }
         }

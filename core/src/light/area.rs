@@ -96,7 +96,7 @@ impl LightModel for Area {
         }
         let corners = Corners::gather(scene, light.record.map(|l| l.triangle), mask);
         let area = F32x8::from_fn(|i| light.record[i].area);
-        on_triangle(&corners, corners.normal(), area, light.emission, p, words)
+        on_triangle(&corners, &corners.normal(), &area, light, &p, &words)
     }
 
     /// Power of a Lambertian emitter.
@@ -152,11 +152,11 @@ fn in_instances(placed: Mask8, normal: Vec3x8, others: Vec3x8, areas: F32x8) -> 
 #[inline(always)]
 fn on_triangle(
     corners: &Corners,
-    normal: Vec3x8,
-    area: F32x8,
-    emission: Vec3x8,
-    p: Vec3x8,
-    words: [U32x8; 3],
+    &normal: &Vec3x8,
+    &area: &F32x8,
+    light: &Chosen<'_>,
+    &p: &Vec3x8,
+    words: &[U32x8; 3],
 ) -> LightSample8 {
     let [b, c] = barycentric([words[0], words[1]].map(U32x8::to_unit));
     let a = F32x8::ONE - b - c;
@@ -171,7 +171,7 @@ fn on_triangle(
         point,
         normal,
         point_error: (bound(corners.a) * a + bound(corners.b) * b + bound(corners.c) * c) * OFFSET_BOUND,
-        radiance: emission,
+        radiance: light.emission,
         pdf,
         valid: pdf.gt(F32x8::ZERO),
         ..LightSample8::NONE
@@ -187,7 +187,7 @@ fn sample_placed(scene: &Scene<'_>, light: &Chosen<'_>, p: Vec3x8, words: [U32x8
     let placed = corners.place(scene, light, mask);
     let in_instance = placed.condition.gt(F32x8::ZERO);
     let (normal, area) = in_instances(in_instance, placed.normal, corners.normal(), area);
-    let sample = on_triangle(&corners, normal, area, light.emission, p, words);
+    let sample = on_triangle(&corners, &normal, &area, light, &p, &words);
     let normal = sample.normal.abs();
     let far = placed.condition * (sample.point - p).abs().max_component() * OFFSET_BOUND;
     let more = placed.rounding.dot(normal) + far * (normal.x + normal.y + normal.z);

@@ -3,7 +3,7 @@
 use super::book::{Beyond, Bookkeeping};
 use super::path::Path8;
 use crate::film::{Aov, AovSet};
-use croupier_simd::{F32x8, Mask8, Vec3x8};
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 impl Bookkeeping<'_> {
     /// Does the caller want to know of first hits?
@@ -89,12 +89,17 @@ impl Bookkeeping<'_> {
     /// [`Self::record_factors`], plane `first` being the first of the eight.
     #[inline(never)]
     fn add_factors(&mut self, first: usize, active: Mask8, path: &Path8, s: F32x8) {
-        let (s, root, depth) = (s.to_array(), path.root.to_array(), path.depth.to_array());
+        // plane of the factor among the eight
+        let plane = U32x8::select(path.depth.lt(U32x8::splat(4)), path.depth - U32x8::splat(1), U32x8::splat(3));
+        let (s, root, plane) = (s.to_array(), path.root.to_array(), plane.to_array());
         let (planes, values) = self.aovs.rows_mut();
+        let Some(values) = values.get_mut(first..) else { return };
+        // so few planes that the compiler knows of no overflow below
+        let planes = planes & 0xff;
         for i in active.lanes() {
-            let at = self.roots.get(root[i]).target.pixel() * planes + first;
-            if let Some(sums) = values.get_mut(at..).and_then(|row| row.first_chunk_mut::<8>()) {
-                let d = (depth[i].clamp(1, 4) - 1) as usize & 3;
+            let at = self.roots.get(root[i]).target.pixel() * planes;
+            if let Some(sums) = values.get_mut(at..at + 8).and_then(|row| row.first_chunk_mut::<8>()) {
+                let d = plane[i] as usize & 3;
                 sums[d] += s[i];
                 sums[4 + d] += 1.0;
             }

@@ -378,13 +378,16 @@ impl<'m> Bookkeeping<'m> {
         self.close_record(record);
         if let Some(done) = self.roots.close(root) {
             self.counters.camera_samples += 1;
-            if let Some(p) = self.pixels.get_mut(done.target.pixel()) {
+            let pixel = done.target.pixel();
+            if let Some(p) = self.pixels.get_mut(pixel) {
                 p.add(done.radiance);
             }
-            if let Some(r) = self.rays.get_mut(done.target.pixel()) {
+            if let Some(r) = self.rays.get_mut(pixel) {
                 *r = r.saturating_add(done.rays);
             }
-            self.aovs.add(done.target.pixel(), Aov::Paths, [1.0 + done.splits as f32]);
+            if let Some(paths) = self.aovs.get(pixel, Aov::Paths, 0) {
+                *paths += 1.0 + done.splits as f32;
+            }
         }
     }
 

@@ -5,7 +5,6 @@ use super::book::Bookkeeping;
 use super::crossing::{across, media_towards};
 use super::packets::{Samples8, ShadowRays8};
 use super::shading::{may_pass, places, straight_share};
-use crate::accel::Intersector;
 use crate::bsdf;
 use crate::cost::COST_SHADOW;
 use crate::geometry::{self, Hit8, NO_INSTANCE, Ray8, SurfaceHit8};
@@ -30,7 +29,7 @@ pub(crate) fn occlude<W: World>(
         return walk(world, book, samples, s);
     }
     count(book, s, s.active);
-    s.active.and_not(world.intersector().occluded(&s.ray, s.active))
+    s.active.and_not(world.occluded(&s.ray, s.active))
 }
 
 /// Counts and charges a ray in each lane of `mask`.
@@ -57,7 +56,7 @@ fn walk<W: World>(world: &W, book: &mut Bookkeeping<'_>, samples: &Samples8, s: 
     let scene = world.scene();
     let mut media = media_towards(world, samples, s.ray.d);
     count(book, s, s.active);
-    let met = world.intersector().occluded_by(&s.ray, s.active, &|t| blocks(scene, t));
+    let met = world.occluded_by(&s.ray, s.active, &|t| blocks(scene, t));
     let mut active = s.active.and_not(met.blocked);
     let (mut left, none) = (met.passed, U32x8::splat(0));
     let in_medium = if W::EFFECTS.contains(Effects::MEDIA) { media.inside() } else { Mask8::NONE };
@@ -76,7 +75,7 @@ fn walk<W: World>(world: &W, book: &mut Bookkeeping<'_>, samples: &Samples8, s: 
         let mut hit = Hit8 { hit: Mask8::NONE, t: ray.tmax, triangle: none, u, v, instance };
         if search.any() {
             count(book, s, search);
-            hit = world.intersector().closest(&ray, search);
+            hit = world.closest(&ray, search);
             hit.hit &= search;
         }
         let mut surface = SurfaceHit8::gather(scene, &hit);

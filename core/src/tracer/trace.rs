@@ -2,7 +2,6 @@
 
 use super::book::Bookkeeping;
 use super::packets::{RayKind, RayState8};
-use crate::accel::Intersector;
 use crate::cost::{COST_BOUNCE, COST_CAMERA, COST_STRAIGHT};
 use crate::geometry::Hit8;
 use crate::world::World;
@@ -25,7 +24,7 @@ pub(crate) fn trace<W: World>(world: &W, book: &mut Bookkeeping<'_>, rays: &RayS
         }
     };
     book.charge(rays.active, &rays.path, cost);
-    let mut hit = world.intersector().closest(&rays.ray, rays.active);
+    let mut hit = world.closest(&rays.ray, rays.active);
     // a host's intersector may answer for lanes that it was not asked about
     hit.hit &= rays.active;
     hit
