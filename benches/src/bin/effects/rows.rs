@@ -6,7 +6,7 @@ use super::instance::Instance;
 use croupier::unstable::Effects;
 use croupier::unstable::profile::Custom;
 use croupier_host::builtin;
-use croupier_host::description::*;
+use croupier_host::description::{Instance as Placement, *};
 
 /// A scene that effects are added to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,12 +25,22 @@ pub(crate) enum Base {
     Textured,
     /// The same as `Textured`, with a principled left sphere.
     Principled,
+    /// The same as `Diffuse`, with the left sphere in an instance.
+    Instanced,
 }
 
 impl Base {
     /// Every base.
-    pub(crate) const ALL: [Self; 7] =
-        [Self::Diffuse, Self::Metal, Self::Open, Self::Boundary, Self::Fog, Self::Textured, Self::Principled];
+    pub(crate) const ALL: [Self; 8] = [
+        Self::Diffuse,
+        Self::Metal,
+        Self::Open,
+        Self::Boundary,
+        Self::Fog,
+        Self::Textured,
+        Self::Principled,
+        Self::Instanced,
+    ];
 
     /// Name in tables.
     pub(crate) const fn name(self) -> &'static str {
@@ -42,6 +52,7 @@ impl Base {
             Self::Fog => "fog box",
             Self::Textured => "textured box",
             Self::Principled => "principled box",
+            Self::Instanced => "instanced box",
         }
     }
 
@@ -55,6 +66,7 @@ impl Base {
             Self::Fog => Self::Boundary.effects().with(Effects::MEDIA),
             Self::Textured => Self::Diffuse.effects().with(Effects::TEXTURES),
             Self::Principled => Self::Textured.effects().with(Effects::PRINCIPLED),
+            Self::Instanced => Self::Diffuse.effects().with(Effects::INSTANCES),
         }
     }
 
@@ -68,6 +80,7 @@ impl Base {
             Self::Fog => Instance::of::<Custom<{ Base::Fog.effects().0 }>>(),
             Self::Textured => Instance::of::<Custom<{ Base::Textured.effects().0 }>>(),
             Self::Principled => Instance::of::<Custom<{ Base::Principled.effects().0 }>>(),
+            Self::Instanced => Instance::of::<Custom<{ Base::Instanced.effects().0 }>>(),
         }
     }
 
@@ -96,6 +109,7 @@ impl Base {
                 textured(&mut scene);
                 sphere(&mut scene, Model::Principled(layered()));
             }
+            Self::Instanced => placed(&mut scene),
         }
         scene
     }
@@ -135,6 +149,19 @@ pub(crate) struct Row {
 
 /// Material of the left sphere in the built-in box.
 const SPHERE: usize = 5;
+
+/// Places the left sphere in the world by an instance.
+fn placed(scene: &mut SceneDescription) {
+    let is_sphere = |t: &Triangle| t.material as usize == SPHERE;
+    let first = scene.triangles.iter().position(is_sphere).unwrap_or(0) as u32;
+    let count = scene.triangles.iter().filter(|t| is_sphere(t)).count() as u32;
+    scene.prototypes.push(Prototype { name: "sphere".into(), triangles: first..first + count, instances: Vec::new() });
+    scene.instances.push(Placement::new(
+        "sphere",
+        0,
+        [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
+    ));
+}
 
 /// Gives the material of the left sphere another model.
 fn sphere(scene: &mut SceneDescription, model: Model) {
@@ -224,5 +251,12 @@ rows! {
         let bumps = Texture { name: "bumps".into(), width: 64, height: 64, texels, ..Texture::default() };
         s.textures.push(Texture { encoding: Encoding::Linear, ..bumps });
         sphere(s, Model::Principled(Principled { normal_texture: Some(TextureRef::new(1)), ..layered() }));
+    };
+    INSTANCES: Diffuse, placed;
+    MOTION: Instanced, |s| {
+        let place = &mut s.instances[0];
+        let mut end = place.to_world;
+        end[1][3] = 0.1;
+        place.to_world_end = Some(end);
     };
 }
