@@ -431,7 +431,15 @@ fn every_field_of_every_light_is_checked() {
         vector: [0.0, 0.6, 0.8],
         ..tiny.lights[5]
     });
-    tiny.light_alias = alias(&[3, 3, 8, 1, 1, 1, 1]);
+    let shape =
+        |kind: LightKind, params| Light { kind: kind as u32, triangle: SHAPE_TWO_SIDED, params, ..tiny.lights[3] };
+    let shapes = [
+        shape(LightKind::Sphere, [0.5, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        shape(LightKind::Rectangle, [0.5, 0.0, 0.0, 0.0, 0.0, 0.25]),
+        shape(LightKind::Disk, [0.0, -0.6, 0.8, 0.5, 0.0, 0.0]),
+    ];
+    tiny.lights.extend(shapes);
+    tiny.light_alias = alias(&[3, 3, 8, 1, 1, 1, 1, 1, 1, 1]);
     assert_eq!(error(&tiny.blob()), None);
     for (params, field, found) in [
         ([0.0, -0.6, 0.8, 0.0, 0.0, 0.0], Field::Cone, 0.0),
@@ -470,6 +478,22 @@ fn every_field_of_every_light_is_checked() {
                     l.params[0] = 1.5;
                     number(S::Lights, index, Field::Cone, 1.5)
                 }
+                LightField::Shape => {
+                    l.triangle = 4;
+                    SceneError::Reserved { of: S::Lights, index }
+                }
+                LightField::Radius => {
+                    l.params[0] = 0.0;
+                    number(S::Lights, index, Field::ShapeSize, 0.0)
+                }
+                LightField::Circle => {
+                    l.params[3] = NAN;
+                    number(S::Lights, index, Field::ShapeSize, NAN)
+                }
+                LightField::HalfEdges => {
+                    l.params[3] = 0.125;
+                    number(S::Lights, index, Field::Edges, 0.2)
+                }
                 LightField::Cone => {
                     l.params[4] = 0.75;
                     number(S::Lights, index, Field::Cone, 0.75)
@@ -483,7 +507,11 @@ fn every_field_of_every_light_is_checked() {
         }
         let mut parts = tiny.clone();
         parts.lights[i].params[5] = 1.0;
-        expect(kind.name(), &parts.blob(), SceneError::Reserved { of: S::Lights, index });
+        let unused = SceneError::Reserved { of: S::Lights, index };
+        if *kind == LightKind::Rectangle {
+            parts.lights[i].instance = 1;
+        }
+        expect(kind.name(), &parts.blob(), unused);
         // each kind calls for one of its effects
         let effects = Scene::from_bytes(tiny.blob().bytes()).unwrap().effects;
         assert!(effects.intersects(Effects::of_light(*kind)), "{}", kind.name());
