@@ -11,13 +11,17 @@
 //! Directions are uniform in the solid angle (Ureña, Fajardo and King, "An Area-Preserving Parametrization for Spherical
 //! Rectangles", EGSR 2013). What differs from the paper keeps `f32` precise:
 //!
-//! 1. The solid angle is that of two triangles (van Oosterom and Strackee 1983): their triple products are known from the
-//!    edges, so that nothing cancels, where the sum of four angles less 2 pi does.
+//! 1. The solid angle is not a sum of four angles less 2 pi. Of a rectangle that lies at a slant in both directions it is
+//!    that of two triangles (van Oosterom and Strackee 1983), whose triple products are known from the edges; of others it
+//!    is the sum of the parts on both sides of the point, each one arc tangent. Both are within 6e-7 for all sizes, by
+//!    2e6 random rectangles against f64; either alone fails for needles.
 //! 2. Angles between edges come from `atan2` instead of `acos`, which is as precise for small ones.
 //! 3. Differences of cosines that are nearly 1 are taken of 1 - cos.
 //! 4. The shorter edge is x, along which the solid angle is inverted: what that loses hardly matters across it.
 //! 5. Solid angles below [`LEAST_SOLID_ANGLE`] are sampled uniformly by area, with the density r^2 / (A cos): there the
-//!    inversion would be off by more than 1e-4 of the rectangle, and the two densities are nearly the same.
+//!    two densities are nearly the same, and the inversion may lose its digits. Above, in random rectangles of 1 : 1 to
+//!    1 : 10,000, it is off by less than 2e-5 of the whole in 99 % and by less than 6e-4 in 99.99 %; the worst, needles
+//!    seen from beside one end, by up to 2 % of their width.
 //!
 //! [`SHAPE_TWO_SIDED`]: crate::scene::blob::SHAPE_TWO_SIDED
 
@@ -31,7 +35,7 @@ use core::f64::consts::PI;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Smaller solid angles are sampled by area, sr.
-pub(super) const LEAST_SOLID_ANGLE: f32 = 1.0 / 256.0;
+pub(super) const LEAST_SOLID_ANGLE: f32 = 1.0 / 64.0;
 
 /// Rectangles parallel to the x-y plane as points at the origin see them.
 pub(super) struct SphericalRectangle8 {
@@ -57,14 +61,34 @@ impl SphericalRectangle8 {
     #[inline(always)]
     pub(super) fn new([cx, cy]: [F32x8; 2], [a, b]: [F32x8; 2], h: F32x8) -> Self {
         let (x, y) = ([cx - a, cx + a], [cy - b, cy + b]);
-        let corner = |i: usize, j: usize| (x[i] * x[i] + y[j] * y[j] + h * h).sqrt();
-        let dot = |i: usize, j: usize, k: usize, l: usize| x[i] * x[k] + y[j] * y[l] + h * h;
-        let (r00, r10, r11, r01) = (corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1));
+        let h_sqr = h * h;
+        let length = |x: F32x8, y: F32x8| (x * x + y * y + h_sqr).sqrt();
+        let (r00, r10, r11, r01) = (length(x[0], y[0]), length(x[1], y[0]), length(x[1], y[1]), length(x[0], y[1]));
+        // triangles: all dot products are positive
+        let dot = |i: usize, j: usize, k: usize, l: usize| x[i] * x[k] + y[j] * y[l] + h_sqr;
         let (triple, diagonal) = (h * (a * b) * 4.0, dot(0, 0, 1, 1));
         let first = r00 * r10 * r11 + dot(0, 0, 1, 0) * r11 + dot(1, 0, 1, 1) * r00 + diagonal * r10;
         let second = r00 * r11 * r01 + diagonal * r01 + dot(1, 1, 0, 1) * r00 + dot(0, 1, 0, 0) * r11;
-        let solid_angle = (triple.atan2(first) + triple.atan2(second)) * 2.0;
-        Self { x, y, h, solid_angle }
+        // parts on both sides of the point: between 0 and s, and between t0 and t1
+        let astride = |[lo, hi]: [F32x8; 2]| lo.lt(F32x8::ZERO) & hi.gt(F32x8::ZERO);
+        let (astride_x, astride_y) = (astride(x), astride(y));
+        let turned = astride_x.and_not(astride_y);
+        let pick = |i: usize| (turned.select(x[i], y[i]), turned.select(y[i], x[i]));
+        let ((s0, t0), (s1, t1)) = (pick(0), pick(1));
+        let width = turned.select(b, a) * 2.0;
+        let part = |s: F32x8, p: F32x8, q: F32x8| {
+            // t1 / q - t0 / p
+            let near = width * (t0 + t1) * (s * s + h_sqr) / (p * q * (t1 * p + t0 * q));
+            let difference = (t0 * t1).gt(F32x8::ZERO).select(near, t1 / q - t0 / p);
+            (s.abs() * h * difference, h_sqr + (t0 / p) * (t1 / q) * (s * s))
+        };
+        let (lower, upper) = (part(s0, r00, turned.select(r01, r10)), part(s1, turned.select(r10, r01), r11));
+        let by_parts = astride_x | astride_y;
+        let angle = |(over, under): (F32x8, F32x8), other: F32x8| {
+            by_parts.select(over, triple).atan2(by_parts.select(under, other))
+        };
+        let sum = angle(lower, first) + angle(upper, second);
+        Self { x, y, h, solid_angle: by_parts.select(sum, sum * 2.0) }
     }
 
     /// Lanes that are sampled by their solid angle.
