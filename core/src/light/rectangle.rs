@@ -77,8 +77,8 @@ impl SphericalRectangle8 {
         let ((s0, t0), (s1, t1)) = (pick(0), pick(1));
         let width = turned.select(b, a) * 2.0;
         let part = |s: F32x8, p: F32x8, q: F32x8| {
-            // t1 / q - t0 / p
-            let near = width * (t0 + t1) * (s * s + h_sqr) / (p * q * (t1 * p + t0 * q));
+            // t1 / q - t0 / p; in this order nothing overflows within the range of coordinates
+            let near = (width / p) * ((t0 + t1) / (t1 * p + t0 * q)) * ((s * s + h_sqr) / q);
             let difference = (t0 * t1).gt(F32x8::ZERO).select(near, t1 / q - t0 / p);
             (s.abs() * h * difference, h_sqr + (t0 / p) * (t1 / q) * (s * s))
         };

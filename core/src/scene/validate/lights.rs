@@ -16,7 +16,7 @@ pub(super) fn lights(scene: &Records<'_>) -> Result<Effects, SceneError> {
         let kind = light(scene, at, l)?;
         match (kind.has_shape(), first_shape) {
             (true, None) => first_shape = Some(at.index()),
-            (true, Some(first)) if (at.index() - first) as usize >= MAX_SHAPE_LIGHTS => {
+            (true, Some(first)) if at.index().saturating_sub(first) as usize >= MAX_SHAPE_LIGHTS => {
                 return Err(SceneError::ShapeLights { light: at.index() });
             }
             (false, Some(_)) => return Err(SceneError::ShapeLights { light: at.index().saturating_sub(1) }),
