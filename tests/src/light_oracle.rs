@@ -56,6 +56,32 @@ pub fn plane_distance(t: [[f32; 3]; 3], o: V, d: V) -> f64 {
     dot(sub(a, o), n) / dot(d, n)
 }
 
+/// Irradiance at the origin of the plane y = 0 from a polygon of radiance 1 that emits to both sides (Lambert 1760):
+/// half the sum over edges of the angle they subtend times the cosine between the floor's normal and that of the plane
+/// through edge and origin, after clipping at the horizon.
+pub fn polygon_irradiance(corners: &[V]) -> f64 {
+    let mut above: Vec<V> = Vec::new();
+    for (i, p) in corners.iter().enumerate() {
+        let q = corners[(i + 1) % corners.len()];
+        if p[1] >= 0.0 {
+            above.push(*p);
+        }
+        if (p[1] < 0.0) != (q[1] < 0.0) {
+            let t = p[1] / (p[1] - q[1]);
+            above.push(std::array::from_fn(|c| p[c] + t * (q[c] - p[c])));
+        }
+    }
+    let mut sum = 0.0;
+    for (i, p) in above.iter().enumerate() {
+        let q = above[(i + 1) % above.len()];
+        let n = cross(*p, q);
+        if length(n) > 0.0 {
+            sum += length(n).atan2(dot(*p, q)) * n[1] / length(n);
+        }
+    }
+    (sum / 2.0).abs()
+}
+
 /// Rec. 709 luminance.
 pub fn luminance(c: V) -> f64 {
     0.212_671 * c[0] + 0.715_16 * c[1] + 0.072_169 * c[2]

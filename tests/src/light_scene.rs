@@ -91,6 +91,20 @@ impl LightScene {
         self
     }
 
+    /// Adds a light with a shape that emits from one side.
+    pub fn shape(mut self, kind: LightKind, middle: [f32; 3], params: &[f32], emission: [f32; 3]) -> Self {
+        let mut all = [0.0; 6];
+        all[..params.len()].copy_from_slice(params);
+        self.lights.push(Light { kind: kind as u32, vector: middle, emission, params: all, ..Light::zeroed() });
+        self
+    }
+
+    /// Lets the last light, one with a shape, emit from both sides.
+    pub fn two_sided(mut self) -> Self {
+        self.lights.iter_mut().last().expect("a light").triangle |= SHAPE_TWO_SIDED;
+        self
+    }
+
     fn environment(mut self, e: Environment) -> Self {
         self.environment = Some(Environment { light: self.lights.len() as u32, ..e });
         self.lights.push(Light { kind: LightKind::Environment as u32, triangle: NONE, ..Light::zeroed() });

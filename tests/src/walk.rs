@@ -28,6 +28,9 @@ pub fn everything(scene: &Scene<'_>) -> usize {
     assert!(scene.media.len() <= MAX_MEDIA);
     scene.media.iter().for_each(|m| medium(scene, m));
     pick(scene.light_alias);
+    let has_shape = |l: &&Light| LightKind::from_u32(l.kind).is_some_and(LightKind::has_shape);
+    let shapes = scene.lights.iter().filter(has_shape).count();
+    assert!(shapes <= MAX_SHAPE_LIGHTS && scene.lights.iter().rev().take(shapes).all(|l| has_shape(&l)));
     for l in scene.lights {
         assert!(l.emission.iter().all(|x| x.is_finite() && *x >= 0.0));
         if l.kind == LightKind::Area as u32 {

@@ -8,7 +8,7 @@ use croupier::Settings;
 use croupier::unstable::scene::blob::MaterialKind;
 use croupier_host::description::*;
 use croupier_tests::bsdf::{Case, unit};
-use croupier_tests::light_oracle::{Map, cross, dot, length, sub, wide};
+use croupier_tests::light_oracle::{Map, cross, dot, polygon_irradiance, sub, wide};
 use croupier_tests::runner::{Image, render, settings};
 use croupier_tests::scenes::*;
 use croupier_tests::stats::SplitMix;
@@ -18,32 +18,6 @@ use std::f64::consts::PI;
 const LIMIT: f64 = 5.2;
 
 type V = [f64; 3];
-
-/// Irradiance at the origin of the plane y = 0 from a polygon of radiance 1 that emits to both sides (Lambert 1760):
-/// half the sum over edges of the angle they subtend times the cosine between the floor's normal and that of the plane
-/// through edge and origin, after clipping at the horizon.
-fn polygon_irradiance(corners: &[V]) -> f64 {
-    let mut above: Vec<V> = Vec::new();
-    for (i, p) in corners.iter().enumerate() {
-        let q = corners[(i + 1) % corners.len()];
-        if p[1] >= 0.0 {
-            above.push(*p);
-        }
-        if (p[1] < 0.0) != (q[1] < 0.0) {
-            let t = p[1] / (p[1] - q[1]);
-            above.push(std::array::from_fn(|c| p[c] + t * (q[c] - p[c])));
-        }
-    }
-    let mut sum = 0.0;
-    for (i, p) in above.iter().enumerate() {
-        let q = above[(i + 1) % above.len()];
-        let n = cross(*p, q);
-        if length(n) > 0.0 {
-            sum += length(n).atan2(dot(*p, q)) * n[1] / length(n);
-        }
-    }
-    (sum / 2.0).abs()
-}
 
 /// The corners of every triangle of a material that faces the origin.
 fn facing_triangles(s: &SceneDescription, material: u32) -> Vec<[V; 3]> {

@@ -119,6 +119,48 @@ fn emission_scales_the_picture() {
     assert!((again.mean() / a.mean() - 1.0).abs() < 8.0 * error);
 }
 
+/// Lights with shapes move, grow and change their sides; their kind stays, and no size is too small. Killed by: a size
+/// that an edit keeps, flags that it drops, a check that baking alone makes.
+#[test]
+fn lights_with_shapes_change() {
+    let light = |shape, position, two_sided| {
+        let radiance = [3.0, 2.0, 4.0];
+        Emitter::Shape(description::ShapeLight { shape, position, radiance, two_sided, visible: true })
+    };
+    let scene_of = |radius, x: f32, two_sided| {
+        let mut scene = cornell([24, 16]);
+        scene.emitters = vec![
+            light(description::LightShape::Sphere { radius }, [x, 0.2, 0.1], false),
+            light(description::LightShape::Disk { direction: [0.0, -x, x], radius }, [0.0, 0.5, x], two_sided),
+        ];
+        scene
+    };
+    let target = blob(&scene_of(0.125, -0.25, true));
+    let baked = Scene::from_bytes(&target).unwrap();
+    let mut edited = editable(&scene_of(0.25, 0.25, false));
+    for (index, l) in (0..).zip(baked.lights) {
+        edited.edit().light(index, *l).unwrap();
+        let refused = |e: Result<(), EditError>, fixed: bool| {
+            let found = e.expect_err("a wrong light");
+            assert!(matches!(found, EditError::Fixed { .. }) == fixed, "{found}");
+        };
+        refused(edited.edit().light(index, Light { kind: LightKind::Rectangle as u32, ..*l }), true);
+        refused(edited.edit().light(index, Light { area: 1.0, ..*l }), true);
+        refused(edited.edit().light(index, Light { params: [0.0; 6], ..*l }), false);
+        refused(edited.edit().light(index, Light { triangle: 8, ..*l }), false);
+        refused(edited.edit().light(index, Light { vector: [f32::NAN; 3], ..*l }), false);
+    }
+    let bytes = sealed(edited);
+    let found = Scene::from_bytes(&bytes).expect("a valid blob");
+    assert_eq!(bytemuck::cast_slice::<_, u8>(found.lights), bytemuck::cast_slice::<_, u8>(baked.lights));
+    for (a, b) in found.light_alias.iter().zip(baked.light_alias) {
+        assert!((f64::from(a.probability) / f64::from(b.probability) - 1.0).abs() < 1e-5);
+    }
+    let (a, b) = (render(&bytes, &settings(&bytes, "none"), 64), render(&target, &settings(&target, "none"), 64));
+    let error = a.error_of_mean().hypot(b.error_of_mean());
+    assert!((a.mean() - b.mean()).abs() < 5.0 * error && error < 0.05 * b.mean(), "{} and {}", a.mean(), b.mean());
+}
+
 /// Killed by: a check that is left out, a record that changes before it is checked, an identity that forgets an edit.
 #[test]
 fn what_is_wrong_is_refused_and_changes_nothing() {

@@ -118,6 +118,9 @@ fn lights() {
     let triangle = [[1.0, 2.0, 0.5], [-1.5, 2.5, 0.0], [0.3, 1.5, 2.0]];
     let facing = [triangle[0], triangle[2], triangle[1]];
     let area = |t| LightScene::default().triangle(t, Some([1.0; 3])).constant([0.5; 3]).finish();
+    let shape = |kind: LightKind, params: &[f32]| {
+        LightScene::default().shape(kind, [0.5, 1.5, 1.0], params, [1.0; 3]).constant([0.5; 3]).finish()
+    };
     let texels = |w: usize, h: usize| -> Vec<[f32; 3]> {
         let at = |k: usize| 1.0 + 0.5 * ((k % w) as f32 * 0.9).sin() + 0.3 * ((k / w) as f32 * 0.7).cos();
         (0..w * h).map(|k| [at(k), 0.5 * at(k), 0.25]).collect()
@@ -129,9 +132,14 @@ fn lights() {
         ("area", LightKind::Area, area(triangle)),
         ("area, turned", LightKind::Area, area(facing)),
         ("constant", LightKind::Environment, tilted),
+        ("sphere", LightKind::Sphere, shape(LightKind::Sphere, &[0.9])),
+        ("rectangle", LightKind::Rectangle, shape(LightKind::Rectangle, &[1.5, 0.0, 0.5, -0.5, 0.0, 1.5])),
+        ("small rectangle", LightKind::Rectangle, shape(LightKind::Rectangle, &[0.05, 0.0, 0.0, 0.0, 0.0, 0.05])),
+        ("disk", LightKind::Disk, shape(LightKind::Disk, &[0.0, -0.6, -0.8, 0.5])),
+        ("near disk", LightKind::Disk, shape(LightKind::Disk, &[0.0, -0.6, -0.8, 3.0])),
     ] {
         let scene = scene.scene();
-        let is_area = kind == LightKind::Area;
+        let is_area = kind != LightKind::Environment;
         let draw = |u: f64, v: f64| {
             let word = |x: f64| U32x8::splat((x.clamp(0.0, BELOW_ONE) * 4_294_967_296.0) as u32);
             // the first word chooses the light: find one that gives the wanted kind

@@ -72,7 +72,10 @@ fn lights_state_their_fields() {
             LightField::Environment => &[],
             LightField::Position | LightField::Direction => &["vector"],
             LightField::Emission => &["emission"],
-            LightField::Disk => &["params[0]"],
+            LightField::Disk | LightField::Radius => &["params[0]"],
+            LightField::Shape => &["triangle"],
+            LightField::HalfEdges => &["params[0..3]", "params[3..6]"],
+            LightField::Circle => &["params[0..3]", "params[3]"],
             LightField::Cone => &["params[0..3]", "params[3]", "params[4]"],
         });
         let mut wanted: Vec<String> = fields.map(|f| f.to_string()).collect();

@@ -44,6 +44,23 @@ fn example(kind: LightKind, s: LightScene) -> (LightScene, f64) {
             let s = s.delta(kind, p, RGB);
             (s.cone(axis, [1.0 - outer, 1.0 - inner]), f * f * f64::from(p[1]) / r.powi(3))
         }
+        LightKind::Sphere => {
+            let (p, radius) = ([0.5f32, 2.0, -1.0], 1.2f32);
+            let r = length(wide(p));
+            let irradiance = PI * f64::from(radius).powi(2) * f64::from(p[1]) / r.powi(3);
+            (s.shape(kind, p, &[radius], RGB), irradiance)
+        }
+        LightKind::Rectangle => {
+            let s = s.shape(kind, [0.0, 2.0, 0.0], &[1.5, 0.0, 0.0, 0.0, 0.0, 1.0], RGB);
+            // Howell, configuration factor of a plane element and a rectangle above its corner: four of them
+            let [x, y] = [1.5f64 / 2.0, 1.0 / 2.0];
+            let part = |a: f64, b: f64| a / (1.0 + a * a).sqrt() * (b / (1.0 + a * a).sqrt()).atan();
+            (s, 2.0 * (part(x, y) + part(y, x)))
+        }
+        LightKind::Disk => {
+            let s = s.shape(kind, [0.0, 2.0, 0.0], &[0.0, -1.0, 0.0, 1.5], RGB);
+            (s, PI * 1.5 * 1.5 / (1.5 * 1.5 + 4.0))
+        }
         LightKind::Directional => (s.delta(kind, [0.0, 0.8, 0.6], RGB), f64::from(0.8f32)),
     }
 }

@@ -170,8 +170,8 @@ fn lights_weigh_their_power() {
             LightKind::Environment => disk * 2.5 * integral,
             LightKind::Point => 4.0 * PI * y,
             LightKind::Directional | LightKind::Sun => disk * y,
-            // without a cone: nothing
-            LightKind::Spot => continue,
+            // without a cone or a size: nothing
+            LightKind::Spot | LightKind::Sphere | LightKind::Rectangle | LightKind::Disk => continue,
         };
         assert!((got / want - 1.0).abs() < 1e-5, "{}: {got} for {want}", kind.name());
     }
@@ -186,6 +186,20 @@ fn lights_weigh_their_power() {
         };
         let want = 2.0 * PI * y * outer / f64::from(steps) * (0..steps).map(falloff).sum::<f64>();
         assert!((got / want - 1.0).abs() < 1e-4, "spot {outer} {inner}: {got} for {want}");
+    }
+    // radiance times pi times the area, of both sides where there are two
+    for (kind, params, area) in [
+        (LightKind::Sphere, [1.5, 0.0, 0.0, 0.0, 0.0, 0.0], 4.0 * PI * 2.25),
+        (LightKind::Rectangle, [0.0, 1.5, 2.0, 0.5, 0.0, 0.0], 2.0 * 2.5),
+        (LightKind::Disk, [0.0, 0.6, 0.8, 1.5, 0.0, 0.0], PI * 2.25),
+    ] {
+        for (triangle, sides) in [(0, 1.0), (SHAPE_TWO_SIDED, 2.0), (SHAPE_HIDDEN, 1.0)] {
+            let shape = Light { params, triangle, ..light(&kind) };
+            let got = environment::light_weights(&[shape], None, &[], radius)[0];
+            let sides = if kind == LightKind::Sphere { 1.0 } else { sides };
+            let want = PI * area * sides * y;
+            assert!((got / want - 1.0).abs() < 1e-6, "{}: {got} for {want}", kind.name());
+        }
     }
     let constant = Environment { kind: EnvironmentKind::Constant as u32, radiance: c, ..e };
     let got = environment::light_weights(&[light(&LightKind::Environment)], Some(&constant), &[], radius)[0];

@@ -312,8 +312,8 @@ impl SceneEdit<'_> {
         Ok(())
     }
 
-    /// Replaces a light's emission, and the position, direction and cone of one that is no surface. Kind, triangle and area must be
-    /// the old ones. Emission may become black and light up again; the light stays in the scene.
+    /// Replaces a light's emission, and the position, direction, cone, size and flags of one that has no triangle. Kind,
+    /// triangle and area must be the old ones. Emission may become black and light up again; the light stays in the scene.
     ///
     /// # Errors
     /// No such light, one that breaks a rule of the blob, or one that differs in what cannot change.
@@ -323,7 +323,9 @@ impl SceneEdit<'_> {
         let placed = |f: &LightField| matches!(f, LightField::Position | LightField::Direction);
         let moves = LightKind::from_u32(old.kind).is_some_and(|kind| kind.fields().iter().any(placed));
         let (vector, params) = if moves { (light.vector, light.params) } else { (old.vector, old.params) };
-        let fixed = Light { emission: light.emission, vector, params, ..old };
+        let has_shape = LightKind::from_u32(old.kind).is_some_and(LightKind::has_shape);
+        let triangle = if has_shape { light.triangle } else { old.triangle };
+        let fixed = Light { emission: light.emission, vector, params, triangle, ..old };
         if bytemuck::bytes_of(&fixed) != bytemuck::bytes_of(&light) {
             return Err(EditError::Fixed { of, index });
         }

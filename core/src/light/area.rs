@@ -68,7 +68,7 @@ impl Corners {
 /// Solid-angle density of a uniform point on a triangle of `area` at distance `r`, its front seen under `cos`; 0 where
 /// the front is not seen or r^2 underflows. Infinite for overflow (NUMERICS SOL-3): the callers drop that.
 #[inline(always)]
-fn density(r: F32x8, cos: F32x8, area: F32x8) -> F32x8 {
+pub(super) fn density(r: F32x8, cos: F32x8, area: F32x8) -> F32x8 {
     let r_sqr = r * r;
     let seen = cos.gt(F32x8::splat(MIN_COS)) & r_sqr.ge(F32x8::splat(f32::MIN_POSITIVE));
     seen.zero_unless(r_sqr / (area * cos))

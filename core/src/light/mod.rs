@@ -10,19 +10,26 @@
 //! | directional | `directional.rs` | the direction | delta | pi R^2 E |
 //! | spot | `spot.rs` | the point | delta | 2 pi (inner + (outer - inner) / 3) I |
 //! | sun | `sun.rs` | uniform on the disk at infinity | counts as delta | pi R^2 E |
+//! | sphere | `sphere.rs` | uniform in the cone around it | 1 / (2 pi (1 - cos)) | 4 pi^2 r^2 L |
+//! | rectangle | `rectangle.rs` | uniform in its solid angle | 1 / solid angle | pi A L |
+//! | disk | `disk.rs` | near: in the solid angle of a square around it; far: uniform on the disk | 1 / that; r^2 / (A cos) | pi A L |
 //!
 //! A light is chosen by a [`LightSelector`] (power-weighted: `power.rs`); every density stated here contains the
-//! selection probability. What [`sample_of`] states for a direction is what [`area_pdf`] and [`environment_pdf`] give for
-//! a scattered ray that finds the same light (NUMERICS MIS-3): for the environment bit for bit, for triangles up to the
-//! rounding of the hit. Densities are finite and never NaN; where one would be infinite (edge-on or touching) both
+//! selection probability. What [`sample_of`] states for a direction is what [`area_pdf`], [`meet_shapes`] and
+//! [`environment_pdf`] give for a scattered ray that finds the same light (NUMERICS MIS-3): for the environment and where
+//! all directions to a shape are alike bit for bit, for others up to the rounding of the hit. Densities are finite and never NaN; where one would be infinite (edge-on or touching) both
 //! the sampler and the density function give the direction up, and the scattered ray has it alone.
 
 mod area;
 mod directional;
+mod disk;
 mod environment;
 mod mis;
 mod point;
 mod power;
+mod rectangle;
+mod shape;
+mod sphere;
 mod spot;
 mod sun;
 
@@ -30,6 +37,7 @@ pub use area::{area_of, area_pdf, area_radiance, area_texture};
 pub use environment::{environment_pdf, environment_radiance};
 pub use mis::power_heuristic;
 pub use power::{PowerSelector, SceneExtent, luminance};
+pub use shape::{ShapeRays8, meet_shapes, nearest_shape};
 
 use crate::scene::blob::{Light, LightKind, NONE};
 use crate::scene::{Effects, Scene};
@@ -246,6 +254,9 @@ models! {
     Directional => directional::Directional,
     Spot => spot::Spot,
     Sun => sun::Sun,
+    Sphere => sphere::Sphere,
+    Rectangle => rectangle::Rectangle,
+    Disk => disk::Disk,
 }
 
 // The two tables say the same of what both know.

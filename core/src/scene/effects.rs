@@ -68,6 +68,8 @@ effects! {
     NORMAL_MAPS = 29, "normal maps";
     /// Orthographic or panoramic camera.
     PROJECTIONS = 30, "orthographic or panoramic camera";
+    /// Lights with shapes of their own: spheres, rectangles, disks.
+    SHAPE_LIGHTS = 31, "sphere, rectangle and disk lights";
 }
 
 macro_rules! lights {

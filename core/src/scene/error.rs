@@ -1,6 +1,6 @@
 //! Errors of scene validation: the object, its index and the number that is wrong.
 
-use super::blob::{MAX_CONDITION, MAX_TREE_DEPTH, SectionKind, VERSION};
+use super::blob::{MAX_CONDITION, MAX_SHAPE_LIGHTS, MAX_TREE_DEPTH, SectionKind, VERSION};
 use super::instances::InstanceFault;
 use core::fmt;
 
@@ -67,6 +67,10 @@ pub enum Field {
     NormalScale,
     /// Condition of an object: the largest of its instances.
     Condition,
+    /// Radius, or length of half an edge, of a light with a shape, [`super::blob::SHAPE_SIZE_RANGE`].
+    ShapeSize,
+    /// Squared cosine between the edges of a rectangle, up to 1e-6.
+    Edges,
 }
 
 impl Field {
@@ -100,6 +104,8 @@ impl Field {
             Self::SheenWidth => "width of the sheen",
             Self::NormalScale => "normal scale",
             Self::Condition => "condition",
+            Self::ShapeSize => "radius or length of half an edge",
+            Self::Edges => "squared cosine between the edges",
         }
     }
 }
@@ -309,6 +315,11 @@ pub enum SceneError {
         /// Sum over the items of (stated - actual) / stated probability, each weighed by up to +-1.
         deviation: f32,
     },
+    /// A light with a shape that is followed by a light without one, or by too many of its like.
+    ShapeLights {
+        /// Light.
+        light: u32,
+    },
     /// Names are not one line of UTF-8 per material.
     Names {
         /// Lines found.
@@ -414,6 +425,9 @@ impl fmt::Display for SceneError {
             }
             Self::AliasTable { of, first, length, deviation } => {
                 write!(f, "{}[{first}..+{length}]: probabilities disagree with thresholds by {deviation}", of.name())
+            }
+            Self::ShapeLights { light } => {
+                write!(f, "lights[{light}]: lights with shapes come last, at most {MAX_SHAPE_LIGHTS} of them")
             }
             Self::Names { lines, materials } => {
                 write!(f, "names must be one line of UTF-8 per material: {lines} lines, {materials} materials")

@@ -3,10 +3,10 @@
 use super::packets::Contribution8;
 use super::packets::RayState8;
 use crate::geometry::SurfaceHit8;
-use crate::light::{self, TEXTURED_EMISSION, power_heuristic};
-use crate::scene::Effects;
+use crate::light::{self, ShapeRays8, TEXTURED_EMISSION, power_heuristic};
+use crate::scene::{Effects, Scene};
 use crate::world::World;
-use croupier_simd::{F32x8, Mask8, Vec3x8};
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Radiance of the environment along the rays that `escaped`; `None` without one.
 #[inline(always)]
@@ -40,6 +40,38 @@ pub(crate) fn area<W: World>(world: &W, rays: &RayState8, hit: &SurfaceHit8, ng:
     }
     let pdf = light::area_pdf(scene, world.lights(), rays.from, rays.normal, hit, rays.ray.d, sampled);
     Some(weighted(rays, radiance, pdf))
+}
+
+/// Does the scene have lights with shapes, which rays meet without a hit?
+#[inline(always)]
+pub(crate) fn has_shapes<W: World>(scene: &Scene<'_>) -> bool {
+    W::EFFECTS.contains(Effects::SHAPE_LIGHTS) && scene.effects.contains(Effects::SHAPE_LIGHTS)
+}
+
+/// The part of the rays in `mask` that ends at the distance `upto` from their last vertices.
+#[inline(always)]
+fn part(rays: &RayState8, upto: F32x8, mask: Mask8) -> ShapeRays8 {
+    let camera = rays.path.depth.eq(U32x8::splat(1));
+    ShapeRays8 { p: rays.from, d: rays.ray.d, after: rays.travelled, upto, mask, camera }
+}
+
+/// Distance, from the vertices that the rays in `mask` left, to the nearest light with a shape on their parts up to
+/// `upto`; infinity where there is none.
+#[inline(always)]
+pub(crate) fn nearest_shape<W: World>(world: &W, rays: &RayState8, upto: F32x8, mask: Mask8) -> F32x8 {
+    light::nearest_shape(world.scene(), &part(rays, upto, mask))
+}
+
+/// Radiance of all lights with shapes that the rays in `mask` meet on their parts up to `upto`.
+#[inline(never)]
+pub(crate) fn shapes<W: World>(world: &W, rays: &RayState8, upto: F32x8, mask: Mask8) -> Contribution8 {
+    let mut sum = Vec3x8::ZERO;
+    let part = part(rays, upto, mask);
+    light::meet_shapes(world.scene(), world.lights(), &part, rays.normal, !rays.skip_mis, |met, radiance, pdf| {
+        let weight = rays.skip_mis.select(F32x8::ONE, power_heuristic(rays.pdf, pdf));
+        sum += radiance * met.zero_unless(weight);
+    });
+    Contribution8 { pixel: rays.beta * sum, local: rays.weight * sum }
 }
 
 /// `radiance` times the MIS weight of rays whose directions light sampling has with density `pdf`.

@@ -2,6 +2,7 @@
 
 use super::book::{Beyond, Bookkeeping};
 use super::class::PHASE_KIND;
+use super::emission;
 use super::packets::{Contribution8, RayState8};
 use super::passing::wait;
 use super::ring::Ring;
@@ -32,6 +33,9 @@ impl Collision8 {
 
 /// Sends the rays through the media that they are inside of. What the media emit is added; rays that scatter, end or stop
 /// on the way do not reach their hits: they are taken out of `hit`, and those that end or wait out of `rays`.
+///
+/// `light` are the distances, from the vertices that the rays left, of the nearest lights with shapes; infinity without
+/// one. A flight ends there, so that the light counts if the ray survives to it, and goes on from there as a waiting ray.
 #[inline(never)]
 pub(crate) fn cross_media<W: World>(
     world: &W,
@@ -39,10 +43,13 @@ pub(crate) fn cross_media<W: World>(
     ring: &mut Ring<'_>,
     rays: &mut RayState8,
     hit: &mut Hit8,
+    light: F32x8,
 ) -> Collision8 {
     let inside = rays.active & rays.media.inside();
     let medium = rays.media.met();
-    let tmax = hit.hit.select(hit.t, rays.ray.tmax);
+    let end = hit.hit.select(hit.t, rays.ray.tmax);
+    let stops = light.lt(rays.travelled + end);
+    let tmax = stops.select(F32x8::ZERO.max(light - rays.travelled), end);
     let segment = Segment8 { o: rays.ray.o, d: rays.ray.d, tmax };
     let flight = media::fly(W::EFFECTS, world.scene(), medium, &segment, rays.beta, rays.key, inside);
     book.charge_medium(inside, &rays.path, flight.steps, flight.roulettes);
@@ -52,6 +59,13 @@ pub(crate) fn cross_media<W: World>(
     rays.weight = Vec3x8::select(inside, rays.weight * flight.weight, rays.weight);
     let goes_on = rays.beta.any_positive() & rays.beta.is_finite();
     book.break_lanes(inside.and_not(rays.beta.is_finite()), &rays.path);
+    let reached = inside & flight.passed & goes_on & light.is_finite();
+    let stopped = reached & stops;
+    if reached.any() {
+        let found = emission::shapes(world, rays, stops.select(light, rays.travelled + end), reached);
+        book.accumulate(reached, &rays.path, &found, Beyond::Ray);
+        wait(ring, rays, stopped, (rays.ray.o + rays.ray.d * tmax, light, rays.media));
+    }
     let unfinished = inside & flight.unfinished & goes_on;
     if unfinished.any() {
         let o = rays.ray.o + rays.ray.d * flight.t;
@@ -59,7 +73,7 @@ pub(crate) fn cross_media<W: World>(
     }
     let ended = inside.and_not((flight.collided | flight.passed | flight.unfinished) & goes_on);
     book.close_lanes(ended, &rays.path);
-    rays.active = rays.active.and_not(ended | unfinished);
+    rays.active = rays.active.and_not(ended | unfinished | stopped);
     let mask = inside & flight.collided & goes_on;
     hit.hit &= rays.active.and_not(mask);
     Collision8 { mask, t: flight.t, albedo: flight.albedo, medium }

@@ -35,7 +35,7 @@ use super::trace::trace;
 use crate::geometry::SurfaceHit8;
 use crate::scene::Effects;
 use crate::world::World;
-use croupier_simd::{Mask8, U32x8, Vec3x8};
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// One packet of shard `index` through all stages; `false` when nothing is left.
 pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State<'_>) -> bool {
@@ -82,8 +82,19 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
     }
 
     let mut hit = trace(world, book, &rays, kind);
-    let in_media = W::EFFECTS.contains(Effects::MEDIA) && (rays.active & rays.media.inside()).any();
-    let collision = if in_media { cross_media(world, book, ring, &mut rays, &mut hit) } else { Collision8::NONE };
+    let inside = if W::EFFECTS.contains(Effects::MEDIA) { rays.active & rays.media.inside() } else { Mask8::NONE };
+    let in_media = inside.any();
+    let mut light = F32x8::INFINITY;
+    if emission::has_shapes::<W>(world.scene()) {
+        let (clear, upto) = (rays.active.and_not(inside), rays.travelled + hit.hit.select(hit.t, rays.ray.tmax));
+        let found = emission::shapes(world, &rays, upto, clear);
+        book.accumulate(clear, &rays.path, &found, Beyond::Ray);
+        if in_media {
+            light = emission::nearest_shape(world, &rays, upto, inside);
+        }
+    }
+    let collision =
+        if in_media { cross_media(world, book, ring, &mut rays, &mut hit, light) } else { Collision8::NONE };
     let escaped = rays.active.and_not(hit.hit | collision.mask);
     if escaped.any() {
         if let Some(found) = emission::environment(world, &rays, escaped) {

@@ -383,6 +383,46 @@ pub enum Emitter {
         /// Half angle of the outer cone, degrees, 0.01 to 180.
         outer_deg: f32,
     },
+    /// A sphere, rectangle or disk of its own, without triangles.
+    Shape(ShapeLight),
+}
+
+/// A light with a shape of its own. Rays that meet it take its radiance along and go on: it hides nothing. At most
+/// [`MAX_SHAPE_LIGHTS`](croupier::unstable::scene::blob::MAX_SHAPE_LIGHTS) of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShapeLight {
+    /// What it looks like.
+    pub shape: LightShape,
+    /// Middle, world space.
+    pub position: [f32; 3],
+    /// Radiance.
+    pub radiance: [f32; 3],
+    /// A rectangle or disk emits from its back, too; a sphere also to its inside.
+    pub two_sided: bool,
+    /// Do camera rays see it?
+    pub visible: bool,
+}
+
+/// Shape of a [`ShapeLight`]. Lengths are from 2e-9 (edges) or 1e-9 (radii) to 1e9.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightShape {
+    /// A sphere that emits to its outside.
+    Sphere {
+        /// Radius, world units.
+        radius: f32,
+    },
+    /// A rectangle that emits to the side where the cross product of its edges points.
+    Rectangle {
+        /// Two edges from one corner, perpendicular to 1e-3; whole lengths, world units.
+        edges: [[f32; 3]; 2],
+    },
+    /// A disk that emits from one side.
+    Disk {
+        /// Direction in which it faces, of any length but 0.
+        direction: [f32; 3],
+        /// Radius, world units.
+        radius: f32,
+    },
 }
 
 /// Light from infinity, all around.

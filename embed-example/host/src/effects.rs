@@ -191,6 +191,13 @@ const REASONS: &[(Effects, Facts)] = &[
         let sun = count(LightKind::Sun, ["sun", "suns"]);
         [point, directional, spot, sun].into_iter().flatten().collect()
     }),
+    (Effects::SHAPE_LIGHTS, |c| {
+        let count = |kind: LightKind, names| Some(Fact::Count(names, c.lights(kind))).filter(|_| c.lights(kind) > 0);
+        let sphere = count(LightKind::Sphere, ["sphere light", "sphere lights"]);
+        let rectangle = count(LightKind::Rectangle, ["rectangle light", "rectangle lights"]);
+        let disk = count(LightKind::Disk, ["disk light", "disk lights"]);
+        [sphere, rectangle, disk].into_iter().flatten().collect()
+    }),
     (Effects::LENS, |c| {
         let camera = c.scene.camera;
         vec![Fact::Number("radius", camera.lens_radius), Fact::Number("focus_distance", camera.focus_distance)]

@@ -104,6 +104,20 @@ scenes! {
             s.emitters = vec![Emitter::Spot { position, direction, intensity: [3.0; 3], inner_deg: 20.0, outer_deg: 60.0 }];
         })
     };
+    "sphere, rectangle and disk light", [DIFFUSE, SHAPE_LIGHTS], || {
+        changed(|s| {
+            let edges = [[0.4, 0.0, 0.0], [0.0, 0.0, 0.6]];
+            let light = |shape, position| {
+                let radiance = [3.0, 2.0, 4.0];
+                Emitter::Shape(ShapeLight { shape, position, radiance, two_sided: false, visible: true })
+            };
+            s.emitters = vec![
+                light(LightShape::Sphere { radius: 0.1 }, [-0.4, 0.1, 0.2]),
+                light(LightShape::Rectangle { edges }, [0.1, 0.9, 0.0]),
+                light(LightShape::Disk { direction: [1.0, 0.2, 0.0], radius: 0.3 }, [-0.9, 0.0, 0.0]),
+            ];
+        })
+    };
     "orthographic", [DIFFUSE, AREA_LIGHTS, PROJECTIONS],
         || changed(|s| s.camera.projection = Projection::Orthographic { height: 2.0 });
     "panoramic", [DIFFUSE, AREA_LIGHTS, PROJECTIONS], || {

@@ -239,6 +239,11 @@ rows! {
     DELTA_LIGHTS: Diffuse, |s| {
         s.emitters.push(Emitter::Point { position: [0.0, 1.7, 0.5], intensity: [1.0; 3] });
     };
+    SHAPE_LIGHTS: Open, |s| {
+        let (shape, position) = (LightShape::Sphere { radius: 0.2 }, [0.0, 1.5, 0.5]);
+        let radiance = [10.0; 3];
+        s.emitters.push(Emitter::Shape(ShapeLight { shape, position, radiance, two_sided: false, visible: true }));
+    };
     LENS: Diffuse, |s| s.camera.lens = Some(ThinLens { radius: 0.05, focus_distance: 6.8 });
     SMOOTH_NORMALS: Diffuse, |s| s.triangles.iter_mut().skip(12).for_each(|t| t.smooth = true);
     MEDIA: Boundary, |s| fog(s, Density::Homogeneous);

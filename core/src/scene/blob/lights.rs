@@ -9,6 +9,16 @@ use bytemuck::{Pod, Zeroable};
 /// Largest emission (radiance, intensity or irradiance, any channel): its square still fits `f32`.
 pub const MAX_EMISSION: f32 = 1e18;
 
+/// Most lights with shapes: every ray is tested against each of them.
+pub const MAX_SHAPE_LIGHTS: usize = 1024;
+/// Range of the radius and of the length of half an edge of a light with a shape. The solid-angle density of the smallest
+/// light seen from the largest distance still fits `f32`.
+pub const SHAPE_SIZE_RANGE: [f32; 2] = [1e-9, 1e9];
+/// A rectangle or disk emits from its back, too; a sphere also to its inside.
+pub const SHAPE_TWO_SIDED: u32 = 1;
+/// Camera rays do not see the light; all others do.
+pub const SHAPE_HIDDEN: u32 = 2;
+
 /// The light kinds, one row each, handed to the macro `$then`: kind and number in the blob, name, effects of which a
 /// kernel needs at least one to sample it, and the fields of the record that it uses.
 macro_rules! light_table {
@@ -26,6 +36,12 @@ macro_rules! light_table {
             Spot = 4, "spot", [DELTA_LIGHTS], [Position, Cone, Emission];
             /// Parallel light with the spread of a distant disk.
             Sun = 5, "sun", [DELTA_LIGHTS], [Direction, Disk, Emission];
+            /// Sphere that emits to its outside.
+            Sphere = 6, "sphere", [SHAPE_LIGHTS], [Shape, Position, Radius, Emission];
+            /// Rectangle that emits from its front.
+            Rectangle = 7, "rectangle", [SHAPE_LIGHTS], [Shape, Position, HalfEdges, Emission];
+            /// Disk that emits from its front.
+            Disk = 8, "disk", [SHAPE_LIGHTS], [Shape, Position, Circle, Emission];
         }
     };
 }
@@ -87,8 +103,25 @@ pub enum LightField {
     Emission,
     /// `params`: the unit axis along which the light travels, 1 - cos of the outer and of the inner half angle.
     Cone,
-    /// `params`: 1 - cos of the angular radius of a disk.
+    /// `params`: 1 - cos of the angular radius of a disk at infinity.
     Disk,
+    /// `triangle`: flags of a light with a shape, [`SHAPE_TWO_SIDED`] and [`SHAPE_HIDDEN`]. Such lights come last in
+    /// their section, and are at most [`MAX_SHAPE_LIGHTS`].
+    Shape,
+    /// `params`: a radius.
+    Radius,
+    /// `params`: two vectors, perpendicular to 1e-3, from the middle of a rectangle to the middles of two edges; the
+    /// front is where their cross product points.
+    HalfEdges,
+    /// `params`: the unit normal of the front of a disk, its radius.
+    Circle,
+}
+
+impl LightKind {
+    /// Has a light of this kind a shape that rays may meet, without triangles?
+    pub const fn has_shape(self) -> bool {
+        matches!(self.fields(), [LightField::Shape, ..])
+    }
 }
 
 /// One light, a cache line; fields a kind does not use are 0.
@@ -97,18 +130,19 @@ pub enum LightField {
 pub struct Light {
     /// [`LightKind`].
     pub kind: u32,
-    /// Area: index of the triangle.
+    /// Area: index of the triangle. Sphere, rectangle, disk: flags, [`SHAPE_TWO_SIDED`] and [`SHAPE_HIDDEN`].
     pub triangle: u32,
     /// Area: area of the triangle, world units squared; in a moving instance, when the shutter opens.
     pub area: f32,
     /// Area: 1 + index of the world's [`super::Instance`] that the triangle is in; 0 if it is the world's own.
     pub instance: u32,
-    /// Point, spot: position. Directional, sun: unit direction towards the light.
+    /// Point, spot: position. Sphere, rectangle, disk: middle. Directional, sun: unit direction towards the light.
     pub vector: [f32; 3],
-    /// Area: radiance. Point: intensity. Spot: intensity on the axis. Directional, sun: irradiance on a facing surface.
+    /// Area, sphere, rectangle, disk: radiance. Point: intensity. Spot: intensity on the axis. Directional, sun: irradiance on a facing surface.
     pub emission: [f32; 3],
     /// Spot: unit axis, 1 - cos of the outer and of the inner half angle, 0. Sun: 1 - cos of its angular radius, then 0.
-    /// Others: zero, room for kinds to come (the radius of a sphere), so that they need no other version of the blob.
+    /// Sphere: radius, then 0. Rectangle: two halves of edges. Disk: unit normal, radius, 0. Others: zero, room for kinds
+    /// to come, so that they need no other version of the blob.
     pub params: [f32; 6],
 }
 

@@ -11,8 +11,17 @@ use crate::scene::{Effects, Records};
 pub(super) fn lights(scene: &Records<'_>) -> Result<Effects, SceneError> {
     instances::lights(scene)?;
     let mut effects = Effects::default();
+    let mut first_shape = None;
     for (at, l) in records(SectionKind::Lights, scene.lights) {
         let kind = light(scene, at, l)?;
+        match (kind.has_shape(), first_shape) {
+            (true, None) => first_shape = Some(at.index()),
+            (true, Some(first)) if at.index().saturating_sub(first) as usize >= MAX_SHAPE_LIGHTS => {
+                return Err(SceneError::ShapeLights { light: at.index() });
+            }
+            (false, Some(_)) => return Err(SceneError::ShapeLights { light: at.index().saturating_sub(1) }),
+            _ => (),
+        }
         // The environment's own kind says what it calls for.
         if !kind.fields().contains(&LightField::Environment) {
             effects = effects.with(Effects::of_light(kind));
@@ -37,7 +46,9 @@ pub(super) fn light(scene: &Records<'_>, at: Record, l: &Light) -> Result<LightK
 fn unused_params_are_zero(kind: LightKind, params: &[f32; 6]) -> bool {
     let words = |field: &LightField| match field {
         LightField::Cone => 5,
-        LightField::Disk => 1,
+        LightField::Disk | LightField::Radius => 1,
+        LightField::Circle => 4,
+        LightField::HalfEdges => 6,
         _ => 0,
     };
     let used = kind.fields().iter().map(words).sum();
@@ -68,8 +79,42 @@ fn field(scene: &Records<'_>, at: Record, l: &Light, field: LightField) -> Resul
             let [width, ..] = l.params;
             at.within(Field::Cone, width, f32::MIN_POSITIVE, 1.0)
         }
+        LightField::Shape => at.zero(l.triangle & !(SHAPE_TWO_SIDED | SHAPE_HIDDEN) == 0),
+        LightField::Radius => {
+            let [radius, ..] = l.params;
+            size(at, radius)
+        }
+        LightField::HalfEdges => half_edges(at, l.params),
+        LightField::Circle => {
+            let [x, y, z, radius, ..] = l.params;
+            at.unit([x, y, z])?;
+            size(at, radius)
+        }
         LightField::Emission => at.all_within(Field::Emission, &l.emission, 0.0, MAX_EMISSION),
     }
+}
+
+/// A radius, or the length of half an edge.
+fn size(at: Record, x: f32) -> Result<(), SceneError> {
+    let [lo, hi] = SHAPE_SIZE_RANGE;
+    at.within(Field::ShapeSize, x, lo, hi)
+}
+
+/// Both halves of edges of a rectangle.
+fn half_edges(at: Record, [a, b, c, x, y, z]: [f32; 6]) -> Result<(), SceneError> {
+    let [_, widest] = SHAPE_SIZE_RANGE;
+    at.all_within(Field::ShapeSize, &[a, b, c, x, y, z], -widest, widest)?;
+    let [u, v] = [[a, b, c], [x, y, z]].map(|e| e.map(f64::from));
+    let [lo, hi] = SHAPE_SIZE_RANGE.map(|x| f64::from(x) * f64::from(x));
+    for e in [u, v] {
+        // squares: no square root is needed
+        if !(lo..=hi).contains(&dot64(e, e)) {
+            return Err(at.bad(Field::ShapeSize, e.iter().fold(0.0, |m: f64, x| m.max(x.abs())) as f32));
+        }
+    }
+    let [uu, vv] = [dot64(u, u), dot64(v, v)];
+    let cos_sqr = dot64(u, v) * dot64(u, v) / (uu * vv);
+    at.within(Field::Edges, cos_sqr as f32, 0.0, 1e-6)
 }
 
 /// The table that chooses among the lights; only where none emits may it be missing.

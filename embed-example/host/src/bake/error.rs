@@ -171,7 +171,7 @@ pub enum BakeError {
         /// Fault of the prototype.
         what: String,
     },
-    /// More of something than indices of 31 bits can tell apart.
+    /// More of something than indices of 31 bits can tell apart, or than there may be.
     TooMany {
         /// Plural of the thing.
         what: &'static str,

@@ -3,12 +3,14 @@
 use super::geometry::{Geometry, area, radius};
 use super::instances::Forest;
 use super::{BakeError, emission};
-use crate::description::{Emitter, Environment, Model, SceneDescription};
+use crate::description::{Emitter, Environment, LightShape, Model, SceneDescription, ShapeLight};
 use crate::{alias, environment};
 use bytemuck::Zeroable;
 use croupier::unstable::light::luminance;
 use croupier::unstable::scene::blob::{self, Alias, EnvironmentKind, Light, LightKind};
-use croupier::unstable::scene::blob::{MAX_COORDINATE, MAX_EMISSION, MAX_SIDE};
+use croupier::unstable::scene::blob::{
+    MAX_COORDINATE, MAX_EMISSION, MAX_SHAPE_LIGHTS, MAX_SIDE, SHAPE_HIDDEN, SHAPE_SIZE_RANGE, SHAPE_TWO_SIDED,
+};
 use glam::{DVec3, Vec3};
 use std::ops::Range;
 
@@ -94,6 +96,14 @@ pub(super) fn bake(
         out.surround(e)?;
     }
     let hidden = out.place(scene, emission, geometry, forest)?;
+    for (i, e) in scene.emitters.iter().enumerate() {
+        let Emitter::Shape(light) = e else { continue };
+        out.lights.extend(shape_light(i, light)?);
+    }
+    let shapes = out.lights.iter().filter(|l| LightKind::from_u32(l.kind).is_some_and(LightKind::has_shape)).count();
+    if shapes > MAX_SHAPE_LIGHTS {
+        return Err(BakeError::TooMany { what: "sphere, rectangle and disk lights", count: shapes });
+    }
     let radius = radius(forest.bounds);
     let mut weights = environment::light_weights(&out.lights, out.environment.first(), &out.env_texels, radius);
     weights.iter_mut().zip(&shares).for_each(|(weight, share)| *weight *= share);
@@ -204,16 +214,61 @@ fn sub(a: [f64; 3], b: [f64; 3]) -> DVec3 {
     DVec3::from_array(a) - DVec3::from_array(b)
 }
 
+/// Checks a position.
+fn located(emitter: &str, position: [f32; 3]) -> Result<[f32; 3], BakeError> {
+    match position.into_iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE) {
+        Some(found) => Err(BakeError::Emitter { emitter: emitter.into(), what: "position", found }),
+        None => Ok(position),
+    }
+}
+
+/// A light with a shape; black ones are left out.
+fn shape_light(index: usize, l: &ShapeLight) -> Result<Option<Light>, BakeError> {
+    let kind = match l.shape {
+        LightShape::Sphere { .. } => LightKind::Sphere,
+        LightShape::Rectangle { .. } => LightKind::Rectangle,
+        LightShape::Disk { .. } => LightKind::Disk,
+    };
+    let emitter = format!("emitter {index} ({})", kind.name());
+    check_emission(&emitter, "radiance", l.radiance)?;
+    let vector = located(&emitter, l.position)?;
+    let bad = |what, found| Err(BakeError::Emitter { emitter: emitter.clone(), what, found });
+    let [least, most] = SHAPE_SIZE_RANGE;
+    let params = match l.shape {
+        LightShape::Sphere { radius } | LightShape::Disk { radius, .. } if !(least..=most).contains(&radius) => {
+            return bad("radius", radius);
+        }
+        LightShape::Sphere { radius } => [radius, 0.0, 0.0, 0.0, 0.0, 0.0],
+        LightShape::Disk { direction, radius } => {
+            let [x, y, z] = unit(&emitter, direction)?.to_array();
+            [x, y, z, radius, 0.0, 0.0]
+        }
+        LightShape::Rectangle { edges } => {
+            let [u, v] = edges.map(|e| Vec3::from_array(e).as_dvec3() / 2.0);
+            for half in [u, v] {
+                let length = half.length();
+                if !(f64::from(least)..=f64::from(most)).contains(&length) {
+                    return bad("length of an edge", (2.0 * length) as f32);
+                }
+            }
+            let cos = u.normalize().dot(v.normalize());
+            if cos.abs() > 1e-3 {
+                return bad("cosine of the angle between the edges", cos as f32);
+            }
+            let ([a, b, c], [x, y, z]) = (u.as_vec3().to_array(), v.as_vec3().to_array());
+            [a, b, c, x, y, z]
+        }
+    };
+    let flag = |on, bit| if on { bit } else { 0 };
+    let triangle = flag(l.two_sided, SHAPE_TWO_SIDED) | flag(!l.visible, SHAPE_HIDDEN);
+    let light = Light { kind: kind as u32, triangle, vector, emission: l.radiance, params, ..Zeroable::zeroed() };
+    Ok((l.radiance != [0.0; 3]).then_some(light))
+}
+
 /// A light that no ray meets; black ones are left out.
 fn delta_light(index: usize, e: &Emitter) -> Result<Option<Light>, BakeError> {
-    let located =
-        |emitter: &str, position: [f32; 3]| match position.into_iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE)
-        {
-            Some(found) => Err(BakeError::Emitter { emitter: emitter.into(), what: "position", found }),
-            None => Ok(position),
-        };
     let (kind, vector, emission, params) = match *e {
-        Emitter::Area { .. } => return Ok(None),
+        Emitter::Area { .. } | Emitter::Shape(_) => return Ok(None),
         Emitter::Point { position, intensity } => {
             let emitter = format!("emitter {index} (point)");
             check_emission(&emitter, "intensity", intensity)?;

@@ -4,8 +4,8 @@ use super::json::{self, Place};
 use super::loader::Loader;
 use super::{LoadError, instances, media, obj, principled};
 use crate::description::{
-    Camera, Emitter, Environment, Material, Model, ModelParameters, NamedCamera, ParameterSource, Principled,
-    Projection, Reflectance, SceneDescription, ThinLens,
+    Camera, Emitter, Environment, LightShape, Material, Model, ModelParameters, NamedCamera, ParameterSource,
+    Principled, Projection, Reflectance, SceneDescription, ShapeLight, ThinLens,
 };
 use crate::text::excerpt;
 use croupier::unstable::scene::blob::{CameraKind, EnvironmentKind, LightKind, MaterialKind};
@@ -208,6 +208,15 @@ fn emitter(loader: &mut Loader, scene: &mut SceneDescription, folder: &Path, e: 
             inner_deg: e.find("inner_deg")?.map_or(Ok(0.0), |d| d.float())?,
             outer_deg: e.get("outer_deg")?.float()?,
         },
+        Some(LightKind::Sphere) => shape_light(e, LightShape::Sphere { radius: e.get("radius")?.float()? })?,
+        Some(LightKind::Rectangle) => {
+            let edges = [e.get("edge_u")?.rgb()?, e.get("edge_v")?.rgb()?];
+            shape_light(e, LightShape::Rectangle { edges })?
+        }
+        Some(LightKind::Disk) => {
+            let (direction, radius) = (e.get("direction")?.rgb()?, e.get("radius")?.float()?);
+            shape_light(e, LightShape::Disk { direction, radius })?
+        }
         // An environment's type is that of its own kind.
         Some(LightKind::Environment) | None => {
             let environment = match EnvironmentKind::from_name(name) {
@@ -223,6 +232,18 @@ fn emitter(loader: &mut Loader, scene: &mut SceneDescription, folder: &Path, e: 
     };
     scene.emitters.push(emitter);
     Ok(())
+}
+
+/// What lights with shapes have in common.
+fn shape_light(e: &Place<'_>, shape: LightShape) -> Result<Emitter, LoadError> {
+    let flag = |key: &str, default: bool| e.find(key)?.map_or(Ok(default), |f| f.flag());
+    Ok(Emitter::Shape(ShapeLight {
+        shape,
+        position: e.get("position")?.rgb()?,
+        radiance: e.get("radiance")?.rgb()?,
+        two_sided: flag("twosided", false)?,
+        visible: flag("visible", true)?,
+    }))
 }
 
 /// Index of the material that an area emitter names.
