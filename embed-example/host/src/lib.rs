@@ -40,6 +40,7 @@ pub mod look;
 pub mod memory;
 pub mod microfacet;
 pub mod principled;
+pub mod probes;
 pub mod render;
 pub mod renderer;
 mod sides;
