@@ -24,6 +24,7 @@ use std::process::ExitCode;
 const SIZE: [u32; 2] = [256, 256];
 
 #[derive(clap::Args)]
+#[command(after_help = "Without --size the map has 256x256 texels. Samples are those of each texel.")]
 pub(crate) struct Args {
     /// Folder with scene.json, .gltf, .glb, .obj, .ply or .stl file; `cornell` for the built-in Cornell box
     scene: PathBuf,

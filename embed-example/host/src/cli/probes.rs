@@ -72,6 +72,9 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let path = Some(args.scene.as_path());
     output::writable(&args.output)?;
     let render = args.settings.options()?;
+    if render.settings.size != [0; 2] || render.settings.adaptive {
+        return Err("probes have no `--size` and no `--adaptive`: `--spp` is the number of their directions".into());
+    }
     check(&render)?;
     let (description, scene::Opened { bytes, notes, files, .. }) = scene::open_described(path, &args.scene_flags)?;
     output::spares(&[&args.output], &files)?;
