@@ -53,8 +53,8 @@ pub trait Extension {
     /// Is [`Self::factor`] there?
     const ROULETTE: bool = false;
 
-    /// Rays of eight camera samples, in place of the camera's: of lightmap texels, probes, sensors. They begin in the
-    /// media in which the scene's camera is.
+    /// Rays of eight camera samples, in place of the camera's: of probes, sensors, texels. They begin in the media in which
+    /// the scene's camera is. Samples without a ray count as camera rays too, so that steps stay bounded.
     fn rays(&self, _scene: &Scene<'_>, samples: &PixelSamples8) -> SourceRays8 {
         SourceRays8 { active: Mask8::NONE, ..SourceRays8::none(samples) }
     }
@@ -63,7 +63,7 @@ pub trait Extension {
     /// sample brings is the radiance that a white diffuse surface would reflect there, from its front, whatever the
     /// surface is made of: the irradiance over pi. Lights are sampled from the point as from any other, so that those that
     /// no ray meets count too; what the surface emits itself does not. They are in the media in which the scene's camera
-    /// is. A sample counts as a camera ray. The profile must have [`Effects::DIFFUSE`](crate::unstable::Effects::DIFFUSE).
+    /// is. Every sample counts as a camera ray. The profile must have [`Effects::DIFFUSE`](crate::unstable::Effects::DIFFUSE).
     fn points(&self, _scene: &Scene<'_>, _samples: &PixelSamples8) -> SourcePoints8 {
         SourcePoints8::NONE
     }

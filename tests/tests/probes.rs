@@ -9,7 +9,7 @@ use croupier_tests::light_oracle::Map;
 use croupier_tests::scenes::{add_box, blob, camera, cornell, grey};
 use std::f64::consts::PI;
 
-/// Largest deviation in standard errors that chance explains: with a few hundred comparisons and four iterations or
+/// Largest deviation in standard errors that chance explains: with a few hundred comparisons and seven iterations or
 /// more, the tails of whose means are wider than a normal distribution's.
 const SIGMAS: f64 = 7.0;
 
@@ -44,7 +44,7 @@ fn under(environment: Environment) -> SceneDescription {
 #[test]
 fn a_constant_environment_is_one_coefficient() {
     let scene = under(Environment::Constant { radiance: [1.0, 2.0, 0.5] });
-    for rays in [2, 100, 1024] {
+    for rays in [2, 100, 4096] {
         let probes = render(&scene, &[[0.0; 3], [3.0, -2.0, 1.0], [0.5; 3]], &options("ears", rays));
         for probe in &probes {
             for c in 0..3 {

@@ -195,7 +195,7 @@ pub(crate) fn camera_rays<W: World>(
     if W::Extension::RAYS {
         book.close_lanes(s.asked.and_not(active), &s.path);
     }
-    book.counters.camera_rays += if W::Extension::RAYS { active.count().into() } else { s.count };
+    book.counters.camera_rays += s.count;
     RayState8 {
         active,
         ray: Ray8::unbounded(o, d).at(s.time),

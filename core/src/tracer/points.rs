@@ -25,7 +25,7 @@ pub(super) fn begin_at_points<W: World>(world: &W, job: &Job, index: u32, state:
     let path = &samples.path;
     let mut arrival = arrive(world, &samples);
     let first = arrival.active;
-    book.counters.camera_rays += u64::from(first.count());
+    book.counters.camera_rays += samples.count;
     book.charge(first, path, COST_CAMERA);
     if book.wants_first_hits() && first.any() {
         let material = arrival.vertex.material.to_array();

@@ -34,7 +34,8 @@ fn folder() -> tempfile::TempDir {
 #[test]
 fn a_lightmap_is_an_exr_and_a_png() {
     let dir = tempfile::tempdir().unwrap();
-    let arguments = ["lightmap", "cornell", "--object", "floor", "--size", "12x10", "--spp", "4", "--denoise", "-o", "f.exr"];
+    let arguments =
+        ["lightmap", "cornell", "--object", "floor", "--size", "12x10", "--spp", "4", "--denoise", "-o", "f.exr"];
     let out = croupier(dir.path(), &arguments);
     assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
     assert!(text(&out.stdout).contains("12x10 texels, 1 charts: 120 texels sampled"), "{}", text(&out.stdout));
@@ -59,7 +60,8 @@ fn probes_are_json() {
     let out = croupier(dir.path(), &["probes", "cornell", "--grid", "2x1x3", "--spp", "64", "-o", "p.json"]);
     assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
     assert!(text(&out.stdout).contains("6 probes"), "{}", text(&out.stdout));
-    let read = || -> serde_json::Value { serde_json::from_slice(&fs::read(dir.path().join("p.json")).unwrap()).unwrap() };
+    let read =
+        || -> serde_json::Value { serde_json::from_slice(&fs::read(dir.path().join("p.json")).unwrap()).unwrap() };
     let probes = read();
     assert_eq!(probes["probes"].as_array().map(Vec::len), Some(6));
     assert_eq!(probes["probes"][1]["position"][0].as_f64(), Some(0.5));

@@ -7,12 +7,13 @@ use super::settings::SettingsFlags;
 use super::until::Until;
 use super::values::{Exposure, exposure, exr_path, share};
 use super::{output, scene, signals};
-use croupier::Scene;
+use croupier::{Scene, Settings};
 use croupier_host::drive::DriveError;
 use croupier_host::image::{Rgb, write_png};
 use croupier_host::lightmap::{Lightmap, LightmapError, LightmapOptions, Surface, TexelOrigin, render_lightmap};
 use croupier_host::look::exposure::auto;
-use croupier_host::render::{RenderOptions, check};
+use croupier_host::memory::{Demand, machine};
+use croupier_host::render::{RenderOptions, check, plan};
 use croupier_host::text;
 use croupier_host::tonemap::{Curve, tonemap};
 use serde::Serialize;
@@ -106,6 +107,12 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
         gutter: args.gutter,
         most_backs: args.backs,
     };
+    let aovs = settings.aovs.with(LightmapOptions::AOVS);
+    let memory = plan(&validated, &RenderOptions { settings: Settings { aovs, ..settings }, ..render })?;
+    let demand = Demand::new(bytes.len() as u64, &memory, settings.size, aovs);
+    if let Some(text) = demand.judge(machine()).map_err(|e| about(file)(&e))? {
+        notes.add(file, text);
+    }
     signals::save_at_first();
     let watch = Rendering::start(options.target);
     let map = render_lightmap(validated, &surface, &options, &watch).map_err(|e| explained(&e, file))?;

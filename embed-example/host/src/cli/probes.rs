@@ -7,10 +7,11 @@ use super::progress::Rendering;
 use super::settings::SettingsFlags;
 use super::values::{counts, json_path, share};
 use super::{output, scene, signals};
-use croupier::Scene;
+use croupier::{Scene, Settings};
 use croupier_host::image::{ImageError, write_whole};
-use croupier_host::probes::{ProbeFile, ProbeOptions, grid, render_probes};
-use croupier_host::render::{Target, check};
+use croupier_host::memory::{Demand, machine};
+use croupier_host::probes::{ProbeFile, ProbeOptions, grid, picture_size, render_probes};
+use croupier_host::render::{RenderOptions, Target, check, plan};
 use croupier_host::text;
 use serde::Serialize;
 use std::error::Error;
@@ -76,7 +77,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
         return Err("probes have no `--size` and no `--adaptive`: `--spp` is the number of their directions".into());
     }
     check(&render)?;
-    let (description, scene::Opened { bytes, notes, files, .. }) = scene::open_described(path, &args.scene_flags)?;
+    let (description, scene::Opened { bytes, mut notes, files, .. }) = scene::open_described(path, &args.scene_flags)?;
     output::spares(&[&args.output], &files)?;
     let file = files.first().map(PathBuf::as_path).or(path);
     let validated = Scene::from_bytes(&bytes).map_err(|e| about(file)(&e))?;
@@ -90,6 +91,12 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
         threads: args.threads.into(),
         most_backs: args.backs,
     };
+    let settings = Settings { size: picture_size(positions.len(), args.spp), ..render.settings };
+    let memory = plan(&validated, &RenderOptions { settings, ..render.clone() })?;
+    let demand = Demand::new(bytes.len() as u64, &memory, settings.size, settings.aovs);
+    if let Some(text) = demand.judge(machine()).map_err(|e| about(file)(&e))? {
+        notes.add(file, text);
+    }
     signals::save_at_first();
     let watch = Rendering::start(Target::Spp(args.spp));
     let probes = render_probes(validated, &description, &positions, &options, &watch);

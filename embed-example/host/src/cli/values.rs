@@ -17,11 +17,14 @@ pub(crate) fn json_path(text: &str) -> Result<PathBuf, String> {
     path_ending_in("json", text)
 }
 
-/// Three counts, such as `4x3x4`, each from 1 to 1024.
+/// Most probes of a grid.
+const MAX_PROBES: u32 = 1 << 18;
+
+/// Three counts, such as `4x3x4`, of a grid that is not too large.
 pub(crate) fn counts(text: &str) -> Result<[u32; 3], String> {
     let found: Option<Vec<u32>> = text.split('x').map(|n| n.parse().ok().filter(|n| (1..=1024).contains(n))).collect();
-    let found = found.and_then(|v| v.try_into().ok());
-    found.ok_or_else(|| "need NxNxN, each 1 to 1024".into())
+    let found = found.and_then(|v| <[u32; 3]>::try_from(v).ok()).filter(|n| n.iter().product::<u32>() <= MAX_PROBES);
+    found.ok_or_else(|| format!("need NxNxN, each 1 to 1024, and at most {MAX_PROBES} in all"))
 }
 
 /// A share, from 0 to 1.

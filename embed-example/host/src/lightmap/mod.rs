@@ -80,6 +80,9 @@ pub struct LightmapOptions {
 }
 
 impl LightmapOptions {
+    /// Auxiliary values that maps are made with, besides those of the settings.
+    pub const AOVS: AovSet = AovSet::of(&[Aov::Normal, Aov::Direct, Aov::Indirect]);
+
     /// 64 samples for each texel with the strategy and the settings of [`crate::render::RenderOptions`], a gutter of 4
     /// texels, texels filled that see more backs than fronts.
     pub fn new(size: [u32; 2]) -> Self {
@@ -157,9 +160,8 @@ pub fn render_lightmap(
     let texels = Texels::new(surface, size);
     let source = TexelSource(&texels);
     let backs = validity::back_shares(&scene, &surface.opaque, &source);
-    let aovs = AovSet::of(&[Aov::Normal, Aov::Alpha, Aov::Direct, Aov::Indirect]);
-    let settings = Settings { aovs: options.settings.aovs.with(aovs), ..options.settings.with_scene(&scene) };
-    let settings = Settings { size, ..settings };
+    let aovs = options.settings.aovs.with(LightmapOptions::AOVS);
+    let settings = Settings { size, aovs, ..options.settings.with_scene(&scene) };
     let drive = Options { threads: options.threads, ..Options::new(settings, options.target) };
     let rendered = drive_extended::<Full, _>(scene, source, &drive, observer)?;
     let plane = |aov: Aov| -> Vec<[f32; 3]> {

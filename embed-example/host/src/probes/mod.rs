@@ -145,6 +145,11 @@ fn side(rays: u32) -> u32 {
     }
 }
 
+/// Columns and rows of the picture that a session renders for so many probes of so many rays: what its memory depends on.
+pub fn picture_size(probes: usize, rays: u32) -> [u32; 2] {
+    source::size(probes, side(rays))
+}
+
 /// Renders probes at world positions. `description` is that of the scene: it tells which materials are opaque.
 ///
 /// Probes depend on scene, positions and options, never on threads. If the observer stops them, they have fewer rays.

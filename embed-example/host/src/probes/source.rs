@@ -18,6 +18,17 @@ pub(super) fn directions([u, v]: [F32x8; 2]) -> Vec3x8 {
     Vec3x8::new(r * cos, r * sin, z)
 }
 
+/// Probes in a row.
+fn columns(probes: usize) -> u32 {
+    (probes as f64).sqrt().ceil().max(1.0) as u32
+}
+
+/// Columns and rows of the picture of so many probes with so many cells in a row.
+pub(super) fn size(probes: usize, side: u32) -> [u32; 2] {
+    let columns = columns(probes);
+    [columns, (probes as u32).div_ceil(columns)].map(|n| n.saturating_mul(side))
+}
+
 /// Rays from probes: a square of cells for each, in rows of probes.
 pub(super) struct ProbeSource<'a> {
     positions: &'a [[f32; 3]],
@@ -32,14 +43,12 @@ pub(super) struct ProbeSource<'a> {
 
 impl<'a> ProbeSource<'a> {
     pub(super) fn new(positions: &'a [[f32; 3]], side: u32, seed: u64) -> Self {
-        let columns = (positions.len() as f64).sqrt().ceil() as u32;
-        Self { positions, side, columns, seed: seed ^ SEED, iteration: AtomicU32::new(0) }
+        Self { positions, side, columns: columns(positions.len()), seed: seed ^ SEED, iteration: AtomicU32::new(0) }
     }
 
     /// Columns and rows of the picture.
     pub(super) fn size(&self) -> [u32; 2] {
-        let rows = (self.positions.len() as u32).div_ceil(self.columns);
-        [self.columns * self.side, rows * self.side]
+        size(self.positions.len(), self.side)
     }
 
     pub(super) fn pixels(&self) -> usize {
