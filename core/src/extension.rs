@@ -24,8 +24,10 @@
 //! ```
 
 use crate::bsdf::{Bsdf, NoBsdf};
+use crate::geometry::NO_INSTANCE;
 use crate::rrs::Vertices8;
 use crate::scene::Scene;
+use crate::scene::blob::NONE;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Parts of the tracer that a host replaces. `()` replaces nothing.
@@ -42,16 +44,28 @@ pub trait Extension {
     /// Is [`Self::rays`] there?
     const RAYS: bool = false;
 
+    /// Is [`Self::points`] there? It goes before [`Self::rays`].
+    const POINTS: bool = false;
+
     /// Is [`Self::reflectance`] there?
     const TEXTURES: bool = false;
 
     /// Is [`Self::factor`] there?
     const ROULETTE: bool = false;
 
-    /// Rays of eight camera samples, in place of the camera's: of lightmap texels, probes, sensors. They begin in the
-    /// media in which the scene's camera is.
+    /// Rays of eight camera samples, in place of the camera's: of probes, sensors, texels. They begin in the media in which
+    /// the scene's camera is. Samples without a ray count as camera rays too, so that steps stay bounded.
     fn rays(&self, _scene: &Scene<'_>, samples: &PixelSamples8) -> SourceRays8 {
         SourceRays8 { active: Mask8::NONE, ..SourceRays8::none(samples) }
+    }
+
+    /// Points of surfaces at which eight camera samples begin, in place of the camera's rays: texels of lightmaps. What a
+    /// sample brings is the radiance that a white diffuse surface would reflect there, from its front, whatever the
+    /// surface is made of: the irradiance over pi. Lights are sampled from the point as from any other, so that those that
+    /// no ray meets count too; what the surface emits itself does not. They are in the media in which the scene's camera
+    /// is. Every sample counts as a camera ray. The profile must have [`Effects::DIFFUSE`](crate::unstable::Effects::DIFFUSE).
+    fn points(&self, _scene: &Scene<'_>, _samples: &PixelSamples8) -> SourcePoints8 {
+        SourcePoints8::NONE
     }
 
     /// Reflectances (base colours) of eight hits, `reflectance` as materials and texture files give them. Between 0 and 1
@@ -110,6 +124,34 @@ impl SourceRays8 {
         let direction = Vec3x8::splat(0.0, 0.0, 1.0);
         Self { origin: Vec3x8::ZERO, direction, weight: Vec3x8::ZERO, active: samples.active }
     }
+}
+
+/// Points of surfaces at which eight camera samples begin.
+#[derive(Clone, Copy, Debug)]
+pub struct SourcePoints8 {
+    /// Triangle indices.
+    pub triangle: U32x8,
+    /// Instances around the triangles, see [`Hit8::instance`](crate::geometry::Hit8::instance);
+    /// [`NO_INSTANCE`] for those in the world itself.
+    pub instance: [U32x8; 2],
+    /// Barycentric weights of vertices b and c; vertex a has `1 - u - v`.
+    pub weights: [F32x8; 2],
+    /// What the radiance counts in the pixel's mean: 1 for irradiance over pi, pi for irradiance.
+    pub scale: Vec3x8,
+    /// Lanes with a point, among those of the samples; the others are black, as are lanes without a triangle and those
+    /// whose numbers are not finite.
+    pub active: Mask8,
+}
+
+impl SourcePoints8 {
+    /// No points.
+    pub const NONE: Self = Self {
+        triangle: U32x8::splat(NONE),
+        instance: NO_INSTANCE,
+        weights: [F32x8::ZERO; 2],
+        scale: Vec3x8::ZERO,
+        active: Mask8::NONE,
+    };
 }
 
 /// Eight points on surfaces that want a reflectance.

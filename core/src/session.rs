@@ -296,8 +296,9 @@ const fn effects<P: Profile, X: Extension>() -> Effects {
 
 fn check_effects<P: Profile, X: Extension>(scene: &Scene<'_>) -> Result<(), SessionError> {
     let kernels = effects::<P, X>();
-    let missing = scene.effects.without(kernels);
-    if kernels.contains(scene.effects) { Ok(()) } else { Err(SessionError::Profile { missing }) }
+    let wanted = if X::POINTS { scene.effects.with(Effects::DIFFUSE) } else { scene.effects };
+    let missing = wanted.without(kernels);
+    if kernels.contains(wanted) { Ok(()) } else { Err(SessionError::Profile { missing }) }
 }
 
 /// Bits of the media that the camera is inside of.

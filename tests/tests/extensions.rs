@@ -2,7 +2,7 @@
 
 use croupier::unstable::accel::WideBvh;
 use croupier::unstable::bsdf::{self, Bsdf, CacheDirection, Eval8, Inputs8, Lobes, NoBsdf, Sample8};
-use croupier::unstable::extension::{Extension, PixelSamples8, SourceRays8, TextureSamples8};
+use croupier::unstable::extension::{Extension, PixelSamples8, SourcePoints8, SourceRays8, TextureSamples8};
 use croupier::unstable::profile::Full;
 use croupier::unstable::rrs::Vertices8;
 use croupier::unstable::scene::blob::Material;
@@ -10,9 +10,10 @@ use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier::unstable::{camera, film::PixelStats, light::PowerSelector};
 use croupier::{Budget, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
-use croupier_host::description::{self, Model, Reflectance, SceneDescription};
+use croupier_host::description::{self, Emitter, Model, Reflectance, SceneDescription};
 use croupier_tests::runner::settings;
 use croupier_tests::scenes::{add_quad, blob, camera as look, cornell, facing_y, grey, in_white_environment};
+use std::f32::consts::PI;
 
 /// Renders iterations of `spp` samples with an extension.
 fn render<X: Extension>(bytes: &[u8], s: &Settings, iterations: &[u32], extension: X) -> Vec<PixelStats> {
@@ -113,6 +114,67 @@ fn lightmaps_are_pictures_of_texels() {
             assert_eq!(p.samples, 32);
             for x in p.mean() {
                 assert!((x - expected).abs() < 1e-6, "{strategy}: pixel {i} has {x}");
+            }
+        }
+    }
+}
+
+/// Points of a floor's two triangles by column and row; some columns have numbers that cannot be used.
+struct Points;
+
+impl Extension for Points {
+    type Bsdf = NoBsdf;
+    const POINTS: bool = true;
+
+    fn points(&self, _: &Scene<'_>, s: &PixelSamples8) -> SourcePoints8 {
+        let [w, h] = s.size.map(|n| n as f32);
+        let (x, z) = (s.position[0] * (1.0 / w), s.position[1] * (1.0 / h));
+        let lower = x.gt(z);
+        let nan = F32x8::splat(f32::NAN);
+        let is = |column: u32| s.column.eq(U32x8::splat(column));
+        let triangle = is(4).select(F32x8::from_bits(U32x8::splat(2)), F32x8::ZERO).to_bits();
+        let triangle = U32x8::select(lower | is(4), triangle, U32x8::splat(1));
+        let [u, v] = [lower.select(x - z, x), lower.select(z, z - x)];
+        SourcePoints8 {
+            triangle,
+            weights: [is(5).select(nan, u), v],
+            scale: Vec3x8::splat(PI, PI, PI),
+            active: s.active.and_not(is(6)),
+            ..SourcePoints8::NONE
+        }
+    }
+}
+
+/// The floor is black, and a light that no ray meets shines on it: the samples bring its irradiance all the same. Killed
+/// by: a vertex with the surface's own reflectance, points of other triangles or lanes, a sample without a point that is
+/// not counted, or leaves a root open (the render would not end), an emitter that counts at its own texels.
+#[test]
+fn points_bring_the_irradiance() {
+    let mut scene = SceneDescription { camera: look([0.0, 3.0, 4.0], [0.0; 3], 40.0, [8, 8]), ..Default::default() };
+    let floor = scene.add_material("floor", grey(0.0));
+    add_quad(&mut scene, "floor", floor, facing_y(1.0, 0.0, 1.0));
+    scene.emitters.push(Emitter::Area { material: floor, radiance: [5.0; 3] });
+    scene.emitters.push(Emitter::Point { position: [0.5, 1.0, 0.25], intensity: [1.0, 2.0, 3.0] });
+    let bytes = blob(&scene);
+    for strategy in ["classic", "fixed:2.5", "ears"] {
+        let pixels = render(&bytes, &settings(&bytes, strategy), &[4, 60], Points);
+        for (i, p) in pixels.iter().enumerate() {
+            let (column, row) = (i % 8, i / 8);
+            assert_eq!(p.samples, 64);
+            // the mean over the pixel, by the midpoint rule; a pixel's first column and row are at x = -1, z = 1
+            let n = 16;
+            let at = |c: usize, k: usize| (c as f64 + (k as f64 + 0.5) / n as f64) / 4.0 - 1.0;
+            let irradiance = |(x, z): (f64, f64)| (1.0 + (x - 0.5).powi(2) + (-z - 0.25).powi(2)).powf(-1.5);
+            let sum: f64 = (0..n * n).map(|k| irradiance((at(column, k % n), at(row, k / n)))).sum();
+            let mean = if (4..7).contains(&column) { 0.0 } else { sum / (n * n) as f64 };
+            for (c, (x, variance)) in p.mean().into_iter().zip(p.variance_of_mean()).enumerate() {
+                let expected = mean * (c + 1) as f64;
+                // the choice between two lights is the noise
+                assert!(
+                    (x - expected).abs() <= 5.5 * variance.sqrt() + 1e-6 * expected,
+                    "{strategy}: {i} has {x}, {expected}"
+                );
+                assert!(variance.sqrt() <= 0.3 * expected);
             }
         }
     }

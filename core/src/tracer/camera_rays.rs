@@ -98,15 +98,32 @@ impl CameraCursor {
     }
 }
 
-/// Up to eight camera rays of shard `index`; none when the cursor ran out within empty slots.
+/// Up to eight camera samples that begin.
+pub(super) struct CameraSamples8 {
+    /// Lanes with a sample, the first `count`.
+    pub asked: Mask8,
+    pub count: u64,
+    /// What an extension is told of them.
+    pub pixels: PixelSamples8,
+    /// Times of the samples, drawn if anything moves.
+    pub time: F32x8,
+    /// Whose samples these are.
+    pub path: Path8,
+    /// Keys of their first vertices.
+    pub key: Key8,
+    /// See [`PixelTarget::error_weight`].
+    pub error_weight: Vec3x8,
+}
+
+/// The next camera samples of shard `index`; none when the cursor ran out within empty slots.
 #[inline(always)]
-pub(crate) fn camera_rays<W: World>(
+pub(super) fn camera_samples<W: World>(
     world: &W,
     job: &Job,
     index: u32,
     cursor: &mut CameraCursor,
     book: &mut Bookkeeping<'_>,
-) -> RayState8 {
+) -> CameraSamples8 {
     let (settings, tiles, learned, iteration) = (&job.settings, &job.tiles, world.learned(), world.iteration());
     // numbers of one pixel must not come back in another iteration, however many samples it had
     let (seed, first_sample) = match settings.adaptive {
@@ -137,17 +154,8 @@ pub(crate) fn camera_rays<W: World>(
     let px = F32x8::from_fn(|i| x[i] as f32) + u0;
     let py = F32x8::from_fn(|i| y[i] as f32) + u1;
     let asked = Mask8::first(lanes);
-    let source = if W::Extension::RAYS {
-        let (column, row) = (U32x8::new(x), U32x8::new(y));
-        let (position, u) = ([px, py], [u2, u3]);
-        let samples = PixelSamples8 { size: settings.size, column, row, position, u, active: asked };
-        let source = world.extension().rays(world.scene(), &samples);
-        SourceRays8 { active: source.active & asked, ..source }
-    } else {
-        let (origin, direction) = through_lens(world, settings.size, [px, py], [u2, u3]);
-        SourceRays8 { origin, direction, weight: Vec3x8::ONE, active: asked }
-    };
-    let (o, d, active) = (source.origin, source.direction, source.active);
+    let (column, row) = (U32x8::new(x), U32x8::new(y));
+    let (position, u) = ([px, py], [u2, u3]);
     let mut time = F32x8::ZERO;
     if moves::<W>(world.scene()) {
         time = key.time();
@@ -155,31 +163,61 @@ pub(crate) fn camera_rays<W: World>(
             book.roots.get(*root).time = time;
         }
     }
-    let path = Path8 { root: U32x8::new(root), record: U32x8::new(record), depth: U32x8::splat(1) };
-    if W::Extension::RAYS {
-        book.close_lanes(asked.and_not(active), &path);
+    CameraSamples8 {
+        asked,
+        count: lanes as u64,
+        pixels: PixelSamples8 { size: settings.size, column, row, position, u, active: asked },
+        time,
+        path: Path8 { root: U32x8::new(root), record: U32x8::new(record), depth: U32x8::splat(1) },
+        key: key.next_vertex(),
+        error_weight: Vec3x8::from_fn(|i| weight[i]),
     }
-    book.counters.camera_rays += if W::Extension::RAYS { active.count().into() } else { lanes as u64 };
+}
+
+/// Up to eight camera rays of shard `index`; none when the cursor ran out within empty slots.
+#[inline(always)]
+pub(crate) fn camera_rays<W: World>(
+    world: &W,
+    job: &Job,
+    index: u32,
+    cursor: &mut CameraCursor,
+    book: &mut Bookkeeping<'_>,
+) -> RayState8 {
+    let s = camera_samples(world, job, index, cursor, book);
+    let source = if W::Extension::RAYS {
+        let source = world.extension().rays(world.scene(), &s.pixels);
+        SourceRays8 { active: source.active & s.asked, ..source }
+    } else {
+        let (origin, direction) = through_lens(world, s.pixels.size, s.pixels.position, s.pixels.u);
+        SourceRays8 { origin, direction, weight: Vec3x8::ONE, active: s.asked }
+    };
+    let (o, d, active) = (source.origin, source.direction, source.active);
+    if W::Extension::RAYS {
+        book.close_lanes(s.asked.and_not(active), &s.path);
+    }
+    book.counters.camera_rays += s.count;
     RayState8 {
         active,
-        ray: Ray8::unbounded(o, d).at(time),
+        ray: Ray8::unbounded(o, d).at(s.time),
         from: o,
         normal: Vec3x8::ZERO,
         travelled: F32x8::ZERO,
-        media: if W::EFFECTS.contains(Effects::MEDIA) {
-            MediaSet8::splat(world.camera_media())
-        } else {
-            MediaSet8::NONE
-        },
+        media: camera_media(world),
         beta: source.weight,
         weight: source.weight,
         pdf: F32x8::ONE,
         skip_mis: Mask8::all_lanes(),
-        path,
-        key: key.next_vertex(),
+        path: s.path,
+        key: s.key,
         albedo_product: F32x8::ONE,
-        error_weight: Vec3x8::from_fn(|i| weight[i]),
+        error_weight: s.error_weight,
     }
+}
+
+/// The media in which camera samples begin.
+#[inline(always)]
+pub(super) fn camera_media<W: World>(world: &W) -> MediaSet8 {
+    if W::EFFECTS.contains(Effects::MEDIA) { MediaSet8::splat(world.camera_media()) } else { MediaSet8::NONE }
 }
 
 /// Rays of the scene's camera through points of the picture: origins and unit directions.

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `pipeline` | all stages in order |
 //! | `refill`, `camera_rays` | what fills a packet: samples of waiting vertices, or camera samples |
+//! | `points` | camera samples that begin at surfaces |
 //! | `nee`, `occlude` | next event estimation: light samples, their shadow rays |
 //! | `scatter` | BSDF samples and values |
 //! | `trace` | closest hits |
@@ -37,6 +38,7 @@ mod packets;
 mod passing;
 mod path;
 mod pipeline;
+mod points;
 mod refill;
 mod relief;
 mod ring;

@@ -10,6 +10,8 @@
 //!    +------------------------------------ settle <-- roulette <-- aov <----------------------------------+
 //! ```
 //!
+//! Camera samples of an extension that has points in place of rays (`points.rs`) join at `aov`.
+//!
 //! `medium` and `pass` are compiled in with effects that call for them. Waiting rays stopped in a medium, or passed what
 //! they met (`passing.rs`). A collision in a medium is a vertex without a surface: it joins behind `pass`.
 //!
@@ -25,6 +27,7 @@ use super::nee::{sample_lights, shadow_rays};
 use super::occlude::occlude;
 use super::packets::RayKind;
 use super::passing::{pass, straight_rays};
+use super::points::begin_at_points;
 use super::refill::{Refill, refill, samples};
 use super::roulette::roulette;
 use super::scatter::scatter;
@@ -32,6 +35,7 @@ use super::settle::settle;
 use super::shading::{albedo, may_pass, moves, places, shade};
 use super::state::State;
 use super::trace::trace;
+use crate::extension::Extension;
 use crate::geometry::SurfaceHit8;
 use crate::scene::Effects;
 use crate::world::World;
@@ -43,6 +47,10 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
     let settings = &job.settings;
 
     let filled = refill(cursor, ring, book);
+    if W::Extension::POINTS && matches!(filled, Refill::Camera) {
+        begin_at_points(world, job, index, state);
+        return true;
+    }
     let kind = match filled {
         Refill::Done => return false,
         Refill::Camera => RayKind::Camera,

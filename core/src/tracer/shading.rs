@@ -106,18 +106,7 @@ impl Materials8 {
         let mut reflectance = Vec3x8::from_fn(|i| reflectance[i]);
         let mut straight = F32x8::ZERO;
         let [wa, wb, wc] = hit.weights();
-        let mut ns = ng;
-        if W::EFFECTS.contains(Effects::SMOOTH_NORMALS) && hit.smooth.any() {
-            let n = |k: usize| hit.of_vertex(scene, k, |v| v.n);
-            let mut sum = n(0) * wa + n(1) * wb + n(2) * wc;
-            if places::<W>(scene) {
-                sum = geometry::place_normals(scene, hit.instance, hit.time, sum, hit.placed());
-            }
-            let len = sum.length();
-            // opposite normals may cancel: then the triangle's own serves (NUMERICS FRM-3)
-            let ok = hit.smooth & len.gt(F32x8::splat(1e-6));
-            ns = Vec3x8::select(ok, sum / len, ng);
-        }
+        let mut ns = interpolated_normals::<W>(scene, hit, ng);
         if W::EFFECTS.contains(Effects::TEXTURES) && textured != 0 {
             let uv = |k: usize| hit.of_vertex(scene, k, |v| [v.uv[0], v.uv[1], 0.0]);
             let at = uv(0) * wa + uv(1) * wb + uv(2) * wc;
@@ -162,6 +151,24 @@ impl Materials8 {
         }
         Self { kind, reflectance, ns, scatters, straight }
     }
+}
+
+/// Unit shading normals, as vertices have them; `ng` are the normals by winding.
+#[inline(always)]
+pub(super) fn interpolated_normals<W: World>(scene: &Scene<'_>, hit: &SurfaceHit8, ng: Vec3x8) -> Vec3x8 {
+    if !W::EFFECTS.contains(Effects::SMOOTH_NORMALS) || hit.smooth.none() {
+        return ng;
+    }
+    let [wa, wb, wc] = hit.weights();
+    let n = |k: usize| hit.of_vertex(scene, k, |v| v.n);
+    let mut sum = n(0) * wa + n(1) * wb + n(2) * wc;
+    if places::<W>(scene) {
+        sum = geometry::place_normals(scene, hit.instance, hit.time, sum, hit.placed());
+    }
+    let len = sum.length();
+    // opposite normals may cancel: then the triangle's own serves (NUMERICS FRM-3)
+    let ok = hit.smooth & len.gt(F32x8::splat(1e-6));
+    Vec3x8::select(ok, sum / len, ng)
 }
 
 /// Reflectances that the host's extension makes of those of materials and texture files.

@@ -110,6 +110,15 @@ pub struct Baked {
     pub report: BakeReport,
 }
 
+/// Index in the description of each triangle of the blob, in the blob's order: triangles without area are left out, and
+/// those of prototypes follow those of the world.
+///
+/// # Errors
+/// Prototypes and instances that cannot be baked.
+pub fn triangle_order(scene: &SceneDescription) -> Result<Vec<u32>, BakeError> {
+    Ok(geometry::order(scene, &instances::plan(scene)?.runs))
+}
+
 /// Bakes a scene. `progress` hears of each stage at its start (0) and end (1).
 ///
 /// The blob depends on the description and the options only: the same input gives the same bytes.

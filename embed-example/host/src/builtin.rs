@@ -8,7 +8,8 @@ use crate::description::*;
 use std::collections::HashMap;
 
 /// Reflectances and light of the Cornell box (Goral et al. 1984, in the usual RGB approximation), 2 x 2 x 2 units with
-/// the floor at y = 0, open towards the camera; a metal sphere and a glass one stand in it.
+/// the floor at y = 0, open towards the camera; a metal sphere and a glass one stand in it. Each wall has texture coordinates of its own, from 0 to
+/// 1, for lightmaps.
 ///
 /// ```
 /// let scene = croupier_host::builtin::cornell_box();
@@ -53,8 +54,9 @@ pub fn cornell_box() -> SceneDescription {
         ("lamp", lamp, [[-0.24, 1.998, -0.22], [0.23, 1.998, -0.22], [0.23, 1.998, 0.16], [-0.24, 1.998, 0.16]]),
     ];
     for (name, material, corners) in walls {
-        let vertices = corners.map(|position| Vertex { position, ..Vertex::default() });
-        scene.add_mesh(name, material, &vertices, &[[0, 1, 2], [0, 2, 3]], false);
+        let uv = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let vertex = |k: usize| Vertex { position: corners[k], uv: uv[k], ..Vertex::default() };
+        scene.add_mesh(name, material, &[0, 1, 2, 3].map(vertex), &[[0, 1, 2], [0, 2, 3]], false);
     }
     add_sphere(&mut scene, "metal sphere", metal, [-0.42, 0.4, -0.35], 0.4);
     add_sphere(&mut scene, "glass sphere", glass, [0.45, 0.4, 0.3], 0.4);

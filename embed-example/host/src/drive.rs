@@ -15,9 +15,11 @@ pub use result::{CacheRecord, IterationRecord, Rendered};
 use crate::blob::AlignedBytes;
 use crate::checkpoint::{self, Schedule};
 use croupier::unstable::Phase;
-use croupier::unstable::accel::Intersector;
+use croupier::unstable::accel::WideBvh;
+use croupier::unstable::extension::Extension;
 use croupier::unstable::film::Aov;
 use croupier::unstable::learn::cache::{Cache, CacheError};
+use croupier::unstable::light::PowerSelector;
 use croupier::unstable::profile::{AnyProfile, Profile, ProfileVisitor};
 use croupier::unstable::rrs::Space;
 use croupier::{
@@ -104,6 +106,17 @@ pub fn drive_with<P: Profile + Send + Sync>(
     options: &Options<'_>,
     observer: &dyn Observer,
 ) -> Result<Rendered, DriveError> {
+    drive_extended::<P, ()>(scene, (), options, observer)
+}
+
+/// Renders a validated scene with profile `P` and an extension: from other rays or points than the camera's, for
+/// instance. A checkpoint does not know the extension: it must be that of the render that wrote it.
+pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
+    scene: Scene<'_>,
+    extension: X,
+    options: &Options<'_>,
+    observer: &dyn Observer,
+) -> Result<Rendered, DriveError> {
     let settings = &options.settings;
     if options.cache.is_some() || options.save_cache {
         needs_cache(settings)?;
@@ -113,7 +126,7 @@ pub fn drive_with<P: Profile + Send + Sync>(
     let mut shared = block(plan.session().size)?;
     let mut blocks = (0..settings.shards).map(|i| block(plan.shard_of(i).size)).collect::<Result<Vec<_>, _>>()?;
     let saved = options.resume.map(|path| checkpoint::read(path, scene.hash, settings, shared.as_mut())).transpose()?;
-    let builder = || Session::builder(scene).profile::<P>();
+    let builder = || Session::builder(scene).profile::<P>().extension(extension);
     let mut session = match &saved {
         Some(_) => builder().resume(&plan, shared.as_mut())?,
         None => builder().build(&plan, shared.as_mut())?,
@@ -273,8 +286,8 @@ fn save(cache: &Cache<'_>) -> Result<Vec<u8>, CacheError> {
 }
 
 /// Ends an iteration that has begun at `begun` and is traced.
-fn end_iteration<P: Profile, I: Intersector>(
-    session: &mut Session<'_, '_, P, I>,
+fn end_iteration<'s, P: Profile, X: Extension>(
+    session: &mut Session<'s, '_, P, WideBvh<'s>, PowerSelector<'s>, X>,
     shards: &[Shard<'_>],
     begun: Instant,
 ) -> Result<IterationRecord, SessionError> {
@@ -308,8 +321,8 @@ fn end_iteration<P: Profile, I: Intersector>(
 }
 
 /// One iteration over all shards.
-struct Run<'a, 's, 'm, P: Profile, I: Intersector> {
-    session: &'a Session<'s, 'm, P, I>,
+struct Run<'a, 's, 'm, P: Profile, X: Extension> {
+    session: &'a Session<'s, 'm, P, WideBvh<'s>, PowerSelector<'s>, X>,
     observer: &'a dyn Observer,
     start: Instant,
     /// Iterations before this one, and the last of them.
@@ -320,7 +333,7 @@ struct Run<'a, 's, 'm, P: Profile, I: Intersector> {
     rays: AtomicU64,
 }
 
-impl<P: Profile + Sync, I: Intersector + Sync> Run<'_, '_, '_, P, I> {
+impl<P: Profile + Sync, X: Extension + Sync> Run<'_, '_, '_, P, X> {
     /// `true` if the observer stopped it.
     fn all(&self, shards: &mut [Shard<'_>]) -> bool {
         let stopped: Vec<bool> = shards.par_iter_mut().map(|s| self.one(s)).collect();

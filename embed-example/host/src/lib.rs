@@ -12,6 +12,7 @@
 //! | [`drive`] | memory, threads, iterations around the core | files |
 //! | [`checkpoint`] | files that a render goes on from | how light is transported |
 //! | [`render`] | options in, pictures with layers out | how light is transported |
+//! | [`lightmap`], [`probes`] | irradiance of surfaces texel by texel, radiance at points as spherical harmonics | files |
 //! | [`memory`] | bytes of a render against those of the machine | files of scenes |
 //! | [`statistics`] | figures of a render as tables | files |
 //! | [`image`], [`tonemap`], [`false_color`] | EXR and PNG | scenes |
@@ -33,13 +34,16 @@ pub mod environment;
 pub mod false_color;
 pub mod flip;
 pub mod image;
+pub mod lightmap;
 pub mod load;
 pub mod look;
 pub mod memory;
 pub mod microfacet;
 pub mod principled;
+pub mod probes;
 pub mod render;
 pub mod renderer;
+mod sides;
 pub mod statistics;
 pub mod text;
 pub mod tonemap;

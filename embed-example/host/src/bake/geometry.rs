@@ -31,6 +31,19 @@ fn unit(n: [f32; 3]) -> [f32; 3] {
     Vec3::from_array(n).as_dvec3().normalize_or_zero().as_vec3().to_array()
 }
 
+/// Does a triangle have an area that `f32` can hold? One without is hit by no ray and has no normal: it is left out.
+fn has_area(corners: &[[f32; 3]; 3]) -> bool {
+    area(corners) >= f32::MIN_POSITIVE
+}
+
+/// Index in the description of each triangle that is taken over, in order; `runs` as for [`bake`].
+pub(super) fn order(scene: &SceneDescription, runs: &[Vec<Range<u32>>]) -> Vec<u32> {
+    let corners =
+        |t: &Triangle| t.vertices.map(|v| scene.vertices.get(v as usize).map_or([f32::NAN; 3], |v| v.position));
+    let taken = |i: &u32| scene.triangles.get(*i as usize).is_some_and(|t| has_area(&corners(t)));
+    runs.iter().flatten().flat_map(Clone::clone).filter(taken).collect()
+}
+
 /// `emission` tells which materials emit, `runs` which triangles make up each object.
 pub(super) fn bake(
     scene: &SceneDescription,
@@ -91,11 +104,11 @@ fn check(scene: &SceneDescription, index: u32, v: &Vertex) -> Result<(), BakeErr
 }
 
 impl Geometry {
-    /// Takes a triangle over unless it has no area that `f32` can hold: no ray hits it, and it has no normal.
+    /// Takes a triangle over unless it has no area.
     fn add(&mut self, t: &Triangle, emits: bool) {
         let corner = t.vertices.map(|v| self.vertices[v as usize]);
         let corners = corner.map(|v| v.p);
-        if area(&corners) < f32::MIN_POSITIVE {
+        if !has_area(&corners) {
             self.dropped_degenerate += 1;
             self.dropped_lights += u32::from(emits);
             return;

@@ -119,7 +119,8 @@ fn numbers<const N: usize>(text: &str, lo: f64, hi: f64) -> Result<[f64; N], Str
     found.ok_or_else(|| format!("need {what}, {lo} to {hi}"))
 }
 
-fn point(text: &str) -> Result<[f64; 3], String> {
+/// A point in the world, such as `1,2.5,-3`.
+pub(crate) fn point(text: &str) -> Result<[f64; 3], String> {
     numbers(text, -1e9, 1e9)
 }
 

@@ -9,14 +9,17 @@ mod checkpoint;
 mod compare;
 mod console;
 mod info;
+mod lightmap;
 mod look;
 mod notes;
 mod output;
+mod probes;
 mod progress;
 mod render;
 mod scene;
 mod settings;
 mod signals;
+mod until;
 mod values;
 
 use clap::{Parser, Subcommand};
@@ -40,6 +43,10 @@ enum Command {
     Bake(bake::Args),
     /// Print what a scene contains, the effects it needs and the memory a render takes
     Info(info::Args),
+    /// Render the irradiance of an object, texel by texel, to an EXR file and a PNG beside it
+    Lightmap(lightmap::Args),
+    /// Render the light at points as spherical harmonics to a JSON file
+    Probes(probes::Args),
     /// Compare an image with a reference: error, bias, perceived difference
     Compare(compare::Args),
 }
@@ -54,6 +61,8 @@ pub(crate) fn run() -> ExitCode {
         Some(Command::Render(args)) => render::run(args.scene.as_deref(), &args.flags),
         Some(Command::Bake(args)) => bake::run(&args).map(done),
         Some(Command::Info(args)) => info::run(&args).map(done),
+        Some(Command::Lightmap(args)) => lightmap::run(&args),
+        Some(Command::Probes(args)) => probes::run(&args),
         Some(Command::Compare(args)) => compare::run(&args).map(done),
     };
     match outcome {

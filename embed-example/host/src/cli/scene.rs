@@ -56,6 +56,13 @@ pub(crate) struct SceneFlags {
     look: LookFlags,
 }
 
+impl SceneFlags {
+    /// Are notes about what is nearly right to be errors?
+    pub(crate) fn is_strict(&self) -> bool {
+        self.strict
+    }
+}
+
 /// A scene that was opened.
 pub(crate) struct Opened {
     pub(crate) bytes: SceneBytes,
@@ -70,16 +77,31 @@ pub(crate) struct Opened {
 /// Opens a scene: a baked `.crp` file, anything that loads and bakes (a folder with `scene.json`, an `.obj`),
 /// `cornell` for the built-in Cornell box, or, without a path, the built-in still life. What had to be assumed, ignored or left out is printed and returned.
 pub(crate) fn open(path: Option<&Path>, flags: &SceneFlags) -> Result<Opened, Box<dyn Error>> {
-    let options = LoadOptions { strict: flags.strict, texture_memory: flags.texture_memory };
-    let baked_file = path.is_some_and(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")));
-    if let Some(path) = path.filter(|_| baked_file) {
-        let flag = if flags.single_scattering { Some("--single-scattering") } else { flags.look.any() };
-        if let Some(flag) = flag {
-            return Err(format!("{}: `{flag}` is for baking, not for baked files", text::path(path)).into());
-        }
-        let exposure = Exposure::Stops(0.0);
-        return Ok(Opened { bytes: map(path)?, notes: Notes::default(), files: vec![path.into()], exposure });
+    let Some(path) = path.filter(|p| is_baked(p)) else { return open_described(path, flags).map(|(_, opened)| opened) };
+    let flag = if flags.single_scattering { Some("--single-scattering") } else { flags.look.any() };
+    if let Some(flag) = flag {
+        return Err(format!("{}: `{flag}` is for baking, not for baked files", text::path(path)).into());
     }
+    let exposure = Exposure::Stops(0.0);
+    Ok(Opened { bytes: map(path)?, notes: Notes::default(), files: vec![path.into()], exposure })
+}
+
+fn is_baked(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp"))
+}
+
+/// [`open`] for anything but baked files, with the description that was baked: it has names.
+pub(crate) fn open_described(
+    path: Option<&Path>,
+    flags: &SceneFlags,
+) -> Result<(SceneDescription, Opened), Box<dyn Error>> {
+    if let Some(path) = path.filter(|p| is_baked(p)) {
+        let path = text::path(path);
+        return Err(
+            format!("{path}: baked files have no names of objects; give the scene that it was baked from").into()
+        );
+    }
+    let options = LoadOptions { strict: flags.strict, texture_memory: flags.texture_memory };
     let (look, notes) = flags.look.look()?;
     let (mut description, mut loaded) = match path {
         Some(path) if !is_cornell(path) => load::load_with(path, &options, &look)?,
@@ -100,7 +122,6 @@ pub(crate) fn open(path: Option<&Path>, flags: &SceneFlags) -> Result<Opened, Bo
         let count = baked.report.dropped_degenerate;
         return Err(about(file)(&format!("none of the {count} triangles has an area: there is nothing to see")).into());
     }
-    drop(description);
     let notes = Notes::of(&loaded, &baked.report);
     notes.print(path);
     let mut files = loaded.files;
@@ -111,7 +132,7 @@ pub(crate) fn open(path: Option<&Path>, flags: &SceneFlags) -> Result<Opened, Bo
         Some(_) if !loaded.framed => Exposure::Stops(0.0),
         _ => Exposure::Auto,
     };
-    Ok(Opened { bytes: SceneBytes::Baked(baked), notes, files, exposure })
+    Ok((description, Opened { bytes: SceneBytes::Baked(baked), notes, files, exposure }))
 }
 
 /// The built-in box, unless there is a file of that name.

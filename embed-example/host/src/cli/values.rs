@@ -12,6 +12,27 @@ pub(crate) fn crp_path(text: &str) -> Result<PathBuf, String> {
     path_ending_in("crp", text)
 }
 
+/// The name of a JSON file.
+pub(crate) fn json_path(text: &str) -> Result<PathBuf, String> {
+    path_ending_in("json", text)
+}
+
+/// Most probes of a grid.
+const MAX_PROBES: u32 = 1 << 18;
+
+/// Three counts, such as `4x3x4`, of a grid that is not too large.
+pub(crate) fn counts(text: &str) -> Result<[u32; 3], String> {
+    let found: Option<Vec<u32>> = text.split('x').map(|n| n.parse().ok().filter(|n| (1..=1024).contains(n))).collect();
+    let found = found.and_then(|v| <[u32; 3]>::try_from(v).ok()).filter(|n| n.iter().product::<u32>() <= MAX_PROBES);
+    found.ok_or_else(|| format!("need NxNxN, each 1 to 1024, and at most {MAX_PROBES} in all"))
+}
+
+/// A share, from 0 to 1.
+pub(crate) fn share(text: &str) -> Result<f32, String> {
+    let found = text.parse::<f32>().ok().filter(|x| (0.0..=1.0).contains(x));
+    found.ok_or_else(|| "need a number from 0 to 1".into())
+}
+
 fn path_ending_in(extension: &str, text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension)) {
