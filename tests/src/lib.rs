@@ -1,5 +1,6 @@
 //! Scalar f64 oracles and statistics shared by the integration tests.
 
+pub mod allocator;
 pub mod blob;
 pub mod bsdf;
 pub mod cache;

@@ -286,6 +286,16 @@ fn refused() {
             vec!["u.png", "take 20.0 KiB to decode, 8.00 KiB of"],
         ),
         (
+            "texture memory of a texture that is made of others",
+            {
+                let mut f = obj("newmtl m\nmap_Pr t.png\n");
+                f.push(("t.png", small_png()));
+                f
+            },
+            vec!["a.obj", "--texture-memory", "24KiB"],
+            vec!["a.mtl: material `m`: roughness and metalness", "take 16.0 KiB to decode, 8.00 KiB of"],
+        ),
+        (
             "a picture larger than memory",
             obj("newmtl m\n"),
             vec!["a.obj", "--size", "32768x32768", "--shards", "65536", "--ring", "1000000", "--rrs", "classic"],

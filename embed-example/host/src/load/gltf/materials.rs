@@ -21,6 +21,7 @@ use super::super::{LoadError, mtl};
 use super::asset::Asset;
 use super::textures::{Slot, Textures, Use};
 use crate::description::{Material, Model, Principled, SceneDescription, TextureRef};
+use crate::text::excerpt;
 use gltf_json::extensions::material::PbrSpecularGlossiness;
 use gltf_json::extensions::texture::TextureTransform;
 use gltf_json::material::{AlphaMode, PbrMetallicRoughness};
@@ -115,7 +116,8 @@ impl Materials {
             Some(i) => {
                 let m = asset.get(&asset.root.materials, i, at, "materials")?;
                 let at = format!("materials[{}]", i.value());
-                let name = m.name.clone().unwrap_or_else(|| at.clone());
+                // an excerpt: each factor makes a material of that name
+                let name = excerpt(m.name.as_ref().unwrap_or(&at)).into_owned();
                 let mut reading = Reading { textures: &mut self.textures, loader, scene, asset, at, set: None };
                 let (material, sigma_a) = reading.material(m, name, factor)?;
                 let set = reading.set;

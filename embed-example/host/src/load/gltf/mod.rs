@@ -31,6 +31,7 @@ use crate::description::{
     Instance, Material, Medium, Model, Object, Projection, Prototype, SceneDescription, Triangle, Vertex,
 };
 use crate::look::{Given, Up};
+use crate::text::excerpt;
 use asset::Asset;
 use croupier::unstable::scene::blob::MAX_MEDIA;
 use glam::{DMat3, DMat4, DVec3};
@@ -152,7 +153,7 @@ fn place(
     }
     for mesh in order {
         let Some(uses) = uses.get(&mesh) else { continue };
-        let at = uses.first().map_or("nodes", |p| p.name.as_str());
+        let at = uses.first().map_or("nodes", |p| &*p.name);
         let primitives = meshes::load(loader, scene, asset, materials, mesh, at)?;
         let triangles: usize = primitives.iter().map(|p| p.triangles.len()).sum();
         if triangles == 0 {
@@ -168,7 +169,7 @@ fn place(
         }
         if instanced {
             let name = asset.root.meshes.get(mesh.value()).and_then(|m| m.name.clone());
-            let name = name.unwrap_or_else(|| format!("meshes[{}]", mesh.value()));
+            let name = name.map_or_else(|| format!("meshes[{}]", mesh.value()), |name| excerpt(&name).into_owned());
             let first = scene.triangles.len() as u32;
             append(scene, &name, &primitives, &Space::Own);
             let prototype = scene.prototypes.len() as u32;
