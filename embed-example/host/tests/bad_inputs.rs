@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::text;
+use common::{hdr, text};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -53,6 +53,11 @@ fn png(width: u32, height: u32, data: &[u8]) -> Vec<u8> {
     writer.write_chunk(png::chunk::IDAT, data).unwrap();
     drop(writer);
     out
+}
+
+/// An environment map of 16 x 16 pixels: 3 KiB.
+fn sky() -> Vec<u8> {
+    hdr(16, 16, |_, _| [1, 1, 1, 128])
 }
 
 /// A complete PNG of 64 x 64 grey pixels.
@@ -296,6 +301,24 @@ fn refused() {
             vec!["a.mtl: material `m`: roughness and metalness", "take 16.0 KiB to decode, 8.00 KiB of"],
         ),
         (
+            "texture memory of an environment map",
+            [obj("newmtl m\n"), vec![("sky.hdr", sky())]].concat(),
+            vec!["a.obj", "--env", "sky.hdr", "--texture-memory", "2KiB"],
+            vec!["sky.hdr, which --env names: 16 x 16 pixels take 3.00 KiB to decode, 2.00 KiB of"],
+        ),
+        (
+            "texture memory of an environment map and a texture",
+            [obj("newmtl m\nmap_Kd t.png\n"), vec![("sky.hdr", sky()), ("t.png", small_png())]].concat(),
+            vec!["a.obj", "--env", "sky.hdr", "--texture-memory", "21KiB"],
+            vec!["t.png", "take 20.0 KiB to decode, 18.0 KiB of"],
+        ),
+        (
+            "an environment map of another case, strictly",
+            [obj("newmtl m\n"), vec![("sky.hdr", sky())]].concat(),
+            vec!["a.obj", "--env", "Sky.hdr", "--strict"],
+            vec!["cannot read Sky.hdr, which --env names"],
+        ),
+        (
             "a picture larger than memory",
             obj("newmtl m\n"),
             vec!["a.obj", "--size", "32768x32768", "--shards", "65536", "--ring", "1000000", "--rrs", "classic"],
@@ -409,13 +432,15 @@ fn replaced_with_a_note() {
     assert_eq!((status, notes.as_str()), (Some(0), ""));
 }
 
-/// No output is a file that was read, under any name. Killed by: a comparison of texts, of the scene's file alone, or
-/// of names where a file has two.
+/// No output is a file that was read, under any name. Killed by: a comparison of texts, of the scene's file alone, of
+/// names where a file has two, or of a name as it was typed where a file of another case was read.
 #[test]
 fn inputs_are_never_written() {
     let files = || {
         let mut files = obj("newmtl m\nmap_Kd wood.png\n");
         files.push(("wood.png", small_png()));
+        // told by its first bytes
+        files.push(("sky.exr", sky()));
         files
     };
     let check = |make_links: &dyn Fn(&Path), arguments: &[&str], parts: &[&str]| {
@@ -438,6 +463,7 @@ fn inputs_are_never_written() {
     check(&|_| (), &render(&["-o", "x.exr", "--cache-out", "a.obj"]), &["cannot write a.obj", "which was read"]);
     check(&|_| (), &render(&["-o", "x.exr", "--cache-out", "./a.mtl"]), &["cannot write ./a.mtl: it is a.mtl"]);
     check(&|_| (), &render(&["-o", "x.exr", "--checkpoint", "a.obj"]), &["cannot write a.obj", "which was read"]);
+    check(&|_| (), &render(&["-o", "sky.exr", "--env", "Sky.EXR"]), &["cannot write sky.exr: it is sky.exr, which was"]);
     check(&|_| (), &render(&["-o", "x.exr", "--cache-out", "./x.png"]), &["cannot write ./x.png: two outputs"]);
     check(
         &|d| fs::hard_link(d.join("wood.png"), d.join("x.png")).unwrap(),

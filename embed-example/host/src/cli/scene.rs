@@ -70,7 +70,7 @@ pub(crate) struct Opened {
 /// Opens a scene: a baked `.crp` file, anything that loads and bakes (a folder with `scene.json`, an `.obj`),
 /// `cornell` for the built-in Cornell box, or, without a path, the built-in still life. What had to be assumed, ignored or left out is printed and returned.
 pub(crate) fn open(path: Option<&Path>, flags: &SceneFlags) -> Result<Opened, Box<dyn Error>> {
-    let options = LoadOptions { strict: flags.strict, texture_memory: flags.texture_memory };
+    let mut options = LoadOptions { strict: flags.strict, texture_memory: flags.texture_memory };
     let baked_file = path.is_some_and(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("crp")));
     if let Some(path) = path.filter(|_| baked_file) {
         let flag = if flags.single_scattering { Some("--single-scattering") } else { flags.look.any() };
@@ -80,7 +80,7 @@ pub(crate) fn open(path: Option<&Path>, flags: &SceneFlags) -> Result<Opened, Bo
         let exposure = Exposure::Stops(0.0);
         return Ok(Opened { bytes: map(path)?, notes: Notes::default(), files: vec![path.into()], exposure });
     }
-    let (look, notes) = flags.look.look()?;
+    let (look, environment) = flags.look.look(&mut options)?;
     let (mut description, mut loaded) = match path {
         Some(path) if !is_cornell(path) => load::load_with(path, &options, &look)?,
         _ => {
@@ -89,7 +89,7 @@ pub(crate) fn open(path: Option<&Path>, flags: &SceneFlags) -> Result<Opened, Bo
             (scene, LoadReport { notes, ..LoadReport::default() })
         }
     };
-    loaded.notes.extend(notes);
+    loaded.notes.extend(environment.notes);
     if flags.single_scattering {
         description.materials.iter_mut().for_each(|m| m.compensated = false);
     }
@@ -104,7 +104,7 @@ pub(crate) fn open(path: Option<&Path>, flags: &SceneFlags) -> Result<Opened, Bo
     let notes = Notes::of(&loaded, &baked.report);
     notes.print(path);
     let mut files = loaded.files;
-    files.extend(flags.look.files());
+    files.extend(environment.files);
     let exposure = match path {
         // its area light brings the walls to about a fifth of white
         Some(path) if is_cornell(path) => Exposure::Stops(1.0),
