@@ -12,6 +12,7 @@ pub mod imports;
 pub mod jacobian;
 pub mod light_oracle;
 pub mod light_scene;
+pub mod loading;
 pub mod math;
 pub mod media_flights;
 pub mod media_oracle;

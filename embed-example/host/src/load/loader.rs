@@ -1,7 +1,8 @@
 //! What the files of one scene share while it is loaded.
 
 use super::error::LoadError;
-use super::{files, images};
+use super::files;
+use super::images::{self, Decoded};
 use crate::description::{Encoding, Environment, SceneDescription, Texture, Wrap};
 use crate::look::Given;
 use crate::text;
@@ -155,7 +156,7 @@ impl Loader {
             read => read?,
         };
         let wrong = |what| LoadError::image(&found, referrer, what);
-        let image = images::texture(&bytes, self.free()).map_err(wrong)?;
+        let image = self.decode(&bytes).map_err(wrong)?;
         if let Some(what) = image.ignored {
             self.replace(wrong(what.into()), "the picture was taken without that")?;
         }
@@ -168,11 +169,9 @@ impl Loader {
         Ok(Some(index))
     }
 
-    /// A PNG or JPEG that is in memory; the error is a text.
-    pub(super) fn decode(&mut self, bytes: &[u8]) -> Result<Texture, String> {
-        let image = images::texture(bytes, self.free())?.texture;
-        self.charge(&image);
-        Ok(image)
+    /// A PNG or JPEG that is in memory; the error is a text. Whoever keeps it has to [`Self::charge`] it.
+    pub(super) fn decode(&self, bytes: &[u8]) -> Result<Decoded, String> {
+        images::texture(bytes, self.free())
     }
 
     /// The environment map in `path`, unscaled and unrotated.

@@ -123,11 +123,7 @@ fn starts(path: &Path, is: fn(&[u8]) -> bool) -> bool {
 /// # Errors
 /// Files that cannot be read, are no such map or larger than [`LoadOptions::texture_memory`]; if the options are strict,
 /// also one that is there in another case only.
-pub fn environment(
-    path: &Path,
-    referrer: &str,
-    options: &LoadOptions,
-) -> Result<(Environment, LoadReport), LoadError> {
+pub fn environment(path: &Path, referrer: &str, options: &LoadOptions) -> Result<(Environment, LoadReport), LoadError> {
     let mut loader = Loader::new(*options, path.parent().unwrap_or(Path::new("")));
     let map = loader.environment(path, referrer)?;
     Ok((map, loader.report))

@@ -112,13 +112,7 @@ fn quaternion(q: [f32; 4]) -> DQuat {
 }
 
 /// Places of a node's mesh: one, or those of `EXT_mesh_gpu_instancing`. There are `others` in the scene already.
-fn instances(
-    asset: &Asset<'_>,
-    node: &Node,
-    world: DMat4,
-    at: &str,
-    others: usize,
-) -> Result<Vec<DMat4>, LoadError> {
+fn instances(asset: &Asset<'_>, node: &Node, world: DMat4, at: &str, others: usize) -> Result<Vec<DMat4>, LoadError> {
     let room = |count: usize| {
         let most = asset.most_placements();
         let what = || format!("more than {most} meshes in the scene, in a document of its size");
