@@ -3,15 +3,10 @@
 
 mod common;
 
-use common::{hdr, text};
+use common::{croupier, hdr, text};
 use croupier::Scene;
 use croupier::unstable::scene::blob::{CameraKind, LightKind};
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn croupier(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_croupier")).args(arguments).current_dir(folder).output().unwrap()
-}
 
 const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 const SCENE: &str = r#"{ "geometry": { "file": "t.obj" }, "materials": { "m": { "type": "diffuse", "reflectance": [0.5, 0.5, 0.5] } },
