@@ -1,5 +1,6 @@
 //! Scalar f64 oracles and statistics shared by the integration tests.
 
+pub mod allocator;
 pub mod blob;
 pub mod bsdf;
 pub mod cache;
@@ -11,6 +12,7 @@ pub mod imports;
 pub mod jacobian;
 pub mod light_oracle;
 pub mod light_scene;
+pub mod loading;
 pub mod math;
 pub mod media_flights;
 pub mod media_oracle;

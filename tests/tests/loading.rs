@@ -5,6 +5,7 @@ use croupier_host::description::*;
 use croupier_host::image::Picture;
 use croupier_host::load::{LoadError, LoadOptions, LoadReport, load, load_with};
 use croupier_host::look::Look;
+use croupier_tests::loading::{jpeg, plain_look};
 use croupier_tests::stats::SplitMix;
 use std::fs;
 use std::path::Path;
@@ -26,8 +27,7 @@ fn load_obj(obj: &str, mtl: &str) -> (SceneDescription, LoadReport) {
 
 /// Loads without adding ground, sun and sky.
 fn plain(path: &Path) -> Result<(SceneDescription, LoadReport), LoadError> {
-    let environment = Some(Environment::Constant { radiance: [1.0; 3] });
-    load_with(path, &LoadOptions::default(), &Look { without_ground: true, environment, ..Look::default() })
+    load_with(path, &LoadOptions::default(), &plain_look())
 }
 
 fn positions(scene: &SceneDescription, triangle: usize) -> [[f32; 3]; 3] {
@@ -194,51 +194,6 @@ fn png_kinds_become_rgba() {
         assert_eq!((t.width, t.height, t.texels.as_slice()), (2, 1, wanted.as_slice()), "{color:?} {depth:?}");
         assert_eq!(scene.materials[0].model.parameters().reflectance, Some(Reflectance::Texture(0)));
     }
-}
-
-/// A baseline JPEG of flat blocks of 8x8 pixels in a row; of each block the value of every channel (grey, or YCbCr).
-fn jpeg(blocks: &[&[u8]]) -> Vec<u8> {
-    let channels = blocks[0].len() as u8;
-    let per_channel = |f: &dyn Fn(u8) -> Vec<u8>| (1..=channels).flat_map(f).collect::<Vec<u8>>();
-    let mut file = vec![0xff, 0xd8];
-    let mut segment = |marker: u8, parts: &[&[u8]]| {
-        let data = parts.concat();
-        file.extend([0xff, marker, 0, data.len() as u8 + 2]);
-        file.extend(data);
-    };
-    // quantised by 1; 8 bits a channel, none subsampled
-    segment(0xdb, &[&[0], &[1; 64]]);
-    segment(0xc0, &[&[8, 0, 8, 0, 8 * blocks.len() as u8, channels], &per_channel(&|c| vec![c, 0x11, 0])]);
-    // codes: lengths of differences are themselves in four bits, the end of a block is one bit of 0
-    segment(0xc4, &[&[0x00, 0, 0, 0, 12], &[0; 12], &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]]);
-    segment(0xc4, &[&[0x10, 1], &[0; 15], &[0]]);
-    segment(0xda, &[&[channels], &per_channel(&|c| vec![c, 0]), &[0, 63, 0]]);
-    let (mut bits, mut last) = (String::new(), [0; 3]);
-    for block in blocks {
-        for (value, last) in block.iter().zip(&mut last) {
-            let mean = 8 * (i32::from(*value) - 128);
-            let difference = mean - std::mem::replace(last, mean);
-            let length = (32 - difference.unsigned_abs().leading_zeros()) as usize;
-            bits += &format!("{length:04b}");
-            if length > 0 {
-                let coded = if difference < 0 { difference + (1 << length) - 1 } else { difference };
-                bits += &format!("{coded:0length$b}");
-            }
-            bits.push('0');
-        }
-    }
-    while bits.len() % 8 > 0 {
-        bits.push('1');
-    }
-    for byte in bits.as_bytes().chunks(8) {
-        let byte = byte.iter().fold(0, |b, bit| b << 1 | (bit - b'0'));
-        file.push(byte);
-        if byte == 0xff {
-            file.push(0);
-        }
-    }
-    file.extend([0xff, 0xd9]);
-    file
 }
 
 /// JPEG textures, whatever their file is called; damaged ones are refused with their name and place, never a panic.

@@ -2,34 +2,13 @@
 
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::description::*;
-use croupier_host::load::{LoadOptions, load, load_with};
-use croupier_host::look::Look;
+use croupier_host::load::load;
+use croupier_tests::loading::{self, corners, positions};
 use croupier_tests::stats::SplitMix;
 use std::fs;
 
-/// Loads bytes under a name; the error as its text, in which the folder is `@`. The environment is a constant, so that no
-/// sky has to be computed.
 fn try_load(name: &str, bytes: &[u8]) -> Result<SceneDescription, String> {
-    let environment = Some(Environment::Constant { radiance: [1.0; 3] });
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join(name), bytes).unwrap();
-    let shown = folder.path().display().to_string();
-    let loaded =
-        load_with(&folder.path().join(name), &LoadOptions::default(), &Look { environment, ..Look::default() });
-    loaded.map(|(scene, _)| without_ground(scene)).map_err(|e| e.to_string().replace(&shown, "@"))
-}
-
-/// The scene as its file has it, without the ground that a bare mesh gets.
-fn without_ground(mut scene: SceneDescription) -> SceneDescription {
-    if let Some(i) = scene.objects.iter().position(|o| o.name == "added ground") {
-        let first = scene.objects[i].first_triangle as usize;
-        let vertices = scene.triangles[first..].iter().flat_map(|t| t.vertices).min().unwrap();
-        scene.vertices.truncate(vertices as usize);
-        scene.triangles.truncate(first);
-        scene.objects.truncate(i);
-        scene.materials.pop();
-    }
-    scene
+    loading::try_load(name, bytes).map(|(scene, _)| scene)
 }
 
 fn loaded(name: &str, bytes: &[u8]) -> SceneDescription {
@@ -37,14 +16,6 @@ fn loaded(name: &str, bytes: &[u8]) -> SceneDescription {
     let baked = bake(&scene, &BakeOptions::default(), |_, _| {}).unwrap_or_else(|e| panic!("{name}: {e}"));
     croupier::Scene::from_bytes(&baked.bytes).unwrap();
     scene
-}
-
-fn corners(scene: &SceneDescription) -> Vec<[Vertex; 3]> {
-    scene.triangles.iter().map(|t| t.vertices.map(|v| scene.vertices[v as usize])).collect()
-}
-
-fn positions(scene: &SceneDescription) -> Vec<[[f32; 3]; 3]> {
-    corners(scene).iter().map(|t| t.map(|v| v.position)).collect()
 }
 
 /// What a PLY file is made of: elements of properties, with values that any type can hold.

@@ -54,7 +54,8 @@ pub struct Options<'a> {
     pub calibrate: bool,
     /// Checkpoints to write while the render runs.
     pub checkpoint: Option<&'a Schedule>,
-    /// Checkpoint of a render of the same scene and settings to go on from.
+    /// Checkpoint of a render of the same scene and settings to go on from. It holds pixel estimate and cache, so that
+    /// neither can be given as well.
     pub resume: Option<&'a Path>,
 }
 
@@ -118,6 +119,7 @@ pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
     observer: &dyn Observer,
 ) -> Result<Rendered, DriveError> {
     let settings = &options.settings;
+    resumes_alone(options.resume, options.cache.is_some(), options.pixel_estimate.is_some())?;
     if options.cache.is_some() || options.save_cache {
         needs_cache(settings)?;
     }
@@ -219,6 +221,15 @@ pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
         cache: used.filter(|_| options.save_cache).map(save).transpose()?,
         calibration: used.filter(|_| options.calibrate).and_then(|c| calibrate::calibrate(c, &scene)),
     })
+}
+
+/// Fails if a checkpoint is to be resumed together with what would replace a part of it.
+pub(crate) fn resumes_alone(resume: Option<&Path>, cache: bool, pixel_estimate: bool) -> Result<(), DriveError> {
+    match resume {
+        Some(_) if cache => Err(DriveError::Resumed("statistics of the scene")),
+        Some(_) if pixel_estimate => Err(DriveError::Resumed("pixel estimate")),
+        _ => Ok(()),
+    }
 }
 
 /// Threads of a render with so many shards: more would have nothing to do.

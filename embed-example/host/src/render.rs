@@ -200,6 +200,7 @@ pub fn check(options: &RenderOptions) -> Result<(), RenderError> {
         settings.max_depth = 1;
     }
     Plan::new(&settings)?;
+    drive::resumes_alone(options.resume.as_deref(), options.cache.is_some(), false)?;
     if options.cache.is_some() || options.save_cache { drive::needs_cache(&settings) } else { Ok(()) }
 }
 

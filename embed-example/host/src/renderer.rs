@@ -125,6 +125,11 @@ struct Shared {
 /// Calls from several threads wait for each other only where they must: steps of different shards run together, a
 /// change of the scene or the end of an iteration waits for the steps that are under way. Small budgets keep those
 /// waits short.
+///
+/// # Deadlocks
+/// Closures given to [`Self::edit`], [`Self::with_film`], [`Self::with_scene`] and [`Self::with_unfinished`] run while the
+/// renderer is locked: one that calls the same renderer may wait for itself for ever. They read or change what they are
+/// given, and return what is needed afterwards.
 pub struct Renderer<P: Profile = Full> {
     plan: Plan,
     shared: RwLock<Shared>,
@@ -193,7 +198,8 @@ impl<P: Profile> Renderer<P> {
     }
 
     /// Changes the scene and begins a new picture of it; an iteration that is under way is abandoned. What the edits of
-    /// `change` take does not depend on the size of the scene, see [`EditableScene::edit`].
+    /// `change` take does not depend on the size of the scene, see [`EditableScene::edit`]. `change` must not call this
+    /// renderer ([Deadlocks](Self#deadlocks)).
     ///
     /// # Errors
     /// The error of `change`; the edits that it made before stay.
@@ -268,14 +274,15 @@ impl<P: Profile> Renderer<P> {
         }
     }
 
-    /// Shows the picture so far.
+    /// Shows the picture so far. `show` must not call this renderer ([Deadlocks](Self#deadlocks)).
     pub fn with_film<T>(&self, show: impl FnOnce(&Film<'_>) -> T) -> T {
         show(read(&self.shared).state.borrow_dependent().film())
     }
 
     /// Shows the pixels of a shard in the iteration under way: calls `show(film index, mean radiance, samples)`, see
     /// [`Shard::for_each_pixel`]. Takes time by the pixels of the shard; waits for a step of it that is under way.
-    /// Nothing is shown of a shard that has not stepped since the scene has changed, or that does not exist.
+    /// Nothing is shown of a shard that has not stepped since the scene has changed, or that does not exist. `show` must
+    /// not call this renderer ([Deadlocks](Self#deadlocks)).
     pub fn with_unfinished(&self, shard: u32, show: impl FnMut(usize, [f64; 3], u32)) {
         let shared = read(&self.shared);
         let Ok(view) = builder::<P>(shared.scene.scene()).view(shared.state.borrow_dependent()) else { return };
@@ -286,7 +293,7 @@ impl<P: Profile> Renderer<P> {
         }
     }
 
-    /// Shows the scene as it is now.
+    /// Shows the scene as it is now. `show` must not call this renderer ([Deadlocks](Self#deadlocks)).
     pub fn with_scene<T>(&self, show: impl FnOnce(&Scene<'_>) -> T) -> T {
         show(&read(&self.shared).scene.scene())
     }

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::text;
+use common::{croupier, text};
 use croupier::{Scene, Settings};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::builtin;
@@ -12,13 +12,7 @@ use croupier_host::drive::{DriveError, Observer, Options, Progress, Rendered, Ta
 use croupier_host::image::Picture;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 use std::sync::atomic::{AtomicU32, Ordering};
-
-/// Runs the program in a folder.
-fn croupier(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_croupier")).args(arguments).current_dir(folder).output().unwrap()
-}
 
 /// Ends a render after so many asks.
 struct After {
@@ -125,6 +119,11 @@ fn other_files_are_refused_by_name() {
     let other = Scene::from_bytes(&other.bytes).unwrap();
     let same_depth = with("max-depth", &settings.max_depth.to_string());
     assert!(error(resume(&good, &same_depth, other)).contains("of another scene (hash "));
+    let own = [("statistics of the scene", Some(&good[..]), None), ("pixel estimate", None, Some(&[[1.0; 3]; 48][..]))];
+    for (what, cache, pixel_estimate) in own {
+        let said = error(resume(&good, &Options { cache, pixel_estimate, ..options }, scene));
+        assert!(said.contains(&format!("a checkpoint has its own {what}")), "{said}");
+    }
     let missing = Options { resume: Some(Path::new("missing")), ..options };
     assert!(error(drive_scene(scene, &missing, &After::new(0))).contains("No such file"));
 

@@ -1,19 +1,13 @@
 //! The program from outside: exit status, one clear line of error, JSON.
 #![cfg(feature = "program")]
 
+mod common;
+
 use bytemuck::{Zeroable, bytes_of};
+use common::{croupier, text};
 use croupier::unstable::scene::blob::{self, ALIGN, Camera, Header, SceneInfo, Section, SectionKind};
 use croupier_host::image::Picture;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn croupier(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_croupier")).args(arguments).current_dir(folder).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
-}
 
 /// Runs a command that must fail with status 1, says nothing on stdout and one line on stderr that holds `parts`.
 fn fails(folder: &Path, arguments: &[&str], parts: &[&str]) {

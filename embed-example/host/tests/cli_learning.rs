@@ -1,21 +1,16 @@
 //! The program's flags about learning, denoising, false colours and statistics, from outside.
 #![cfg(feature = "program")]
 
+mod common;
+
+use common::{croupier, text};
 use croupier::unstable::SettingRange;
 use croupier::{Scene, Settings};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::builtin;
 use croupier_host::image::Picture;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn croupier(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_croupier")).args(arguments).current_dir(folder).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
-}
+use std::process::Output;
 
 /// A render of the built-in box, as small as can be.
 fn render(folder: &Path, arguments: &[&str]) -> Output {

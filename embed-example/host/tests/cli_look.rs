@@ -1,18 +1,12 @@
 //! Flags of camera and light, as a user gives them.
 #![cfg(feature = "program")]
 
+mod common;
+
+use common::{croupier, hdr, text};
 use croupier::Scene;
 use croupier::unstable::scene::blob::{CameraKind, LightKind};
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn croupier(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_croupier")).args(arguments).current_dir(folder).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
 
 const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 const SCENE: &str = r#"{ "geometry": { "file": "t.obj" }, "materials": { "m": { "type": "diffuse", "reflectance": [0.5, 0.5, 0.5] } },
@@ -135,4 +129,38 @@ fn flags_choose_camera_and_light() {
     let read = |name: &str| std::fs::read(dir.join(name)).unwrap();
     assert!(read("auto.exr") == read("0.exr") && read("0.exr") == read("-3.5.exr"), "the EXR is not exposed");
     assert!(read("auto.png") != read("-3.5.png") && read("0.png") != read("-3.5.png"));
+}
+
+/// `--env` with rotation and scale: where the map's right, top and front (+x, +y, +z) are in the world. Killed by: a
+/// rotation that is clockwise, in radians or about y where z is up, one before the map is set upright; a scale or texels
+/// that are lost.
+#[test]
+fn environment_maps_are_turned_and_scaled() {
+    let dir = folder();
+    let dir = dir.path();
+    std::fs::write(dir.join("sky.hdr"), hdr(4, 3, |x, y| if (x, y) == (1, 2) { [128, 64, 0, 131] } else { [0; 4] }))
+        .unwrap();
+    type Case = (&'static str, &'static str, &'static str, [[f32; 3]; 3]);
+    let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let minus = |v: [f32; 3]| v.map(|x| 0.0 - x);
+    let cases: [Case; 4] = [
+        ("y", "0", "1", [x, y, z]),
+        ("y", "90", "0.25", [minus(z), y, x]),
+        ("z", "0", "2", [x, z, minus(y)]),
+        ("z", "90", "1", [y, z, x]),
+    ];
+    for (up, turn, scale, wanted) in cases {
+        let flags = ["--env", "sky.hdr", "--env-rotation", turn, "--env-scale", scale, "--up", up, "--no-ground"];
+        baked(dir, "mesh.obj", &flags, |s| {
+            let e = s.environment.unwrap();
+            assert_eq!((e.width, e.height, e.radiance), (4, 3, [scale.parse().unwrap(); 3]), "{flags:?}");
+            // rows of the map from the world are where its axes are in the world
+            for (found, wanted) in e.to_local.iter().zip(wanted) {
+                assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-6), "{flags:?}: {:?}", e.to_local);
+            }
+            for (i, t) in s.env_texels.iter().enumerate() {
+                assert_eq!(*t, if i == 9 { [4.0, 2.0, 0.0] } else { [0.0; 3] }, "{flags:?}: texel {i}");
+            }
+        });
+    }
 }

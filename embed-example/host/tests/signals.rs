@@ -64,11 +64,12 @@ fn everything_is_saved_after_a_signal() {
     }
 }
 
-/// A second signal ends the program at once, whatever it was doing, and leaves no temporary file. Killed by: a second
-/// signal that is ignored, temporary files that nobody removes.
+/// A second signal ends the program at once, whatever it was doing, and leaves no temporary file: also none that was there
+/// when it came. Killed by: a second signal that is ignored, temporary files that nobody removes.
 #[test]
 fn a_second_signal_ends_it_at_once() {
-    for pause in [0, 5, 20, 60] {
+    let mut seen = 0;
+    for pause in [Some(0), Some(5), Some(20), Some(60), None, None, None] {
         let dir = tempfile::tempdir().unwrap();
         // large files, so that some are being written
         let (mut child, said) = begin(dir.path(), "1200x900", &["--false-color"]);
@@ -79,14 +80,30 @@ fn a_second_signal_ends_it_at_once() {
         while !lines.contains("once more ends the program at once") {
             assert!(notes.read_line(&mut lines).unwrap() > 0, "{lines}");
         }
-        std::thread::sleep(std::time::Duration::from_millis(pause));
-        send(&child, "-TERM");
+        match pause {
+            Some(pause) => std::thread::sleep(std::time::Duration::from_millis(pause)),
+            // until a file is being written, or all are
+            None => loop {
+                if names(dir.path()).iter().any(|n| n.contains(".part")) {
+                    seen += 1;
+                    break;
+                }
+                if child.try_wait().unwrap().is_some() {
+                    break;
+                }
+            },
+        }
+        // a process that has been waited for is no longer there
+        if child.try_wait().unwrap().is_none() {
+            send(&child, "-TERM");
+        }
         drop(said);
         let status = child.wait().unwrap().code();
         // 143, or 130 if everything was written before it came
         assert!(matches!(status, Some(130 | 143)), "{status:?}");
         assert!(names(dir.path()).iter().all(|n| !n.contains(".part")), "{:?}", names(dir.path()));
     }
+    assert!(seen > 0, "no temporary file was seen");
 }
 
 /// Killed by: a handler where the parent process wants a signal ignored (`nohup`).

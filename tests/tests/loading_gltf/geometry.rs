@@ -3,6 +3,8 @@
 use super::document::{Document, FLOAT, I8, I16, U8, U16, U32, base64};
 use super::{corners, loaded, positions, rounded, try_load};
 use croupier_host::description::*;
+use croupier_host::load::{LoadOptions, load_with};
+use croupier_tests::loading::plain_look;
 use serde_json::{Value, json};
 
 const POINTS: [[f64; 3]; 6] =
@@ -181,8 +183,9 @@ fn containers() {
     for (uri, file) in [("my%20file.bin", "my file.bin"), ("sub/a%23.bin", "sub/a#.bin"), ("./b.bin", "b.bin")] {
         std::fs::write(folder.path().join(file), &document.bytes).unwrap();
         std::fs::write(folder.path().join("a.gltf"), document.gltf(uri)).unwrap();
-        let (scene, report) = croupier_host::load::load(&folder.path().join("a.gltf")).unwrap();
-        assert_eq!((positions(&super::without_ground(scene)), report.files.len()), (wanted.clone(), 2));
+        let loaded = load_with(&folder.path().join("a.gltf"), &LoadOptions::default(), &plain_look());
+        let (scene, report) = loaded.unwrap();
+        assert_eq!((positions(&scene), report.files.len()), (wanted.clone(), 2));
     }
 }
 
@@ -226,8 +229,37 @@ fn colors_of_vertices() {
     }
 }
 
+/// Alpha of vertices by alpha mode, on a material of alpha 0.5. Killed by: alpha that is lost, is encoded as colours are,
+/// or meets a cutoff without the material's.
+#[test]
+fn alpha_of_vertices() {
+    let alphas = [0.0, 0.7, 1.0];
+    for (mode, wanted, opacity) in
+        [("OPAQUE", [255; 3], 1.0), ("BLEND", [0, 179, 255], 0.5), ("MASK", [0, 0, 255], 1.0)]
+    {
+        let mut document = Document::default();
+        let position = document.floats(&POINTS[..3]);
+        let color = document.floats(&alphas.map(|a| [0.25, 0.5, 1.0, a]));
+        let pbr = json!({"baseColorFactor": [1, 1, 1, 0.5]});
+        let material =
+            document.push("materials", json!({"alphaMode": mode, "alphaCutoff": 0.4, "pbrMetallicRoughness": pbr}));
+        let attributes = json!({"POSITION": position, "COLOR_0": color});
+        let (scene, _) = loaded(&primitive_of(document, attributes, json!({"material": material})));
+        let material = &scene.materials[scene.triangles[0].material as usize];
+        let Model::Principled(p) = material.model else { panic!("{material:?}") };
+        assert_eq!((material.cutout, p.opacity), (mode != "OPAQUE", opacity), "{mode}");
+        let texture = &scene.textures[p.base_texture.unwrap().texture as usize];
+        for v in corners(&scene)[0] {
+            let x = (v.uv[0] * texture.width as f32 - 0.5).round() as usize;
+            let y = ((1.0 - v.uv[1]) * texture.height as f32 - 0.5).round() as usize;
+            let i = POINTS[..3].iter().position(|p| p.map(|x| x as f32) == v.position).unwrap();
+            assert_eq!(texture.texels[y * texture.width as usize + x][3], wanted[i], "{mode}, vertex {i}");
+        }
+    }
+}
+
 /// Vertices follow their joints; the place of the mesh's own node does not count. Killed by: matrices in the wrong order,
-/// weights that are not divided by their sum, skins that are ignored.
+/// weights that are not divided by their sum, skins that are ignored, a joint that is not there and pulls to the origin.
 #[test]
 fn skins_are_posed() {
     let mut document = Document::default();
@@ -248,4 +280,12 @@ fn skins_are_posed() {
     let (scene, _) = loaded(&document);
     // first joint: + (0, 0, 9); second: x times 3, + (0, 4, 10); last vertex: the mean of both
     assert_eq!(rounded(&positions(&scene)), [[[0.0, 0.0, 9.0], [6.0, 4.0, 10.0], [0.0, 3.0, 10.0]]]);
+    // a joint that the skin does not have, first without weight
+    let at = document.json["accessors"][joints]["bufferView"].as_u64().unwrap() as usize;
+    let at = document.json["bufferViews"][at]["byteOffset"].as_u64().unwrap() as usize;
+    document.bytes[at + 3] = 2;
+    assert_eq!(positions(&loaded(&document).0), positions(&scene));
+    document.bytes[at] = 2;
+    let error = try_load("a.glb", &document.glb()).unwrap_err();
+    assert!(error.contains("skins[0]: a vertex follows its joint 2, there are 2"), "{error}");
 }

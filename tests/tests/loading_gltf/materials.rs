@@ -3,6 +3,8 @@
 use super::document::{Document, FLOAT, png};
 use super::{loaded, try_load};
 use croupier_host::description::*;
+use croupier_host::load::{LoadOptions, load_with};
+use croupier_tests::loading::{jpeg, plain_look, try_load_with};
 use serde_json::{Value, json};
 
 fn material_of(document: &Document) -> (Material, Vec<String>) {
@@ -267,8 +269,50 @@ fn volumes() {
     }
 }
 
-/// Images by URI, missing ones, and ones of extensions. Killed by: a missing file that is an error, a fallback that is
-/// not taken, an extension that is not named.
+/// Solids whose vertices have colours absorb as others do, and copies of a material share a medium; what is closed only
+/// together with something that is an instance is a sheet. Killed by: a copy of the material that is no solid, a boundary
+/// that is not what baking checks.
+#[test]
+fn volumes_of_colors_and_instances() {
+    let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let faces = [[0.0, 2.0, 1.0], [0.0, 1.0, 3.0], [0.0, 3.0, 2.0], [1.0, 2.0, 3.0]];
+    let amber = json!({"name": "amber", "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1},
+        "KHR_materials_volume": {"thicknessFactor": 0.5, "attenuationColor": [0.5, 1, 0], "attenuationDistance": 2}}});
+    let mut document = Document::default();
+    document.push("materials", amber);
+    let position = document.floats(&points);
+    let color = document.floats(&points.map(|[r, g, b]| [r, g, b, 1.0]));
+    let mut part = |faces: &[[f64; 3]], color: Option<usize>| {
+        let indices = document.accessor(super::document::U8, 1, false, faces.as_flattened());
+        let mut attributes = json!({"POSITION": position});
+        if let Some(color) = color {
+            attributes["COLOR_0"] = json!(color);
+        }
+        document.mesh(json!({"attributes": attributes, "indices": indices, "material": 0}))
+    };
+    let [whole, plain, three, one] =
+        [part(&faces, Some(color)), part(&faces, None), part(&faces[..3], None), part(&faces[3..], None)];
+    let mut solid = document.clone();
+    solid.node(json!({ "mesh": whole }));
+    solid.node(json!({"mesh": whole, "translation": [9, 0, 0]}));
+    solid.node(json!({"mesh": plain, "translation": [0, 9, 0]}));
+    let (scene, _) = loaded(&solid);
+    let of = |t: usize| &scene.materials[scene.triangles[t].material as usize];
+    assert_eq!((scene.media.len(), of(0).medium, of(4).medium, of(8).medium), (1, Some(0), Some(0), Some(0)));
+    assert!([0, 4].iter().all(|t| principled(of(*t)).base_texture.is_some() && !principled(of(*t)).thin_walled));
+    // a prototype of three sides, placed often, and the fourth one in the world
+    let mut halves = document.clone();
+    let places = halves.accessor(FLOAT, 3, false, &[0.0; 3 * 1500]);
+    let extension = json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}});
+    halves.node(json!({"mesh": three, "extensions": extension}));
+    halves.node(json!({ "mesh": one }));
+    let (scene, notes) = loaded(&halves);
+    assert_eq!((scene.instances.len(), scene.media.len(), scene.triangles.len()), (1500, 0, 4));
+    assert!(principled(&scene.materials[0]).thin_walled && notes.iter().any(|n| n.contains("thin sheet")), "{notes:?}");
+}
+
+/// Images by URI, missing ones, and ones of extensions. Killed by: a missing file that is an error, or none where the
+/// options are strict; a fallback that is not taken, an extension that is not named.
 #[test]
 fn images() {
     let folder = tempfile::tempdir().unwrap();
@@ -287,10 +331,48 @@ fn images() {
     }
     let (scene, report) = load(json!({"uri": "no.png"}), json!({"source": 0})).unwrap();
     assert!(scene.textures.is_empty() && principled(&scene.materials[0]).base_texture.is_none());
-    assert!(report.notes.iter().any(|n| n.contains("images[0]: there is no file `no.png`")), "{report:?}");
+    let told =
+        |n: &str| n.contains("no.png, which ") && n.contains("(images[0].uri) names") && n.contains("without it");
+    assert!(report.notes.iter().any(|n| told(n)), "{report:?}");
     let basis = json!({"KHR_texture_basisu": {"source": 1}});
     let (scene, _) = load(json!({"uri": "a%20b.png"}), json!({"source": 0, "extensions": basis})).unwrap();
     assert_eq!(scene.textures.len(), 1);
     let error = load(json!({"uri": "a%20b.png"}), json!({ "extensions": basis })).unwrap_err();
     assert!(error.contains("textures[0]: its image is of the extension KHR_texture_basisu"), "{error}");
+    // of another case, with bytes behind the end, and what `strict` says of both
+    std::fs::write(folder.path().join("case.png"), png(1, 1, &[[9, 8, 7, 255]])).unwrap();
+    std::fs::write(folder.path().join("long.jpg"), [jpeg(&[&[200]]), vec![0; 9]].concat()).unwrap();
+    let strict = LoadOptions { strict: true, ..LoadOptions::default() };
+    for (uri, said) in [
+        ("no.png", "(images[0].uri) names"),
+        ("Case.PNG", "(images[0].uri) names"),
+        ("case.png/a.png", "(images[0].uri) names"),
+        ("long.jpg", "images[0]: there are bytes behind the end of the JPEG"),
+    ] {
+        let (_, report) = load(json!({ "uri": uri }), json!({"source": 0})).unwrap();
+        assert!(report.notes.iter().any(|n| n.contains(said)), "{uri}: {report:?}");
+        let error = load_with(&folder.path().join("a.gltf"), &strict, &plain_look()).unwrap_err().to_string();
+        assert!(error.contains(said), "{uri}: {error}");
+    }
+}
+
+/// Texels of which the mean is taken are not kept. Killed by: their bytes counted as those of the next texture.
+#[test]
+fn texture_memory() {
+    let mut document = Document::of_material(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}));
+    let [sheen, base] = [document.texture(16, 16, &[[9; 4]; 256]), document.texture(16, 16, &[[9; 4]; 256])];
+    assert_eq!((sheen, base), (0, 1));
+    let material = &mut document.json["materials"][0];
+    material["extensions"] = json!({"KHR_materials_specular": {"specularTexture": {"index": sheen}}});
+    let second = document.push("materials", json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}));
+    let mesh = document.triangle(Some(second));
+    document.node(json!({"mesh": mesh}));
+    // 8 bytes a texel while one is decoded, 4 of one that stays
+    let load = |texture_memory: u64| {
+        let options = LoadOptions { texture_memory, ..LoadOptions::default() };
+        try_load_with("a.glb", &document.glb(), &options, &plain_look())
+    };
+    assert_eq!(load(256 * 12).unwrap().0.textures.len(), 2);
+    let error = load(256 * 12 - 1).unwrap_err();
+    assert!(error.contains("images[0]: 16 x 16 pixels take 2.00 KiB to decode, 2.00 KiB of"), "{error}");
 }

@@ -53,7 +53,8 @@ fn transformations() {
 }
 
 /// Meshes with many triangles become prototypes, others copies; `EXT_mesh_gpu_instancing` gives a node many places.
-/// Killed by: maps that are transposed, instances of a node without its own map, copies where instances would save.
+/// Killed by: maps that are transposed, instances of a node without its own map, copies where instances would save; a
+/// singular map that refuses the file, or drops triangles that are there or without a note.
 #[test]
 fn instances() {
     let mut document = Document::default();
@@ -81,6 +82,19 @@ fn instances() {
         let rows = [[1.0, 0.0, 0.0, x], [0.0, 2.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
         assert_eq!((instance.to_world, instance.prototype, instance.visible), (rows, 0, true));
         assert_eq!(instance.name, format!("copy {x}"));
+    }
+    // a flat copy is none, and nothing is left of a line
+    for (scale, copies) in [([1, 1, 0], 1), ([0, 0, 0], 0), ([0, 2, 0], 0)] {
+        for mesh in [large, small] {
+            let mut document = document.clone();
+            document.node(json!({"mesh": mesh, "scale": scale, "name": "flat"}));
+            let (flat, notes) = loaded(&document);
+            let more = if mesh == large { n as usize - 2 } else { 1 };
+            assert_eq!(flat.triangles.len(), scene.triangles.len() + copies * more, "{scale:?}");
+            assert_eq!((flat.prototypes.len(), &flat.instances), (1, &scene.instances), "{scale:?}");
+            let told = |n: &&String| n.contains("leave them no area: 1, first `flat`");
+            assert_eq!(notes.iter().filter(told).count(), 1 - copies, "{scale:?}: {notes:?}");
+        }
     }
     // one use is no instance
     let mut single = Document::default();

@@ -1,7 +1,8 @@
 //! Flags of camera and light, for whatever loads.
 
+use croupier::unstable::texture::SRGB_TO_LINEAR;
 use croupier_host::description::Environment;
-use croupier_host::load;
+use croupier_host::load::{self, LoadOptions, LoadReport};
 use croupier_host::look::{Look, Sun, Up};
 use std::error::Error;
 use std::path::PathBuf;
@@ -71,18 +72,17 @@ impl LookFlags {
         given.into_iter().find(|(_, given)| *given).map(|(name, _)| name)
     }
 
-    /// Files that it reads.
-    pub(crate) fn files(&self) -> Option<PathBuf> {
-        self.env.clone()
-    }
-
-    /// The requests for the library, and notes of reading the environment map.
-    pub(crate) fn look(&self) -> Result<(Look, Vec<String>), Box<dyn Error>> {
-        let (mut environment, mut notes) = (None, Vec::new());
+    /// The requests for the library, and the report of reading the environment map, whose bytes no longer count as free
+    /// in `options`.
+    pub(crate) fn look(&self, options: &mut LoadOptions) -> Result<(Look, LoadReport), Box<dyn Error>> {
+        let (mut environment, mut report) = (None, LoadReport::default());
         if let Some(path) = &self.env {
-            let (map, found) = load::environment(path)?;
+            let (map, loaded) = load::environment(path, "--env", options)?;
+            if let Environment::Map { texels, .. } = &map {
+                options.texture_memory = options.texture_memory.saturating_sub(12 * texels.len() as u64);
+            }
             environment = Some(self.placed(map));
-            notes = found;
+            report = loaded;
         }
         if let Some(Color(radiance)) = self.background {
             environment = Some(Environment::Constant { radiance });
@@ -97,7 +97,7 @@ impl LookFlags {
             environment,
             without_ground: self.no_ground,
         };
-        Ok((look, notes))
+        Ok((look, report))
     }
 
     /// The map, turned and scaled; y is up.
@@ -163,10 +163,5 @@ fn color(text: &str) -> Result<Color, String> {
         return Err(need.into());
     }
     let value = u32::from_str_radix(hex, 16).map_err(|_| need)?;
-    Ok(Color([16, 8, 0].map(|shift| linear((value >> shift & 255) as f32 / 255.0))))
-}
-
-/// The inverse of the sRGB transfer function.
-fn linear(x: f32) -> f32 {
-    if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+    Ok(Color([16, 8, 0].map(|shift| SRGB_TO_LINEAR[(value >> shift & 255) as usize])))
 }

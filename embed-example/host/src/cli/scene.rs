@@ -101,8 +101,8 @@ pub(crate) fn open_described(
             format!("{path}: baked files have no names of objects; give the scene that it was baked from").into()
         );
     }
-    let options = LoadOptions { strict: flags.strict, texture_memory: flags.texture_memory };
-    let (look, notes) = flags.look.look()?;
+    let mut options = LoadOptions { strict: flags.strict, texture_memory: flags.texture_memory };
+    let (look, environment) = flags.look.look(&mut options)?;
     let (mut description, mut loaded) = match path {
         Some(path) if !is_cornell(path) => load::load_with(path, &options, &look)?,
         _ => {
@@ -111,7 +111,7 @@ pub(crate) fn open_described(
             (scene, LoadReport { notes, ..LoadReport::default() })
         }
     };
-    loaded.notes.extend(notes);
+    loaded.notes.extend(environment.notes);
     if flags.single_scattering {
         description.materials.iter_mut().for_each(|m| m.compensated = false);
     }
@@ -125,7 +125,7 @@ pub(crate) fn open_described(
     let notes = Notes::of(&loaded, &baked.report);
     notes.print(path);
     let mut files = loaded.files;
-    files.extend(flags.look.files());
+    files.extend(environment.files);
     let exposure = match path {
         // its area light brings the walls to about a fifth of white
         Some(path) if is_cornell(path) => Exposure::Stops(1.0),

@@ -1,8 +1,9 @@
 //! Signals that ask the program to end: SIGINT (Ctrl-C), SIGTERM and SIGHUP.
 //!
-//! While a render runs or its files are written, the first one ends the render soon, and everything is saved. Any other
-//! one ends the program at once, without temporary files left behind. Both ways the exit status is 128 plus the number
-//! of the signal. Signals that the parent process has set to be ignored (`nohup`, jobs in the background of a script)
+//! While a render runs, the first one ends it soon, and everything is saved; the exit status is 128 plus the number of the
+//! signal. While the files of a render that is complete are written, the first one changes nothing, and the status is 0.
+//! Any other one ends the program at once, without temporary files left behind, with the status 128 plus its number.
+//! Signals that the parent process has set to be ignored (`nohup`, jobs in the background of a script)
 //! stay ignored.
 
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};

@@ -22,6 +22,8 @@ pub enum DriveError {
     Cache(CacheError),
     /// A cache is to be loaded or saved, but this strategy learns nothing from the scene.
     NoCache(&'static str),
+    /// A checkpoint is to be resumed together with something that it holds itself: this.
+    Resumed(&'static str),
     /// The checkpoint cannot be resumed.
     Checkpoint(CheckpointError),
     /// No memory for a block of so many bytes.
@@ -62,6 +64,7 @@ impl fmt::Display for DriveError {
                     "roulette strategy `{strategy}` learns nothing from the scene: there is no cache to load or save"
                 )
             }
+            Self::Resumed(what) => write!(f, "a checkpoint has its own {what}: give one or the other"),
             Self::Checkpoint(e) => e.fmt(f),
             Self::Memory(bytes) => write!(f, "no memory for a block of {}", text::bytes(*bytes as u64)),
             Self::Threads(e) => write!(f, "cannot start threads: {e}"),

@@ -31,7 +31,10 @@ pub(super) fn scene(loader: &mut Loader, path: &Path, mut mesh: Mesh, up: Up) ->
             ("vertex colours", diffuse(Reflectance::Constant(color.map(colors::linear))))
         }
         Some(_) => {
-            let color = |v: u32| mesh.colors[v as usize].map(colors::linear);
+            let color = |v: u32| {
+                let [r, g, b] = mesh.colors[v as usize].map(colors::linear);
+                [r, g, b, 1.0]
+            };
             let (texture, _) = colors::paint(&mut mesh.vertices, &mut mesh.triangles, color)
                 .map_err(|what| LoadError::file(path, what))?;
             scene.textures.push(texture);

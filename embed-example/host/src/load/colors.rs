@@ -20,13 +20,13 @@ pub(super) fn encoded(linear: f32) -> u8 {
     (tonemap::srgb(linear.clamp(0.0, 1.0)) * 255.0).round() as u8
 }
 
-/// Gives every triangle vertices of its own, whose texture coordinates find the colours of `color` (linear, by vertex
-/// before the change) in the texture that is returned. Second: for each new vertex the one that it was. Vertices must be
+/// Gives every triangle vertices of its own, whose texture coordinates find the colours of `color` (linear with alpha, by
+/// vertex before the change) in the texture that is returned. Second: for each new vertex the one that it was. Vertices must be
 /// in range.
 pub(super) fn paint(
     vertices: &mut Vec<Vertex>,
     triangles: &mut [[u32; 3]],
-    color: impl Fn(u32) -> [f32; 3],
+    color: impl Fn(u32) -> [f32; 4],
 ) -> Result<(Texture, Vec<u32>), String> {
     let columns = (triangles.len() as f64).sqrt().ceil().max(1.0) as usize;
     let rows = triangles.len().div_ceil(columns).max(1);
@@ -40,13 +40,14 @@ pub(super) fn paint(
     let mut origins = Vec::with_capacity(3 * triangles.len());
     for (i, triangle) in triangles.iter_mut().enumerate() {
         let colors = triangle.map(&color);
-        let fourth = |k: usize| -> [f32; 3] {
+        let fourth = |k: usize| -> [f32; 4] {
             std::array::from_fn(|c| colors[(k + 1) % 3][c] + colors[(k + 2) % 3][c] - colors[k][c])
         };
         let cut = |k: usize| fourth(k).iter().map(|x| (x - x.clamp(0.0, 1.0)).abs()).sum::<f32>();
         let start = (0..3).min_by(|a, b| cut(*a).total_cmp(&cut(*b))).unwrap_or(0);
         let (x, y) = (2 * (i % columns), 2 * (i / columns));
-        let texel = |[r, g, b]: [f32; 3]| [encoded(r), encoded(g), encoded(b), 255];
+        let alpha = |a: f32| (a.clamp(0.0, 1.0) * 255.0).round() as u8;
+        let texel = |[r, g, b, a]: [f32; 4]| [encoded(r), encoded(g), encoded(b), alpha(a)];
         let places = [[x, y], [x + 1, y], [x, y + 1]];
         for (k, [x, y]) in places.into_iter().enumerate() {
             let corner = (start + k) % 3;

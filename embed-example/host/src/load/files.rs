@@ -57,7 +57,6 @@ const MAGIC: &[(&[u8], &str)] = &[
     (b"\x89PNG\r\n\x1a\n", "a PNG image"),
     (&[0xff, 0xd8, 0xff], "a JPEG image"),
     (b"v/1\x01", "an EXR image"),
-    (b"\x76\x2f\x31\x01", "an EXR image"),
     (b"#?RADIANCE", "a Radiance HDR image"),
     (b"#?RGBE", "a Radiance HDR image"),
     (b"GIF8", "a GIF image"),

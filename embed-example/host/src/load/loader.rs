@@ -1,7 +1,8 @@
 //! What the files of one scene share while it is loaded.
 
 use super::error::LoadError;
-use super::{files, images};
+use super::files;
+use super::images::{self, Decoded};
 use crate::description::{Encoding, Environment, SceneDescription, Texture, Wrap};
 use crate::look::Given;
 use crate::text;
@@ -16,7 +17,8 @@ pub struct LoadOptions {
     /// that are unknown, faces with some texture coordinates or normals only, bytes behind the end of an image.
     pub strict: bool,
     /// Most bytes that decoded textures and environment maps may take in all while they are decoded: 4 a texel of a
-    /// texture, 12 of an environment map, and what the decoder takes for the one under way. Known from their headers.
+    /// texture, also of one that is made of two others, 12 of an environment map, and what the decoder takes for the one
+    /// under way. Known from their headers.
     pub texture_memory: u64,
 }
 
@@ -56,7 +58,9 @@ pub(super) struct Loader {
     folder: PathBuf,
     /// Textures by path and decoding: a file that several materials use is decoded once. `None`: it is missing.
     textures: HashMap<(PathBuf, Decoding), Option<u32>>,
-    /// Bytes of decoded images so far.
+    /// Textures that were made of two others, by their indices: roughness and metalness of MTL materials.
+    pub(super) combined: HashMap<[Option<u32>; 2], u32>,
+    /// Bytes of decoded images so far, and of textures that were made of them.
     decoded: u64,
 }
 
@@ -75,6 +79,7 @@ impl Loader {
             given: Given::SCENE,
             folder: folder.into(),
             textures: HashMap::new(),
+            combined: HashMap::new(),
             decoded: 0,
         }
     }
@@ -151,12 +156,12 @@ impl Loader {
             read => read?,
         };
         let wrong = |what| LoadError::image(&found, referrer, what);
-        let image = images::texture(&bytes, self.free()).map_err(wrong)?;
+        let image = self.decode(&bytes).map_err(wrong)?;
         if let Some(what) = image.ignored {
             self.replace(wrong(what.into()), "the picture was taken without that")?;
         }
         let image = image.texture;
-        self.decoded += 4 * image.texels.len() as u64;
+        self.charge(&image);
         let index = scene.textures.len() as u32;
         let Decoding { encoding, wrap } = decoding;
         scene.textures.push(Texture { name: found.display().to_string(), encoding, wrap, ..image });
@@ -164,11 +169,9 @@ impl Loader {
         Ok(Some(index))
     }
 
-    /// A PNG or JPEG that is in memory; the error is a text.
-    pub(super) fn decode(&mut self, bytes: &[u8]) -> Result<Texture, String> {
-        let image = images::texture(bytes, self.free())?.texture;
-        self.decoded += 4 * image.texels.len() as u64;
-        Ok(image)
+    /// A PNG or JPEG that is in memory; the error is a text. Whoever keeps it has to [`Self::charge`] it.
+    pub(super) fn decode(&self, bytes: &[u8]) -> Result<Decoded, String> {
+        images::texture(bytes, self.free())
     }
 
     /// The environment map in `path`, unscaled and unrotated.
@@ -187,8 +190,13 @@ impl Loader {
     }
 
     /// Bytes that further images may take.
-    fn free(&self) -> u64 {
+    pub(super) fn free(&self) -> u64 {
         self.options.texture_memory.saturating_sub(self.decoded)
+    }
+
+    /// Counts a texture that stays.
+    pub(super) fn charge(&mut self, texture: &Texture) {
+        self.decoded += 4 * texture.texels.len() as u64;
     }
 
     pub(super) fn note(&mut self, text: String) {

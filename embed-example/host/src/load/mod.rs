@@ -117,9 +117,14 @@ fn starts(path: &Path, is: fn(&[u8]) -> bool) -> bool {
     read.is_ok() && is(&head)
 }
 
-/// Reads an environment map, unscaled and unrotated: a Radiance file, or an EXR with R, G and B. Notes say what was changed.
-pub fn environment(path: &Path) -> Result<(Environment, Vec<String>), LoadError> {
-    let mut loader = Loader::new(LoadOptions::default(), path.parent().unwrap_or(Path::new("")));
-    let map = loader.environment(path, "--env")?;
-    Ok((map, loader.report.notes))
+/// Reads an environment map, unscaled and unrotated: a Radiance file, or an EXR with R, G and B. `referrer` says in messages
+/// who names the file. The report holds the file that was read, which may differ from `path` in case, and what was changed.
+///
+/// # Errors
+/// Files that cannot be read, are no such map or larger than [`LoadOptions::texture_memory`]; if the options are strict,
+/// also one that is there in another case only.
+pub fn environment(path: &Path, referrer: &str, options: &LoadOptions) -> Result<(Environment, LoadReport), LoadError> {
+    let mut loader = Loader::new(*options, path.parent().unwrap_or(Path::new("")));
+    let map = loader.environment(path, referrer)?;
+    Ok((map, loader.report))
 }

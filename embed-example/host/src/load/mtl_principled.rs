@@ -16,6 +16,8 @@
 //!
 //! `aniso` and `anisor` are ignored.
 
+use super::budget::fits;
+use super::loader::Loader;
 use super::mtl::Definition;
 use crate::description::{Encoding, Material, Model, Principled, SceneDescription, Texture, TextureRef};
 
@@ -25,6 +27,8 @@ pub(super) struct Maps {
     pub base: Option<u32>,
     pub roughness: Option<u32>,
     pub metalness: Option<u32>,
+    /// Of roughness and metalness, by [`combine`].
+    pub combined: Option<u32>,
     pub emission: Option<u32>,
     pub normal: Option<u32>,
 }
@@ -38,12 +42,18 @@ pub(super) fn applies(definition: &Definition) -> bool {
     !definition.maps.is_empty() || NUMBERS.iter().any(|key| parameters.contains_key(*key))
 }
 
-/// A texture with the roughness in green and the metalness in blue, each the red of its own or 1.
-fn combined(scene: &SceneDescription, roughness: Option<u32>, metalness: Option<u32>) -> Option<Texture> {
-    let of = |i: Option<u32>| i.and_then(|i| scene.textures.get(i as usize));
-    let (rough, metal) = (of(roughness), of(metalness));
-    let larger = [rough, metal].into_iter().flatten().max_by_key(|t| u64::from(t.width) * u64::from(t.height))?;
+/// Index of the texture with the roughness in green and the metalness in blue, each the red of its own or 1. Made at the
+/// first use of the pair; the error is a text.
+pub(super) fn combine(loader: &mut Loader, scene: &mut SceneDescription, maps: &Maps) -> Result<Option<u32>, String> {
+    let key = [maps.roughness, maps.metalness];
+    if let Some(index) = loader.combined.get(&key) {
+        return Ok(Some(*index));
+    }
+    let [rough, metal] = key.map(|i| i.and_then(|i| scene.textures.get(i as usize)));
+    let larger = [rough, metal].into_iter().flatten().max_by_key(|t| u64::from(t.width) * u64::from(t.height));
+    let Some(larger) = larger else { return Ok(None) };
     let [width, height] = [larger.width, larger.height];
+    fits(width.into(), height.into(), 4, loader.free())?;
     // the nearest texel of a smaller one
     let red = |t: Option<&Texture>, x: u32, y: u32| {
         t.map_or(255, |t| {
@@ -53,18 +63,23 @@ fn combined(scene: &SceneDescription, roughness: Option<u32>, metalness: Option<
         })
     };
     let texel = |i: u32| [255, red(rough, i % width, i / width), red(metal, i % width, i / width), 255];
-    Some(Texture {
+    let texture = Texture {
         name: larger.name.clone(),
         width,
         height,
         texels: (0..width * height).map(texel).collect(),
         encoding: Encoding::Linear,
         ..Texture::default()
-    })
+    };
+    loader.charge(&texture);
+    let index = scene.textures.len() as u32;
+    scene.textures.push(texture);
+    loader.combined.insert(key, index);
+    Ok(Some(index))
 }
 
 /// The mapping of the table above, and the radiance of its emitter.
-pub(super) fn map(scene: &mut SceneDescription, definition: &Definition, maps: Maps) -> (Material, Option<[f32; 3]>) {
+pub(super) fn map(definition: &Definition, maps: Maps) -> (Material, Option<[f32; 3]>) {
     let m = &definition.material;
     let parameter = |key: &str| m.unknown_param.get(key).and_then(|v| v.parse::<f32>().ok());
     let share = |x: f32| x.clamp(0.0, 1.0);
@@ -73,11 +88,6 @@ pub(super) fn map(scene: &mut SceneDescription, definition: &Definition, maps: M
     let opacity = m.dissolve.or(parameter("Tr").map(|t| 1.0 - t)).unwrap_or(1.0);
     let clear = matches!(m.illumination_model, Some(4 | 6 | 7 | 9)) || opacity < 0.5;
     let thin = m.optical_density.is_some_and(|n| (n - 1.0).abs() <= 1e-3);
-    let metal_rough = combined(scene, maps.roughness, maps.metalness);
-    let metal_rough_texture = metal_rough.map(|t| {
-        scene.textures.push(t);
-        TextureRef::new(scene.textures.len() as u32 - 1)
-    });
     let default = Principled::default();
     let given = m.emissive.filter(|c| c.iter().any(|x| *x > 1e-3)).map(|c| c.map(|x| x.max(0.0)));
     let radiance = given.or(maps.emission.map(|_| [1.0; 3]));
@@ -86,7 +96,7 @@ pub(super) fn map(scene: &mut SceneDescription, definition: &Definition, maps: M
         base_texture: texture(maps.base),
         metalness: if maps.metalness.is_some() { 1.0 } else { share(parameter("Pm").unwrap_or(0.0)) },
         roughness: if maps.roughness.is_some() { 1.0 } else { share(parameter("Pr").or(from_ns).unwrap_or(0.5)) },
-        metal_rough_texture,
+        metal_rough_texture: texture(maps.combined),
         ior: m.optical_density.filter(|n| *n > 0.1 && (n - 1.0).abs() > 1e-3).map_or(default.ior, |n| n.min(10.0)),
         transmission: if clear { 1.0 } else { 0.0 },
         thin_walled: clear && thin,

@@ -26,6 +26,9 @@ struct Prepared {
     text: String,
     /// Names that faces use and the line of the first such face; the text calls them m0, m1, ...
     materials: Vec<(String, u32)>,
+    /// Names of `o` and `g` in the order of the file; the text calls them 0, 1, ..., as it repeats them with every
+    /// change of material or form. The first one is that of faces before any.
+    objects: Vec<String>,
     /// Material libraries and the lines that name them.
     libraries: Vec<(String, u32)>,
     polygons: u32,
@@ -100,9 +103,10 @@ struct Checker<'t> {
     points: Vec<[f32; 3]>,
     numbers: HashMap<String, usize>,
     material: String,
+    /// Number of `material`, once a face has it.
+    number: Option<usize>,
     /// Material and form of the text's current group; `None` before its first face.
     current: Option<(usize, Form)>,
-    object: String,
 }
 
 impl Checker<'_> {
@@ -123,12 +127,13 @@ impl Checker<'_> {
                 Ok(())
             }
             "o" | "g" => {
-                self.object = rest(line, keyword).into();
+                self.out.objects.push(rest(line, keyword).into());
                 self.current = None;
                 Ok(())
             }
             "usemtl" => {
                 self.material = rest(line, keyword).into();
+                self.number = None;
                 Ok(())
             }
             "mtllib" => {
@@ -181,7 +186,10 @@ impl Checker<'_> {
     }
 
     fn object_name(&self) -> Cow<'_, str> {
-        if self.object.is_empty() { "unnamed object".into() } else { excerpt(&self.object) }
+        match self.out.objects.last() {
+            Some(name) if !name.is_empty() => excerpt(name),
+            _ => "unnamed object".into(),
+        }
     }
 
     fn face<'w>(&mut self, words: impl Iterator<Item = &'w str>) -> Result<(), LoadError> {
@@ -278,16 +286,17 @@ impl Checker<'_> {
 
     /// Starts a new group in the text if the material or the form changes.
     fn enter(&mut self, form: Form) {
-        let known = self.numbers.get(&self.material).copied();
+        let known = self.number.or_else(|| self.numbers.get(&self.material).copied());
         let material = known.unwrap_or_else(|| {
             self.out.materials.push((self.material.clone(), self.line));
             self.numbers.insert(self.material.clone(), self.out.materials.len() - 1);
             self.out.materials.len() - 1
         });
+        self.number = Some(material);
         if self.current != Some((material, form)) {
             self.current = Some((material, form));
             // Writing to a String cannot fail.
-            let _ = writeln!(self.out.text, "g {}\nusemtl m{material}", self.object);
+            let _ = writeln!(self.out.text, "g {}\nusemtl m{material}", self.out.objects.len() - 1);
         }
     }
 }
@@ -307,6 +316,7 @@ fn prepare(path: &Path, text: &str, strict: bool) -> Result<Prepared, LoadError>
         out: Prepared {
             text: prepared,
             materials: Vec::new(),
+            objects: vec![String::new()],
             libraries: Vec::new(),
             polygons: 0,
             skipped_elements: 0,
@@ -322,8 +332,8 @@ fn prepare(path: &Path, text: &str, strict: bool) -> Result<Prepared, LoadError>
         points: Vec::new(),
         numbers: HashMap::new(),
         material: String::new(),
+        number: None,
         current: None,
-        object: String::new(),
     };
     let mut joined = String::new();
     for line in text.lines() {
@@ -345,9 +355,12 @@ fn prepare(path: &Path, text: &str, strict: bool) -> Result<Prepared, LoadError>
     Ok(checker.out)
 }
 
+/// Name of objects that have none.
+const UNNAMED: &str = "unnamed_object";
+
 /// Appends the meshes to the scene; `materials` maps the prepared text's numbers to the scene's.
 fn append(path: &Path, scene: &mut SceneDescription, prepared: Prepared, materials: &[u32]) -> Result<(), LoadError> {
-    let Prepared { text, .. } = prepared;
+    let Prepared { text, mut objects, .. } = prepared;
     let options = tobj::LoadOptions { single_index: true, triangulate: true, ..tobj::LoadOptions::default() };
     let names = |_: &Path| {
         let named = |i| tobj::Material { name: format!("m{i}"), ..tobj::Material::default() };
@@ -359,6 +372,7 @@ fn append(path: &Path, scene: &mut SceneDescription, prepared: Prepared, materia
         |what: &str| LoadError::Format { path: path.into(), what: format!("refused by the OBJ parser: {what}") };
     let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, names).map_err(|e| refused(&e.to_string()))?;
     drop(text);
+    let mut object = None;
     for model in models {
         let mesh = model.mesh;
         if mesh.indices.is_empty() {
@@ -372,7 +386,12 @@ fn append(path: &Path, scene: &mut SceneDescription, prepared: Prepared, materia
         let base =
             u32::try_from(scene.vertices.len() + count).map_err(|_| refused("too many vertices"))? - count as u32;
         let first_triangle = scene.triangles.len() as u32;
-        scene.objects.push(Object { name: model.name, first_triangle });
+        let number: usize = model.name.parse().map_err(|_| refused("an object of no number"))?;
+        // one may be of several materials
+        if object.replace(number) != Some(number) {
+            let name = objects.get_mut(number).map(std::mem::take).filter(|name| !name.is_empty());
+            scene.objects.push(Object { name: name.unwrap_or_else(|| UNNAMED.into()), first_triangle });
+        }
         let mut normals = mesh.normals.chunks_exact(3);
         let mut uvs = mesh.texcoords.chunks_exact(2);
         scene.vertices.extend(mesh.positions.chunks_exact(3).map(|p| Vertex {
@@ -471,7 +490,7 @@ pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescrip
                 };
                 let (material, radiance) = if mtl_principled::applies(definition) {
                     let maps = Maps { base: texture, ..maps(loader, &mut scene, definition, file)? };
-                    mtl_principled::map(&mut scene, definition, maps)
+                    mtl_principled::map(definition, maps)
                 } else {
                     let mapped = mtl::map(definition, texture);
                     loader.report.notes.extend(mapped.notes);
@@ -527,5 +546,9 @@ fn maps(
         };
         *slot = index;
     }
+    maps.combined = mtl_principled::combine(loader, scene, &maps).map_err(|what| {
+        let name = excerpt(&definition.material.name);
+        LoadError::file(file, format!("material `{name}`: roughness and metalness as one texture: {what}"))
+    })?;
     Ok(maps)
 }

@@ -51,6 +51,14 @@ impl<'b> Asset<'b> {
         self.buffers.iter().map(|b| b.len()).sum::<usize>().saturating_mul(2).max(1 << 22)
     }
 
+    /// Most meshes in the scene, those of `EXT_mesh_gpu_instancing` included: one for each node, and for every two bytes,
+    /// as several nodes may share an accessor; small documents may repeat themselves more often. The scene takes up to
+    /// half a kilobyte for each.
+    pub(super) fn most_placements(&self) -> usize {
+        let bytes: usize = self.buffers.iter().map(|b| b.len()).sum();
+        (bytes / 2).saturating_add(self.root.nodes.len()).clamp(1 << 17, 1 << 21)
+    }
+
     pub(super) fn error(&self, at: impl Into<String>, what: impl Into<String>) -> LoadError {
         LoadError::json(self.path, at, what)
     }

@@ -14,13 +14,14 @@
 //! | `KHR_materials_ior`, `_specular`, `_clearcoat`, `_sheen` | the same; of textures that the principled material has no place for (specular, sheen, roughness of the coat) the mean is taken |
 //! | `KHR_materials_pbrSpecularGlossiness` | dielectric of the specular colour; of its texture the mean is taken |
 //! | `KHR_materials_unlit` | diffuse |
-//! | `COLOR_0` | multiplies the base colour if it is constant, or if the material has no textures |
+//! | `COLOR_0` | multiplies base colour and alpha if it is constant, or if the material has no textures |
 
 use super::super::loader::Loader;
 use super::super::{LoadError, mtl};
 use super::asset::Asset;
 use super::textures::{Slot, Textures, Use};
 use crate::description::{Material, Model, Principled, SceneDescription, TextureRef};
+use crate::text::excerpt;
 use gltf_json::extensions::material::PbrSpecularGlossiness;
 use gltf_json::extensions::texture::TextureTransform;
 use gltf_json::material::{AlphaMode, PbrMetallicRoughness};
@@ -57,6 +58,33 @@ pub(super) struct Loaded {
     pub index: u32,
     /// Set of texture coordinates that its textures use; `None` without textures.
     pub set: Option<u32>,
+    /// What alpha of vertices means.
+    pub alpha: Alpha,
+    /// Absorption coefficient of the solid that it bounds.
+    pub sigma_a: Option<[f32; 3]>,
+}
+
+/// Meaning of alpha.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) enum Alpha {
+    /// None.
+    #[default]
+    Ignored,
+    /// Share of light that meets the surface.
+    Share,
+    /// All light meets the surface where alpha times `factor` is `cutoff` or more, else none.
+    Mask { factor: f32, cutoff: f32 },
+}
+
+impl Alpha {
+    /// Alpha of a texture for that of a vertex.
+    pub(super) fn of_texel(self, a: f32) -> f32 {
+        match self {
+            Self::Ignored => 1.0,
+            Self::Share => unit(a),
+            Self::Mask { factor, cutoff } => f32::from(u8::from(unit(a) * factor >= cutoff)),
+        }
+    }
 }
 
 /// A solid that light enters.
@@ -84,6 +112,7 @@ struct Reading<'r, 'l, 'a, 'b> {
     at: String,
     /// Set of texture coordinates of the textures so far.
     set: Option<u32>,
+    alpha: Alpha,
 }
 
 impl Materials {
@@ -102,7 +131,8 @@ impl Materials {
             return Ok(*loaded);
         }
         let index = scene.materials.len() as u32;
-        let set = match material {
+        let mut loaded = Loaded { index, set: None, alpha: Alpha::Ignored, sigma_a: None };
+        match material {
             None => {
                 if self.known.keys().all(|(m, _)| m.is_some()) {
                     loader.note("what has no material is grey".into());
@@ -110,21 +140,20 @@ impl Materials {
                 let base = crate::description::Reflectance::Constant([0, 1, 2].map(|c| 0.5 * unit(factor[c])));
                 let model = if factor == [1.0; 4] { mtl::GREY } else { Model::Diffuse { reflectance: base } };
                 scene.add_material("default", model);
-                None
             }
             Some(i) => {
                 let m = asset.get(&asset.root.materials, i, at, "materials")?;
                 let at = format!("materials[{}]", i.value());
-                let name = m.name.clone().unwrap_or_else(|| at.clone());
-                let mut reading = Reading { textures: &mut self.textures, loader, scene, asset, at, set: None };
+                // an excerpt: each factor makes a material of that name
+                let name = excerpt(m.name.as_ref().unwrap_or(&at)).into_owned();
+                let (textures, alpha) = (&mut self.textures, Alpha::Ignored);
+                let mut reading = Reading { textures, loader, scene, asset, at, set: None, alpha };
                 let (material, sigma_a) = reading.material(m, name, factor)?;
-                let set = reading.set;
+                loaded = Loaded { set: reading.set, alpha: reading.alpha, sigma_a, ..loaded };
                 scene.materials.push(material);
                 self.volumes.extend(sigma_a.map(|sigma_a| Volume { material: index, sigma_a }));
-                set
             }
-        };
-        let loaded = Loaded { index, set };
+        }
         self.known.insert(key, loaded);
         Ok(loaded)
     }
@@ -185,6 +214,11 @@ impl Reading<'_, '_, '_, '_> {
         let alpha = match &extensions.pbr_specular_glossiness {
             Some(old) => self.specular_glossiness(old, mode, cutoff, factor, &mut p)?,
             None => self.metallic_roughness(&m.pbr_metallic_roughness, mode, cutoff, factor, &mut p)?,
+        };
+        self.alpha = match mode {
+            AlphaMode::Opaque => Alpha::Ignored,
+            AlphaMode::Blend => Alpha::Share,
+            AlphaMode::Mask => Alpha::Mask { factor: alpha, cutoff },
         };
         p.opacity = match mode {
             AlphaMode::Opaque => 1.0,

@@ -4,8 +4,9 @@ use super::super::LoadError;
 use super::super::colors;
 use super::super::loader::Loader;
 use super::asset::{Asset, Numbers};
-use super::materials::{Loaded, Materials};
+use super::materials::{Alpha, Loaded, Materials, Volume};
 use crate::description::{Model, SceneDescription, TextureRef, Vertex};
+use glam::{DVec3, Vec3};
 use gltf_json::accessor::Type;
 use gltf_json::mesh::{Mode, Semantic};
 use gltf_json::validation::Checked;
@@ -23,6 +24,18 @@ pub(super) struct Primitive {
     pub material: u32,
     /// Of each vertex, up to eight joints in groups of four; empty without.
     pub influences: Vec<Influences>,
+}
+
+impl Primitive {
+    /// Whether a triangle spans a plane, as baking asks it.
+    pub(super) fn has_area(&self) -> bool {
+        let position =
+            |v: u32| self.vertices.get(v as usize).map_or(DVec3::ZERO, |v| Vec3::from(v.position).as_dvec3());
+        self.triangles.iter().any(|t| {
+            let [a, b, c] = t.map(position);
+            (b - a).cross(c - a).length_squared() > 0.0
+        })
+    }
 }
 
 /// All primitives of a mesh that have triangles. Vertices that no triangle uses are left out: primitives often share
@@ -145,12 +158,15 @@ fn load_primitive(
     let smooth = normals.is_some();
     let mut out = Primitive { vertices, triangles, smooth, material: material.index, influences };
     if let Some(colors) = colors.filter(|_| constant.is_none()) {
-        paint(loader, scene, asset, &mut out, material, &colors, at)?;
+        if let Some(volume) = paint(loader, scene, asset, &mut out, material, &colors, at)? {
+            materials.volumes.push(volume);
+        }
     }
     Ok(Some(out))
 }
 
-/// Gives a primitive the colours of its vertices as a texture, unless its material has others.
+/// Gives a primitive the colours of its vertices as a texture of a copy of its material, unless that has others. Returns
+/// the solid that the copy bounds.
 fn paint(
     loader: &mut Loader,
     scene: &mut SceneDescription,
@@ -159,17 +175,20 @@ fn paint(
     material: Loaded,
     colors: &[[f32; 4]],
     at: &str,
-) -> Result<(), LoadError> {
+) -> Result<Option<Volume>, LoadError> {
     let mut painted = scene.materials[material.index as usize].clone();
     let Model::Principled(p) = &mut painted.model else {
         loader.note(format!("{at}: colours of vertices were ignored, as there is no material"));
-        return Ok(());
+        return Ok(None);
     };
     if material.set.is_some() {
         loader.note(format!("{at}: colours of vertices were ignored, as the material has textures"));
-        return Ok(());
+        return Ok(None);
     }
-    let color = |v: u32| colors.get(v as usize).map_or([1.0; 3], |c| [c[0], c[1], c[2]]);
+    let color = |v: u32| {
+        let [r, g, b, a] = colors.get(v as usize).copied().unwrap_or([1.0; 4]);
+        [r, g, b, material.alpha.of_texel(a)]
+    };
     let texture = colors::paint(&mut primitive.vertices, &mut primitive.triangles, color);
     let (mut texture, origins) = texture.map_err(|what| asset.error(at, what))?;
     for influences in &mut primitive.influences {
@@ -178,9 +197,13 @@ fn paint(
     texture.name = format!("{at}.attributes.COLOR_0");
     p.base_texture = Some(TextureRef::new(scene.textures.len() as u32));
     scene.textures.push(texture);
+    if matches!(material.alpha, Alpha::Mask { .. }) {
+        // the texture has it
+        p.opacity = 1.0;
+    }
     primitive.material = scene.materials.len() as u32;
     scene.materials.push(painted);
-    Ok(())
+    Ok(material.sigma_a.map(|sigma_a| Volume { material: primitive.material, sigma_a }))
 }
 
 fn color_is_rgb(asset: &Asset<'_>, color: Option<Index<Accessor>>) -> bool {

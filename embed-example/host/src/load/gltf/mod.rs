@@ -31,15 +31,17 @@ use crate::description::{
     Instance, Material, Medium, Model, Object, Projection, Prototype, SceneDescription, Triangle, Vertex,
 };
 use crate::look::{Given, Up};
+use crate::text::excerpt;
 use asset::Asset;
 use croupier::unstable::scene::blob::MAX_MEDIA;
-use glam::{DMat3, DMat4, DVec3};
+use croupier::unstable::scene::derive;
+use glam::{DMat3, DMat4, DVec3, Vec3};
 use gltf_json::accessor::Type;
 use gltf_json::{Index, Mesh, Root, Skin};
 use materials::{Materials, Volume};
 use meshes::Primitive;
 use nodes::{Placed, Placement};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 
 pub(super) use container::is_glb;
@@ -150,17 +152,26 @@ fn place(
         }
         list.push(placement);
     }
+    let mut flat = 0;
+    let mut first_flat = None;
     for mesh in order {
         let Some(uses) = uses.get(&mesh) else { continue };
-        let at = uses.first().map_or("nodes", |p| p.name.as_str());
+        let at = uses.first().map_or("nodes", |p| &*p.name);
         let primitives = meshes::load(loader, scene, asset, materials, mesh, at)?;
         let triangles: usize = primitives.iter().map(|p| p.triangles.len()).sum();
         if triangles == 0 {
             continue;
         }
-        let rigid: Vec<&Placement> = uses.iter().copied().filter(|p| p.skin.is_none()).collect();
+        let (uses, gone): (Vec<&Placement>, Vec<&Placement>) =
+            uses.iter().copied().partition(|p| p.skin.is_some() || spans(p.world));
+        flat += gone.len();
+        first_flat = first_flat.or(gone.first().map(|p| p.name.clone()));
+        // what cannot be an instance, as its map is singular, is a copy
+        let bounds = bounds(&primitives);
+        let fits = |p: &&Placement| p.skin.is_none() && derive(&[rows(p.world); 2], bounds).is_ok();
+        let (rigid, others): (Vec<&Placement>, Vec<&Placement>) = uses.iter().copied().partition(fits);
         let instanced = (rigid.len().max(1) - 1).saturating_mul(triangles) > SAVED_TRIANGLES;
-        let copies = if instanced { uses.len() - rigid.len() + 1 } else { uses.len() };
+        let copies = if instanced { others.len() + 1 } else { uses.len() };
         let total = copies.saturating_mul(triangles).saturating_add(scene.triangles.len());
         if total > asset.most_triangles() {
             let what = format!("{total} triangles in a document of its size");
@@ -168,31 +179,50 @@ fn place(
         }
         if instanced {
             let name = asset.root.meshes.get(mesh.value()).and_then(|m| m.name.clone());
-            let name = name.unwrap_or_else(|| format!("meshes[{}]", mesh.value()));
-            let first = scene.triangles.len() as u32;
-            append(scene, &name, &primitives, &Space::Own);
-            let prototype = scene.prototypes.len() as u32;
-            let triangles = first..scene.triangles.len() as u32;
-            scene.prototypes.push(Prototype { name, triangles, instances: Vec::new() });
-            scene.instances.extend(rigid.iter().map(|p| Instance::new(&p.name, prototype, rows(p.world))));
-        }
-        for placement in uses {
-            match placement.skin {
-                None if instanced => {}
-                None => append(scene, &placement.name, &primitives, &Space::world(placement.world)),
-                Some(skin) => {
-                    let joints = joints(asset, placed, skin)?;
-                    append(
-                        scene,
-                        &placement.name,
-                        &primitives,
-                        &Space::Joints(joints, Space::world(placement.world).into()),
-                    );
-                }
+            let name = name.map_or_else(|| format!("meshes[{}]", mesh.value()), |name| excerpt(&name).into_owned());
+            if primitives.iter().any(Primitive::has_area) {
+                let first = scene.triangles.len() as u32;
+                append(scene, &name, &primitives, &Space::Own);
+                let prototype = scene.prototypes.len() as u32;
+                let triangles = first..scene.triangles.len() as u32;
+                scene.prototypes.push(Prototype { name, triangles, instances: Vec::new() });
+                scene.instances.extend(rigid.iter().map(|p| Instance::new(&p.name, prototype, rows(p.world))));
+            } else {
+                loader.note(format!("mesh {}: left out, none of its triangles has an area", quoted(&name)));
             }
         }
+        for placement in if instanced { others } else { uses } {
+            let space = match placement.skin {
+                None => Space::world(placement.world),
+                Some(skin) => {
+                    let joints = joints(asset, placed, skin, &primitives)?;
+                    Space::Joints(joints, Space::world(placement.world).into())
+                }
+            };
+            append(scene, &placement.name, &primitives, &space);
+        }
+    }
+    if let Some(name) = first_flat {
+        let name = quoted(&name);
+        loader.note(format!(
+            "meshes that were left out, as their transformations leave them no area: {flat}, first {name}"
+        ));
     }
     Ok(())
+}
+
+/// Whether surfaces keep an area under a map.
+fn spans(map: DMat4) -> bool {
+    let [x, y, z] = [map.x_axis, map.y_axis, map.z_axis].map(|c| c.truncate());
+    [x.cross(y), y.cross(z), z.cross(x)].iter().any(|n| *n != DVec3::ZERO)
+}
+
+/// Bounds of vertices.
+fn bounds(primitives: &[Primitive]) -> [[f32; 3]; 2] {
+    let mut points = primitives.iter().flat_map(|p| &p.vertices).map(|v| Vec3::from(v.position));
+    let first = points.next().unwrap_or_default();
+    let (lo, hi) = points.fold((first, first), |(lo, hi), p| (lo.min(p), hi.max(p)));
+    [lo.to_array(), hi.to_array()]
 }
 
 /// The upper rows of an affine map.
@@ -274,10 +304,21 @@ fn append(scene: &mut SceneDescription, name: &str, primitives: &[Primitive], sp
     }
 }
 
-/// The map of each joint from the mesh's space to the world.
-fn joints(asset: &Asset<'_>, placed: &Placed, index: Index<Skin>) -> Result<Vec<DMat4>, LoadError> {
+/// The map of each joint from the mesh's space to the world, all that primitives are weighted with.
+fn joints(
+    asset: &Asset<'_>,
+    placed: &Placed,
+    index: Index<Skin>,
+    primitives: &[Primitive],
+) -> Result<Vec<DMat4>, LoadError> {
     let skin = asset.get(&asset.root.skins, index, "nodes", "skins")?;
     let at = format!("skins[{}]", index.value());
+    let influences = primitives.iter().flat_map(|p| p.influences.iter().flatten());
+    let weighted = influences.flat_map(|(joints, weights)| joints.iter().zip(weights)).filter(|(_, w)| **w > 0.0);
+    if let Some(joint) = weighted.map(|(joint, _)| *joint).max().filter(|joint| *joint as usize >= skin.joints.len()) {
+        let what = format!("a vertex follows its joint {joint}, there are {}", skin.joints.len());
+        return Err(asset.error(at, what));
+    }
     let inverse = skin.inverse_bind_matrices;
     let inverse = inverse.map(|i| asset.numbers(i, &format!("{at}.inverseBindMatrices"), &[Type::Mat4])).transpose()?;
     if inverse.as_ref().is_some_and(|n| n.count < skin.joints.len()) {
@@ -293,34 +334,46 @@ fn joints(asset: &Asset<'_>, placed: &Placed, index: Index<Skin>) -> Result<Vec<
     skin.joints.iter().enumerate().map(joint).collect()
 }
 
-/// Gives solids that absorb their media. What is open has no inside: it becomes a sheet.
+/// Gives solids that absorb their media. What is open has no inside: it becomes a sheet. The world and each prototype are
+/// closed on their own, as baking asks it: instances may be anywhere.
 fn solids(loader: &mut Loader, scene: &mut SceneDescription, volumes: &[Volume]) {
-    let mut bounds: HashMap<u32, Vec<u32>> = volumes.iter().map(|v| (v.material, Vec::new())).collect();
-    for (i, t) in (0..).zip(&scene.triangles) {
-        if let Some(list) = bounds.get_mut(&t.material) {
-            list.push(i);
-        }
+    let wanted: HashSet<u32> = volumes.iter().map(|v| v.material).collect();
+    // by material and object: 0 is the world, then come the prototypes in the order of their triangles
+    let mut bounds: BTreeMap<(u32, usize), Vec<u32>> = BTreeMap::new();
+    for (i, t) in (0..).zip(&scene.triangles).filter(|(_, t)| wanted.contains(&t.material)) {
+        let object = scene.prototypes.partition_point(|p| p.triangles.start <= i);
+        let within = object > 0 && scene.prototypes[object - 1].triangles.contains(&i);
+        bounds.entry((t.material, if within { object } else { 0 })).or_default().push(i);
     }
     for volume in volumes {
-        let triangles = bounds.remove(&volume.material).unwrap_or_default();
-        if triangles.is_empty() {
+        let mut objects = bounds.range((volume.material, 0)..=(volume.material, usize::MAX)).map(|(_, list)| list);
+        if objects.clone().next().is_none() {
             continue;
         }
-        let closed = boundary_is_closed(scene, &triangles);
-        let room = scene.media.len() < MAX_MEDIA;
+        let closed = objects.all(|list| boundary_is_closed(scene, list));
         let material = &mut scene.materials[volume.material as usize];
         let Model::Principled(p) = &mut material.model else { continue };
         if !closed {
             p.thin_walled = true;
             let name = quoted(&material.name);
             loader.note(format!("material {name}: its surface is not closed or faces inwards: taken as a thin sheet"));
-        } else if volume.sigma_a != [0.0; 3] && !room {
+            continue;
+        }
+        if volume.sigma_a == [0.0; 3] {
+            continue;
+        }
+        let medium =
+            Medium { name: format!("inside of {}", material.name), sigma_a: volume.sigma_a, ..Medium::default() };
+        // copies of one material share one
+        let known = scene.media.iter().position(|m| *m == medium);
+        if known.is_none() && scene.media.len() >= MAX_MEDIA {
             let name = quoted(&material.name);
             loader.note(format!("material {name}: without absorption, as there may be {MAX_MEDIA} media"));
-        } else if volume.sigma_a != [0.0; 3] {
-            material.medium = Some(scene.media.len() as u32);
-            let name = format!("inside of {}", material.name);
-            scene.media.push(Medium { name, sigma_a: volume.sigma_a, ..Medium::default() });
+            continue;
+        }
+        material.medium = Some(known.unwrap_or(scene.media.len()) as u32);
+        if known.is_none() {
+            scene.media.push(medium);
         }
     }
 }

@@ -4,6 +4,7 @@ use super::super::LoadError;
 use super::super::loader::Loader;
 use super::asset::Asset;
 use crate::description::{Camera, Emitter, NamedCamera, Projection, SceneDescription};
+use crate::text::excerpt;
 use glam::{DMat4, DQuat, DVec3};
 use gltf_json::accessor::Type;
 use gltf_json::camera::Type as CameraType;
@@ -11,9 +12,8 @@ use gltf_json::extensions::scene::khr_lights_punctual::{Light, Type as LightType
 use gltf_json::validation::Checked;
 use gltf_json::{Accessor, Index, Mesh, Node, Skin};
 use std::collections::HashMap;
+use std::rc::Rc;
 
-/// Most meshes in a scene, those of `EXT_mesh_gpu_instancing` included.
-const MOST_PLACEMENTS: usize = 1 << 22;
 /// Rows of pictures.
 const HEIGHT: u32 = 480;
 /// Lumens of a watt, with which Blender writes lights.
@@ -21,7 +21,8 @@ const LUMENS_PER_WATT: f32 = 683.0;
 
 /// A mesh in the world.
 pub(super) struct Placement {
-    pub name: String,
+    /// An excerpt: a name may be a megabyte long, and its node in many places.
+    pub name: Rc<str>,
     pub mesh: Index<Mesh>,
     pub skin: Option<Index<Skin>>,
     pub world: DMat4,
@@ -50,19 +51,15 @@ pub(super) fn walk(loader: &mut Loader, scene: &mut SceneDescription, asset: &As
         if placed.worlds.insert(index.value(), world).is_some() {
             return Err(asset.error(at, "it is in the scene twice: below itself, or below two other nodes"));
         }
-        let name = node.name.clone().unwrap_or_else(|| at.clone());
         if let Some(mesh) = node.mesh {
-            let mesh_name = asset.root.meshes.get(mesh.value()).and_then(|m| m.name.clone());
-            let name = node.name.clone().or(mesh_name).unwrap_or_else(|| at.clone());
-            let worlds = instances(asset, node, world, &at)?;
-            if worlds.len() + placed.placements.len() > MOST_PLACEMENTS {
-                return Err(asset.error(at, format!("more than {MOST_PLACEMENTS} meshes in the scene")));
-            }
-            for world in worlds {
+            let name = node.name.as_ref().or_else(|| asset.root.meshes.get(mesh.value())?.name.as_ref());
+            let name: Rc<str> = excerpt(name.unwrap_or(&at)).into();
+            for world in instances(asset, node, world, &at, placed.placements.len())? {
                 placed.placements.push(Placement { name: name.clone(), mesh, skin: node.skin, world });
             }
         }
         if let Some(camera) = node.camera {
+            let name = node.name.clone().unwrap_or_else(|| at.clone());
             scene.cameras.push(NamedCamera { camera: self::camera(asset, camera, world, &at)?, name });
         }
         let light = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
@@ -114,10 +111,17 @@ fn quaternion(q: [f32; 4]) -> DQuat {
     if q.length_squared().is_normal() { q.normalize() } else { DQuat::IDENTITY }
 }
 
-/// Places of a node's mesh: one, or those of `EXT_mesh_gpu_instancing`.
-fn instances(asset: &Asset<'_>, node: &Node, world: DMat4, at: &str) -> Result<Vec<DMat4>, LoadError> {
+/// Places of a node's mesh: one, or those of `EXT_mesh_gpu_instancing`. There are `others` in the scene already.
+fn instances(asset: &Asset<'_>, node: &Node, world: DMat4, at: &str, others: usize) -> Result<Vec<DMat4>, LoadError> {
+    let room = |count: usize| {
+        let most = asset.most_placements();
+        let what = || format!("more than {most} meshes in the scene, in a document of its size");
+        if count <= most.saturating_sub(others) { Ok(()) } else { Err(asset.error(at, what())) }
+    };
     let name = "EXT_mesh_gpu_instancing";
-    let Some(value) = node.extensions.as_ref().and_then(|e| e.others.get(name)) else { return Ok(vec![world]) };
+    let Some(value) = node.extensions.as_ref().and_then(|e| e.others.get(name)) else {
+        return room(1).map(|()| vec![world]);
+    };
     let at = format!("{at}.extensions.{name}.attributes");
     let numbers = |key: &str, wanted: Type| {
         let index = value.get("attributes").and_then(|a| a.get(key)).and_then(|i| i.as_u64());
@@ -131,6 +135,7 @@ fn instances(asset: &Asset<'_>, node: &Node, world: DMat4, at: &str) -> Result<V
     let Some(count) = counts.first().copied().filter(|n| counts.iter().all(|m| m == n)) else {
         return Err(asset.error(at, format!("accessors of {counts:?} elements")));
     };
+    room(count)?;
     let vector = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
     let place = |i: usize| {
         let scale = scales.as_ref().map_or(DVec3::ONE, |n| vector(n.get(i)));

@@ -11,7 +11,6 @@ use gltf_json::texture::WrappingMode;
 use gltf_json::validation::Checked;
 use gltf_json::{Image, Index, texture};
 use std::collections::HashMap;
-use std::io::ErrorKind;
 
 /// What a material wants of a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -95,6 +94,7 @@ impl Textures {
                     if let Some(least) = wanted.threshold {
                         texture.texels.iter_mut().for_each(|t| t[3] = if u16::from(t[3]) >= least { 255 } else { 0 });
                     }
+                    loader.charge(&texture);
                     scene.textures.push(texture);
                     (scene.textures.len() - 1) as u32
                 });
@@ -176,12 +176,15 @@ fn decode(loader: &mut Loader, asset: &Asset<'_>, index: Index<Image>, at: &str)
         (None, None) => return Err(asset.error(at, "neither a URI nor a buffer view")),
     };
     let bytes = match read {
-        Err(LoadError::Read { source, .. }) if source.kind() == ErrorKind::NotFound => {
-            loader.note(format!("{at}: there is no file {}; materials are without it", super::quoted(&name)));
+        Err(e) if e.is_missing() => {
+            loader.replace(e, "materials are without it")?;
             return Ok(None);
         }
         read => read?,
     };
-    let texture = loader.decode(&bytes).map_err(|what| asset.error(at, what))?;
-    Ok(Some(Texture { name, ..texture }))
+    let image = loader.decode(&bytes).map_err(|what| asset.error(&at, what))?;
+    if let Some(what) = image.ignored {
+        loader.replace(asset.error(&at, what), "the picture was taken without that")?;
+    }
+    Ok(Some(Texture { name, ..image.texture }))
 }
