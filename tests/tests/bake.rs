@@ -251,7 +251,7 @@ fn rough_plastics_share_tables() {
     assert_eq!(view.tables.len(), 3 * 64);
     assert_eq!(view.materials[3].eta[0], 1.5);
     assert!((view.materials[5].fdr - 0.5963).abs() < 1e-3, "{}", view.materials[5].fdr);
-    assert_eq!(view.names, b"grey\ncoat 0\ncoat 1\ncoat 2\ncoat 3\ncoat 4\n");
+    assert_eq!(view.names, b"grey\ncoat 0\ncoat 1\ncoat 2\ncoat 3\ncoat 4\ntri\n");
 }
 
 /// Killed by: texels without alpha, or in another order.

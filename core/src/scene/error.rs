@@ -309,7 +309,7 @@ pub enum SceneError {
         /// Sum over the items of (stated - actual) / stated probability, each weighed by up to +-1.
         deviation: f32,
     },
-    /// Names are not one line of UTF-8 per material.
+    /// Names are not UTF-8 with a line for each material at least.
     Names {
         /// Lines found.
         lines: u64,
@@ -416,7 +416,10 @@ impl fmt::Display for SceneError {
                 write!(f, "{}[{first}..+{length}]: probabilities disagree with thresholds by {deviation}", of.name())
             }
             Self::Names { lines, materials } => {
-                write!(f, "names must be one line of UTF-8 per material: {lines} lines, {materials} materials")
+                write!(
+                    f,
+                    "names must be UTF-8 with a line for each material at least: {lines} lines, {materials} materials"
+                )
             }
         }
     }
