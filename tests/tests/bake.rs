@@ -2,7 +2,9 @@
 
 use croupier::Scene;
 use croupier::unstable::scene::Effects;
-use croupier::unstable::scene::blob::{ALIGN, Header, LightKind, NONE, Section, TRIANGLE_SMOOTH, content_hash};
+use croupier::unstable::scene::blob::{
+    ALIGN, Header, LightKind, NONE, Section, TRIANGLE_OBJECT_SHIFT, TRIANGLE_SMOOTH, content_hash,
+};
 use croupier_host::bake::{BakeOptions, Baked, Stage, bake};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin::{cornell_box, sky};
@@ -132,7 +134,8 @@ fn normals_are_unit_or_not_used() {
     let baked = baked(&scene);
     let view = Scene::from_bytes(&baked.bytes).unwrap();
     assert_eq!(baked.report.flattened, 1);
-    assert_eq!(view.triangles.iter().map(|t| t.flags).collect::<Vec<_>>(), [TRIANGLE_SMOOTH, 0]);
+    let second = 1 << TRIANGLE_OBJECT_SHIFT;
+    assert_eq!(view.triangles.iter().map(|t| t.flags).collect::<Vec<_>>(), [TRIANGLE_SMOOTH, second]);
     assert_eq!((view.vertices[0].n, view.vertices[0].uv), ([0.0, 0.0, 1.0], [0.5, 0.25]));
 }
 

@@ -201,7 +201,7 @@ fn balls_are_as_bright_as_fine_meshes() {
         let balls: Vec<Ball> = (0..).zip(PLACES).map(|(m, (center, radius))| ball(center, radius, m)).collect();
         let of = |bytes: &AlignedBytes, balls: &[Ball]| {
             let s = Settings { max_depth: 8, seed: 3, ..settings(bytes, strategy) };
-            let seen = render(bytes, balls, &s, &[96, 160]).image;
+            let seen = render(bytes, balls, &s, &[96, 416]).image;
             assert_eq!(seen.counters.non_finite, 0, "{what}");
             (seen.mean(), seen.error_of_mean())
         };
@@ -306,7 +306,7 @@ fn balls_have_normals_coordinates_materials_and_objects() {
     assert_eq!([of(Aov::Material, middle), of(Aov::Object, middle)], [[mapped as f32], [-1.0]]);
     let normal = of(Aov::Normal, middle);
     let toward = [0.6, 0.0, 0.8];
-    assert!(normal.iter().zip(toward).all(|(n, t)| (n - t).abs() < 0.12), "{normal:?}");
+    assert!(normal.iter().zip(toward).all(|(n, t)| (n - t).abs() < 0.15), "{normal:?}");
     assert!((of(Aov::Depth, middle)[0] - 39.0).abs() < 0.1);
     let far = at(0.0);
     assert_eq!([of(Aov::Material, far), of(Aov::Object, far)], [[wall as f32], [0.0]]);
@@ -326,7 +326,7 @@ fn balls_hold_media() {
         let material = add_medium(&mut s, homogeneous([0.5, 1.0, 2.0], [0.0; 3], 0.0), Model::Null);
         let bytes = blob(&s);
         let s = Settings { max_depth: 4, ..settings(&bytes, "none") };
-        let seen = render(&bytes, &[ball([0.0; 3], 1.0, material)], &s, &[256]).image;
+        let seen = render(&bytes, &[ball([0.0; 3], 1.0, material)], &s, &[4096]).image;
         for (c, sigma) in [0.5f64, 1.0, 2.0].into_iter().enumerate() {
             let expected = (-sigma * length).exp();
             let error = LIMIT * seen.error_of_channel(c) + 1e-4;
@@ -374,7 +374,8 @@ fn a_faulty_surface_spoils_its_own_lanes_only() {
     let right = ball([0.0; 3], 1.0, textured);
     let sound = render(&bytes, &[right], &s, &[8]);
     let faulty = render(&bytes, &[Ball { faulty: true, ..right }], &s, &[8]);
-    assert!(faulty.image.counters.non_finite > 0);
+    let seen = |s: &Seen| s.plane(Aov::Albedo, 2)[8 * 32 + 17];
+    assert!(seen(&sound) > 0.9 && seen(&faulty) < 0.1);
     let mut other = 0;
     for (i, (a, b)) in sound.image.pixels.iter().zip(&faulty.image.pixels).enumerate() {
         assert!(b.sum.iter().all(|x| x.is_finite()));

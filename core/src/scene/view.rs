@@ -108,7 +108,7 @@ impl<'s> Scene<'s> {
 
     /// Name of a material, empty if it has none.
     pub fn material_name(&self, material: u32) -> &'s str {
-        self.name(material as usize)
+        if (material as usize) < self.materials.len() { self.name(material as usize) } else { "" }
     }
 
     /// Index of the object that a hit belongs to: of a triangle within instances, the index of the world's instance around
