@@ -46,6 +46,7 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 /// triangle, and says in [`Self::surface`] what is there. Such surfaces scatter, cast shadows, bound media and appear in
 /// auxiliary values as triangles do. They have materials of the scene. What is different:
 ///
+/// * They do not move: in auxiliary values their motion is 0.
 /// * They do not emit, whatever their material: light samples are drawn from the scene's lights alone.
 /// * The effects that their materials call for are taken to be those of all materials of the scene, as the session starts.
 /// * Statistics are kept within [`SceneInfo`](crate::unstable::scene::blob::SceneInfo)'s bounds; what lies outside shares

@@ -50,7 +50,7 @@ pub enum Aov {
     /// Motion of the first hit across the image while the shutter is open, xy: where the surface point is seen when it closes
     /// less where it is seen when it opens, in pixels, x to the right and y down. 0 of what does not move, of scattering in
     /// media, of surfaces of the host's own ([`Intersector`](crate::unstable::accel::Intersector)), and of points that are
-    /// behind the camera at either time. Lenses count as pinholes.
+    /// behind the camera at either time. The camera is the scene's, which does not move; its lens counts as a pinhole.
     Motion,
 }
 

@@ -4,6 +4,7 @@ use super::class::PHASE_KIND;
 use super::media_set::{MediaSet8, media_behind};
 use super::packets::RayState8;
 use super::relief::relief;
+use super::surfaces::places;
 use super::vertex::PathVertex8;
 use crate::accel::Intersector;
 use crate::bsdf::{self, Bsdf, Inputs8, Lobes, Visitor};
@@ -206,12 +207,6 @@ fn own_reflectance<W: World>(world: &W, hit: &SurfaceHit8, own: Option<&OwnHits8
 #[inline(always)]
 pub(crate) fn may_pass<W: World>(scene: &Scene<'_>) -> bool {
     W::EFFECTS.intersects(Effects::STRAIGHT) && scene.effects.intersects(Effects::STRAIGHT)
-}
-
-/// Does the scene place triangles in instances?
-#[inline(always)]
-pub(crate) fn places<W: World>(scene: &Scene<'_>) -> bool {
-    W::EFFECTS.contains(Effects::INSTANCES) && scene.effects.contains(Effects::INSTANCES)
 }
 
 /// Does anything move while the shutter is open?

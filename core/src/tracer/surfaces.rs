@@ -1,11 +1,16 @@
 //! The surfaces of hits: triangles of the scene, or what a host's intersector brings.
 
-use super::shading::places;
 use crate::accel::Intersector;
 use crate::geometry::{Hit8, NO_INSTANCE, OwnHits8, Ray8, SurfaceHit8, SurfacePoint8};
-use crate::scene::Scene;
+use crate::scene::{Effects, Scene};
 use crate::world::World;
 use croupier_simd::U32x8;
+
+/// Does the scene place triangles in instances?
+#[inline(always)]
+pub(crate) fn places<W: World>(scene: &Scene<'_>) -> bool {
+    W::EFFECTS.contains(Effects::INSTANCES) && scene.effects.contains(Effects::INSTANCES)
+}
 
 /// The surfaces that `rays` hit, their points, and what is known of those of the host's own, if there are any.
 #[inline(always)]
