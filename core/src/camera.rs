@@ -9,7 +9,7 @@
 //! `lens_radius` across the axis; all rays of an image point meet in the plane at `focus_distance` along the axis.
 
 use crate::scene::blob::{Camera, CameraKind};
-use croupier_simd::{F32x8, Vec3x8};
+use croupier_simd::{F32x8, Mask8, Vec3x8};
 
 /// Eight rays of a perspective camera: origins and unit directions, world space.
 ///
@@ -59,6 +59,35 @@ pub fn project(camera: &Camera, size: [u32; 2], x: F32x8, y: F32x8, u_lens: [F32
         }
         Some(CameraKind::Perspective) | None => generate(camera, size, x, y, u_lens),
     }
+}
+
+/// Points of the image, in pixels, at which the camera sees points of the world, and the lanes that it can see: the inverse
+/// of [`project`], of a pinhole if there is a lens. The points may lie outside of the image.
+#[inline(never)]
+pub fn image_point(camera: &Camera, size: [u32; 2], p: Vec3x8) -> ([F32x8; 2], Mask8) {
+    let v = |a: [f32; 3]| Vec3x8::splat(a[0], a[1], a[2]);
+    let (forward, right, down) = (v(camera.forward), v(camera.right), v(camera.down));
+    let q = p - v(camera.origin);
+    // coordinates along the three axes, by Cramer's rule
+    let volume = F32x8::ONE / right.cross(down).dot(forward);
+    let (x, y, z) = (q.dot(down.cross(forward)), q.dot(forward.cross(right)), q.dot(right.cross(down)));
+    let (x, y, z) = (x * volume, y * volume, z * volume);
+    let (_, stretch) = scaled(camera, size, F32x8::ZERO, F32x8::ZERO);
+    let (sx, sy, seen) = match CameraKind::from_u32(camera.kind) {
+        Some(CameraKind::Orthographic) => (x / stretch, y, Mask8::all_lanes()),
+        Some(CameraKind::Panoramic) => {
+            let level = (x * x + z * z).sqrt();
+            (
+                x.atan2(z) * core::f32::consts::FRAC_1_PI,
+                y.atan2(level) * core::f32::consts::FRAC_2_PI,
+                q.length().gt(F32x8::ZERO),
+            )
+        }
+        Some(CameraKind::Perspective) | None => (x / (z * stretch), y / z, z.gt(F32x8::ZERO)),
+    };
+    let [width, height] = size.map(|s| s.max(1) as f32);
+    let at = [(sx + 1.0) * (0.5 * width), (sy + 1.0) * (0.5 * height)];
+    (at, seen & at[0].is_finite() & at[1].is_finite())
 }
 
 /// Area-preserving map of the unit square to the unit disk (Shirley and Chiu, JGT 2(3) 1997): squares around the centre

@@ -188,7 +188,7 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector, X: Extension> SessionBuil
         SessionBuilder { scene, intersector, selector, extension, profile: PhantomData }
     }
 
-    /// Another intersector than the scene's own tree.
+    /// Another intersector than the scene's own tree; it may bring surfaces of its own ([`Intersector::SURFACES`]).
     pub fn intersector<J: Intersector>(self, intersector: J) -> SessionBuilder<'s, P, J, L, X> {
         let Self { scene, selector, extension, profile, .. } = self;
         SessionBuilder { scene, intersector, selector, extension, profile }
@@ -239,6 +239,7 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector, X: Extension> SessionBuil
             return Err(SessionError::Instructions { missing });
         }
         let Self { scene, intersector, selector, extension, profile } = self;
+        let scene = with_surfaces::<I>(scene);
         check_effects::<P, X>(&scene)?;
         let camera_media = || camera_media::<P, I>(&scene, &intersector);
         let mut c = Carver::new(block, plan.session()).map_err(SessionError::Memory)?;
@@ -272,7 +273,7 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector, X: Extension> SessionBuil
     }
 
     /// The state of a session with the parts of this builder, for shards to step; in a fixed short time, so that it can
-    /// be made for each step. After the scene has changed: [`SessionState::change_scene`] first, or the shards begin
+    /// be made for each step (with [`Intersector::SURFACES`] in proportion to the number of materials). After the scene has changed: [`SessionState::change_scene`] first, or the shards begin
     /// anew and the iteration cannot end.
     ///
     /// # Errors
@@ -282,6 +283,7 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector, X: Extension> SessionBuil
         's: 'a,
     {
         let Self { scene, intersector, selector, extension, profile } = self;
+        let scene = with_surfaces::<I>(scene);
         check_effects::<P, X>(&scene)?;
         let same = state.scene == scene.hash;
         let camera_media = if same { state.camera_media } else { camera_media::<P, I>(&scene, &intersector) };
@@ -292,6 +294,11 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector, X: Extension> SessionBuil
 /// Effects of the kernels: those of the profile, the host's own scattering model only where there is one.
 const fn effects<P: Profile, X: Extension>() -> Effects {
     if X::BSDF { P::EFFECTS } else { P::EFFECTS.without(Effects::OWN) }
+}
+
+/// The scene as the surfaces of an intersector see it: any material may be theirs.
+fn with_surfaces<I: Intersector>(scene: Scene<'_>) -> Scene<'_> {
+    if I::SURFACES { scene.with_all_materials() } else { scene }
 }
 
 fn check_effects<P: Profile, X: Extension>(scene: &Scene<'_>) -> Result<(), SessionError> {

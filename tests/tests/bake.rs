@@ -2,7 +2,9 @@
 
 use croupier::Scene;
 use croupier::unstable::scene::Effects;
-use croupier::unstable::scene::blob::{ALIGN, Header, LightKind, NONE, Section, TRIANGLE_SMOOTH, content_hash};
+use croupier::unstable::scene::blob::{
+    ALIGN, Header, LightKind, NONE, Section, TRIANGLE_OBJECT_SHIFT, TRIANGLE_SMOOTH, content_hash,
+};
 use croupier_host::bake::{BakeOptions, Baked, Stage, bake};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin::{cornell_box, sky};
@@ -132,7 +134,8 @@ fn normals_are_unit_or_not_used() {
     let baked = baked(&scene);
     let view = Scene::from_bytes(&baked.bytes).unwrap();
     assert_eq!(baked.report.flattened, 1);
-    assert_eq!(view.triangles.iter().map(|t| t.flags).collect::<Vec<_>>(), [TRIANGLE_SMOOTH, 0]);
+    let second = 1 << TRIANGLE_OBJECT_SHIFT;
+    assert_eq!(view.triangles.iter().map(|t| t.flags).collect::<Vec<_>>(), [TRIANGLE_SMOOTH, second]);
     assert_eq!((view.vertices[0].n, view.vertices[0].uv), ([0.0, 0.0, 1.0], [0.5, 0.25]));
 }
 
@@ -251,7 +254,7 @@ fn rough_plastics_share_tables() {
     assert_eq!(view.tables.len(), 3 * 64);
     assert_eq!(view.materials[3].eta[0], 1.5);
     assert!((view.materials[5].fdr - 0.5963).abs() < 1e-3, "{}", view.materials[5].fdr);
-    assert_eq!(view.names, b"grey\ncoat 0\ncoat 1\ncoat 2\ncoat 3\ncoat 4\n");
+    assert_eq!(view.names, b"grey\ncoat 0\ncoat 1\ncoat 2\ncoat 3\ncoat 4\ntri\n");
 }
 
 /// Killed by: texels without alpha, or in another order.

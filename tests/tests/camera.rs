@@ -1,6 +1,6 @@
 //! Camera rays against f64 geometry.
 
-use croupier::unstable::camera::{concentric_disk, generate, project};
+use croupier::unstable::camera::{concentric_disk, generate, image_point, project};
 use croupier::unstable::scene::blob::{Camera, CameraKind};
 use croupier::unstable::simd::F32x8;
 use croupier_tests::light_oracle::{cross, dot, length, sub, unit, wide};
@@ -193,4 +193,39 @@ fn special_lens_numbers_stay_on_the_disk() {
     }
     let [a, b] = concentric_disk([F32x8::splat(0.5); 2]);
     assert_eq!((a, b), (F32x8::ZERO, F32x8::ZERO));
+}
+
+/// Killed by: an axis, a sign or a stretch of another projection's, a distance that is divided by twice, points behind the
+/// camera that are seen, longitudes that grow to the left.
+#[test]
+fn points_are_seen_where_their_rays_came_from() {
+    let mut rng = SplitMix(9);
+    let (perspective, axes) = camera(44.0, 0.3, 2.0);
+    let unit_axes = Camera { right: axes[1].map(|x| x as f32), down: axes[2].map(|x| x as f32), ..perspective };
+    for kind in CameraKind::ALL {
+        let c = match kind {
+            CameraKind::Perspective => perspective,
+            _ => Camera { lens_radius: 0.0, ..unit_axes },
+        };
+        let c = Camera { kind: *kind as u32, ..c };
+        for size in [SIZE, [180, 320], [1, 1]] {
+            for _ in 0..500 {
+                // near the edges of a panorama, both sides are
+                let within =
+                    |n: u32, rng: &mut SplitMix| F32x8::from_fn(|_| ((0.01 + 0.98 * rng.f64()) * f64::from(n)) as f32);
+                let (x, y) = (within(size[0], &mut rng), within(size[1], &mut rng));
+                let (o, d) = project(&Camera { lens_radius: 0.0, ..c }, size, x, y, [F32x8::splat(0.5); 2]);
+                let t = F32x8::from_fn(|_| (0.1 + 20.0 * rng.f64()) as f32);
+                let ([px, py], seen) = image_point(&c, size, o + d * t);
+                assert!(seen.all());
+                let largest = size[0].max(size[1]) as f32;
+                for i in 0..8 {
+                    let off = (px.lane(i) - x.lane(i)).abs().max((py.lane(i) - y.lane(i)).abs());
+                    assert!(off < 5e-6 * largest, "{kind:?} {size:?}: {off}");
+                }
+                let (_, behind) = image_point(&c, size, o - d * t);
+                assert_eq!(behind.any(), *kind != CameraKind::Perspective);
+            }
+        }
+    }
 }

@@ -58,7 +58,7 @@ fn every_scene_bakes_whole() {
         assert_eq!(view.info.dropped_triangles, r.dropped_degenerate, "{name}");
         assert_eq!(u64::from(view.info.max_depth), json["transport"]["max_depth"].as_u64().unwrap());
         let names: Vec<&str> = std::str::from_utf8(view.names).unwrap().lines().collect();
-        assert_eq!(names.len(), view.materials.len());
+        assert_eq!(names.len(), view.materials.len() + scene.instances.len() + scene.objects.len());
         for (m, name) in view.materials.iter().zip(names) {
             let kind = MaterialKind::from_u32(m.kind).unwrap().name();
             assert_eq!(json["materials"][name]["type"], kind, "{name}");

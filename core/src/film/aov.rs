@@ -1,5 +1,6 @@
 //! Auxiliary values of pixels ("AOVs"): which there are, and planes of those that were asked for.
 
+use super::coverage::{self, NO_INDEX, RANKS};
 use crate::bits::bit_set;
 use crate::names::names;
 use bytemuck::{Pod, Zeroable};
@@ -36,15 +37,31 @@ pub enum Aov {
     /// Index of the first hit's material, of the first camera sample of the pixel in its first iteration; -1 where
     /// that sample met no surface. Exact below 2^24.
     Material,
+    /// Index of the first hit's object ([`Scene::object_of`](crate::Scene::object_of)), of the same sample as
+    /// [`Self::Material`]; -1 where it met no surface. Exact below 2^24. [`Scene::object_name`](crate::Scene::object_name)
+    /// has the names.
+    Object,
+    /// The two materials that cover most of the pixel: index and share of the camera samples, largest share first; index -1
+    /// and share 0 where there is none. Shares of pixels in which samples meet two materials are exact, of others they may
+    /// be too small, as an iteration counts the two that it meets first.
+    MaterialCoverage,
+    /// The two objects that cover most of the pixel, likewise.
+    ObjectCoverage,
+    /// Motion of the first hit across the image while the shutter is open, xy: where the surface point is seen when it closes
+    /// less where it is seen when it opens, in pixels, x to the right and y down. 0 of what does not move, of scattering in
+    /// media, of surfaces of the host's own ([`Intersector`](crate::unstable::accel::Intersector)), and of points that are
+    /// behind the camera at either time. The camera is the scene's, which does not move; its lens counts as a pinhole.
+    Motion,
 }
 
 names!(Aov: Albedo = "albedo", Normal = "normal", Depth = "depth", Alpha = "alpha", Factors = "factors",
     Paths = "paths", Cost = "cost", Emission = "emission", Direct = "direct", Indirect = "indirect",
-    Material = "material");
+    Material = "material", Object = "object", MaterialCoverage = "material_coverage",
+    ObjectCoverage = "object_coverage", Motion = "motion");
 
 impl Aov {
     /// All of them.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 15] = [
         Self::Albedo,
         Self::Normal,
         Self::Depth,
@@ -56,6 +73,10 @@ impl Aov {
         Self::Direct,
         Self::Indirect,
         Self::Material,
+        Self::Object,
+        Self::MaterialCoverage,
+        Self::ObjectCoverage,
+        Self::Motion,
     ];
 
     /// Names of the planes, as usual in EXR files.
@@ -68,12 +89,19 @@ impl Aov {
             Self::Factors => &["S1", "S2", "S3", "S4", "N1", "N2", "N3", "N4"],
             Self::Paths => &["N"],
             Self::Cost => &[],
-            Self::Material => &["id"],
+            Self::Material | Self::Object => &["id"],
+            Self::MaterialCoverage | Self::ObjectCoverage => &["id1", "coverage1", "id2", "coverage2"],
+            Self::Motion => &["X", "Y"],
         }
     }
 
-    const fn is_id(self) -> bool {
-        matches!(self, Self::Material)
+    /// Channels that hold indices, one bit each.
+    const fn indices(self) -> u64 {
+        match self {
+            Self::Material | Self::Object => 1,
+            Self::MaterialCoverage | Self::ObjectCoverage => 0b101,
+            _ => 0,
+        }
     }
 }
 
@@ -90,7 +118,11 @@ impl AovSet {
     /// Albedo, normal, depth and alpha of the first hits, factors of roulette, paths and cost.
     pub const STANDARD: Self = Self((1 << (Aov::Cost as u32 + 1)) - 1);
     /// What is known of first hits.
-    pub(crate) const FIRST_HITS: Self = Self::of(&[Aov::Albedo, Aov::Normal, Aov::Depth, Aov::Alpha, Aov::Material]);
+    pub(crate) const FIRST_HITS: Self = Self::FIRST_EIGHT.with(Self::SURFACES);
+    /// What surfaces are and how they move.
+    pub(crate) const SURFACES: Self = Self::of(&[Aov::Material, Aov::Object, Aov::Motion]).with(Self::COVERAGE);
+    /// Coverage by index.
+    const COVERAGE: Self = Self::of(&[Aov::MaterialCoverage, Aov::ObjectCoverage]);
     /// Those of first hits that are the first planes if a set has all of them, eight in a row.
     pub(crate) const FIRST_EIGHT: Self = Self::of(&[Aov::Albedo, Aov::Normal, Aov::Depth, Aov::Alpha]);
     /// Parts of the radiance.
@@ -149,15 +181,19 @@ pub(crate) struct AovLayout {
     pub planes: usize,
     /// Planes of indices, one bit each.
     ids: u64,
+    /// Planes that hold no means, one bit each.
+    kept: u64,
 }
 
 impl AovLayout {
     pub(crate) fn new(set: AovSet) -> Self {
-        let mut layout = Self { set, first: [0; Aov::ALL.len()], planes: 0, ids: 0 };
+        let mut layout = Self { set, first: [0; Aov::ALL.len()], planes: 0, ids: 0, kept: 0 };
         for (aov, first) in Aov::ALL.into_iter().zip(&mut layout.first) {
             *first = layout.planes;
             if set.has(aov) {
-                layout.ids |= u64::from(aov.is_id()) << layout.planes;
+                let of_coverage = if AovSet::COVERAGE.has(aov) { 0b1111 } else { 0 };
+                layout.ids |= aov.indices() << layout.planes;
+                layout.kept |= (aov.indices() | of_coverage) << layout.planes;
                 layout.planes += aov.channels().len();
             }
         }
@@ -185,6 +221,12 @@ impl AovLayout {
     #[inline(always)]
     fn is_id(&self, plane: usize) -> bool {
         self.ids >> plane & 1 != 0
+    }
+
+    /// Does the plane hold something else than means?
+    #[inline(always)]
+    fn is_kept(&self, plane: usize) -> bool {
+        self.kept >> plane & 1 != 0
     }
 }
 
@@ -226,7 +268,16 @@ impl<'m> AovSums<'m> {
         let row = self.row_mut(pixel);
         row.fill(0.0);
         if layout.ids != 0 {
-            row.iter_mut().enumerate().filter(|(plane, _)| layout.is_id(*plane)).for_each(|(_, x)| *x = -1.0);
+            row.iter_mut().enumerate().filter(|(plane, _)| layout.is_id(*plane)).for_each(|(_, x)| *x = NO_INDEX);
+        }
+    }
+
+    /// Counts a sample of `index` towards the coverage of a pixel.
+    pub(crate) fn cover(&mut self, pixel: usize, aov: Aov, index: f32) {
+        if let Some(first) = self.layout.first(aov)
+            && let Some(row) = self.row_mut(pixel).get_mut(first..)
+        {
+            coverage::count(row, index);
         }
     }
 
@@ -282,7 +333,7 @@ impl<'m> AovPlanes<'m> {
         let means = self.values.get_mut(pixel..).unwrap_or(&mut []).iter_mut().step_by(self.pixels.max(1));
         if more == 0.0 {
             if before == 0 {
-                means.zip(0..).for_each(|(mean, plane)| *mean = if self.layout.is_id(plane) { -1.0 } else { 0.0 });
+                means.zip(0..).for_each(|(mean, plane)| *mean = if self.layout.is_id(plane) { NO_INDEX } else { 0.0 });
             }
             return;
         }
@@ -296,10 +347,31 @@ impl<'m> AovPlanes<'m> {
             return;
         }
         for ((mean, sum), plane) in means.zip(sums).zip(0..) {
-            if !self.layout.is_id(plane) {
+            if !self.layout.is_kept(plane) {
                 *mean = merged(*mean, *sum);
-            } else if first {
+            } else if first && self.layout.is_id(plane) {
                 *mean = *sum;
+            }
+        }
+        if self.layout.any(AovSet::COVERAGE) {
+            self.merge_coverage(pixel, before, more, sums);
+        }
+    }
+
+    /// [`Self::merge`] of coverage by index.
+    #[cold]
+    fn merge_coverage(&mut self, pixel: usize, before: u32, more: f64, sums: &[f32]) {
+        for aov in [Aov::MaterialCoverage, Aov::ObjectCoverage] {
+            let Some(first) = self.layout.first(aov) else { continue };
+            let places: [usize; 2 * RANKS] = core::array::from_fn(|k| (first + k) * self.pixels + pixel);
+            let old = places.map(|at| self.values.get(at).copied().unwrap_or(0.0));
+            let [a, b, c, d] = old;
+            let counts = sums.get(first..first + 2 * RANKS).unwrap_or(&[]);
+            let merged = coverage::merge([[a, b], [c, d]], before.into(), more, counts);
+            for (at, x) in places.iter().zip(merged.as_flattened()) {
+                if let Some(value) = self.values.get_mut(*at) {
+                    *value = *x;
+                }
             }
         }
     }

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | `pixel` | sums of one pixel |
 //! | `aov` | auxiliary values: [`Aov`], their planes |
+//! | `coverage` | shares of a pixel by index |
 //! | `short` | 32-bit numbers with the range of `f64` |
 //! | `error` | relMSE of a pixel, [`ErrorEstimate`] |
 //! | `independence` | correlation of an iteration's samples, measured |
@@ -12,6 +13,7 @@
 //! | `sqrt` | square root in f64 |
 
 mod aov;
+mod coverage;
 mod error;
 mod independence;
 mod pixel;

@@ -38,9 +38,9 @@ pub struct Hit8 {
     pub hit: Mask8,
     /// Ray parameter.
     pub t: F32x8,
-    /// Triangle index.
+    /// Triangle index, or from [`FIRST_OWN_SURFACE`](super::FIRST_OWN_SURFACE) on a surface of the host's own.
     pub triangle: U32x8,
-    /// Barycentric weight of the triangle's vertex b.
+    /// Barycentric weight of the triangle's vertex b. `u`, `v` and `instance` of an own surface are the host's to use.
     pub u: F32x8,
     /// Barycentric weight of the triangle's vertex c; vertex a has `1 - u - v`.
     pub v: F32x8,

@@ -104,7 +104,9 @@ kinds! {
         EnvAlias = 13, "environment alias tables";
         /// [`Camera`], exactly one.
         Cameras = 14, "camera";
-        /// Bytes: material names, each ended by a newline, in material order, UTF-8; or nothing.
+        /// Bytes: names, each ended by a newline, UTF-8: of all materials in their order, then, as far as there are any, of
+        /// the world's instances and of the objects of its own triangles ([`Scene::object_of`](crate::Scene::object_of));
+        /// or nothing.
         Names = 15, "names";
         /// [`Medium`]s, at most [`MAX_MEDIA`], those of higher priority first.
         Media = 16, "media";
@@ -203,12 +205,16 @@ pub struct Triangle {
     pub material: u32,
     /// Light index if it emits, else [`NONE`]. Of an instanced object: its number among the object's emitting triangles.
     pub light: u32,
-    /// [`TRIANGLE_SMOOTH`].
+    /// [`TRIANGLE_SMOOTH`], and the number of the object from bit [`TRIANGLE_OBJECT_SHIFT`] on.
     pub flags: u32,
 }
 
 /// Interpolate the vertex normals; else the geometric normal shades.
 pub const TRIANGLE_SMOOTH: u32 = 1;
+
+/// First bit of the object's number in [`Triangle::flags`], which auxiliary values show
+/// ([`Scene::object_of`](crate::Scene::object_of)); transport does not read it.
+pub const TRIANGLE_OBJECT_SHIFT: u32 = 8;
 
 /// One vertex, world space or that of its object.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]

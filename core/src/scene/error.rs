@@ -320,7 +320,7 @@ pub enum SceneError {
         /// Light.
         light: u32,
     },
-    /// Names are not one line of UTF-8 per material.
+    /// Names are not UTF-8 with a line for each material at least.
     Names {
         /// Lines found.
         lines: u64,
@@ -430,7 +430,10 @@ impl fmt::Display for SceneError {
                 write!(f, "lights[{light}]: lights with shapes come last, at most {MAX_SHAPE_LIGHTS} of them")
             }
             Self::Names { lines, materials } => {
-                write!(f, "names must be one line of UTF-8 per material: {lines} lines, {materials} materials")
+                write!(
+                    f,
+                    "names must be UTF-8 with a line for each material at least: {lines} lines, {materials} materials"
+                )
             }
         }
     }

@@ -46,7 +46,8 @@ pub struct Records<'s> {
     pub objects: &'s [Object],
     /// Instances, those of each object in a run.
     pub instances: &'s [Instance],
-    /// Material names, newline-separated; see [`super::Scene::material_name`].
+    /// Names of materials and, behind them, of objects, a line each; see [`super::Scene::material_name`] and
+    /// [`super::Scene::object_name`].
     pub names: &'s [u8],
     /// Effects that the scene calls for: of the materials that triangles use, of lights and camera.
     pub effects: Effects,

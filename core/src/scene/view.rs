@@ -84,6 +84,12 @@ impl<'s> Scene<'s> {
         })
     }
 
+    /// The scene with the effects of all of its materials, for surfaces that are not triangles.
+    pub(crate) fn with_all_materials(mut self) -> Self {
+        self.0.effects = self.0.effects.with(validate::effects_of_materials(&self.0));
+        self
+    }
+
     /// Takes records as they are, for tests that need a part of a scene. If they break a promise of [`Scene`], pictures
     /// may be wrong, it may panic, and a walk of the tree may never end; memory stays safe.
     #[doc(hidden)]
@@ -102,7 +108,28 @@ impl<'s> Scene<'s> {
 
     /// Name of a material, empty if it has none.
     pub fn material_name(&self, material: u32) -> &'s str {
-        let names = core::str::from_utf8(self.names).unwrap_or("");
-        names.lines().nth(material as usize).unwrap_or("")
+        if (material as usize) < self.materials.len() { self.name(material as usize) } else { "" }
+    }
+
+    /// Index of the object that a hit belongs to: of a triangle within instances, the index of the world's instance around
+    /// it; of the world's own triangles, their object's number behind the world's instances. [`NONE`] if there is no such
+    /// triangle.
+    pub fn object_of(&self, triangle: u32, world_instance: u32) -> u32 {
+        if world_instance != NONE {
+            return world_instance;
+        }
+        let instances = self.objects.first().map_or(0, |world| world.instances);
+        let number = |t: &Triangle| instances.saturating_add(t.flags >> TRIANGLE_OBJECT_SHIFT);
+        self.triangles.get(triangle as usize).map_or(NONE, number)
+    }
+
+    /// Name of an object by its index ([`Self::object_of`]), empty if it has none. Hosts may bake scenes without names.
+    pub fn object_name(&self, object: u32) -> &'s str {
+        self.name(self.materials.len().saturating_add(object as usize))
+    }
+
+    /// A line of the names.
+    fn name(&self, line: usize) -> &'s str {
+        core::str::from_utf8(self.names).unwrap_or("").lines().nth(line).unwrap_or("")
     }
 }

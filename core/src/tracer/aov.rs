@@ -1,8 +1,10 @@
 //! Auxiliary values of pixels: what camera rays hit first, the factors of roulette along the paths, parts of the radiance.
 
 use super::book::{Beyond, Bookkeeping};
+use super::first_surfaces::FirstSurfaces8;
 use super::path::Path8;
 use crate::film::{Aov, AovSet};
+use crate::scene::blob::NONE;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 impl Bookkeeping<'_> {
@@ -16,8 +18,18 @@ impl Bookkeeping<'_> {
         self.aovs.layout.first(Aov::Albedo).is_some()
     }
 
-    /// Adds distance, shading normal, albedo and material of the first hits in the lanes of `first`. Objects are to be
-    /// recorded here too, beside the material, when hits tell them.
+    /// Does the caller want to know what the surfaces are, and how they move?
+    pub(super) fn wants_surfaces(&self) -> bool {
+        self.aovs.layout.any(AovSet::SURFACES)
+    }
+
+    /// Does the caller want to know how they move?
+    pub(super) fn wants_motion(&self) -> bool {
+        self.aovs.layout.first(Aov::Motion).is_some()
+    }
+
+    /// Adds distance, shading normal and albedo of the first hits in the lanes of `first`; returns those whose numbers are
+    /// finite.
     pub(super) fn record_first_hit(
         &mut self,
         first: Mask8,
@@ -25,8 +37,7 @@ impl Bookkeeping<'_> {
         t: F32x8,
         normal: Vec3x8,
         albedo: Vec3x8,
-        material: &[u32; 8],
-    ) {
+    ) -> Mask8 {
         let root = path.root.to_array();
         // a host's intersector may answer anything
         let good = first & t.is_finite() & normal.is_finite() & albedo.is_finite();
@@ -47,9 +58,7 @@ impl Bookkeeping<'_> {
         } else {
             self.add_some_of_eight(good, &root, &rows);
         }
-        if self.aovs.layout.first(Aov::Material).is_some() {
-            self.record_material(good, &root, material);
-        }
+        good
     }
 
     /// Adds those of the eight values of [`AovSet::FIRST_EIGHT`] that are asked for.
@@ -65,16 +74,25 @@ impl Bookkeeping<'_> {
         }
     }
 
-    /// Notes the materials of the first camera samples of pixels.
+    /// Adds what the surfaces of first hits are: indices of the first camera samples of pixels, coverage and motion of all.
     #[cold]
-    fn record_material(&mut self, good: Mask8, root: &[u32; 8], material: &[u32; 8]) {
+    pub(super) fn record_surfaces(&mut self, good: Mask8, path: &Path8, found: &FirstSurfaces8) {
         for i in good.lanes() {
-            let target = self.roots.get(root[i]).target;
-            if target.is_first()
-                && let Some(id) = self.aovs.get(target.pixel(), Aov::Material, 0)
-            {
-                *id = material[i] as i32 as f32;
+            let target = self.roots.get(path.root.lane(i)).target;
+            let pixel = target.pixel();
+            let of_surface = [
+                (Aov::Material, Aov::MaterialCoverage, found.material.lane(i)),
+                (Aov::Object, Aov::ObjectCoverage, found.object.lane(i)),
+            ];
+            for (first, coverage, index) in of_surface.into_iter().filter(|s| s.2 != NONE) {
+                self.aovs.cover(pixel, coverage, index as f32);
+                if target.is_first()
+                    && let Some(known) = self.aovs.get(pixel, first, 0)
+                {
+                    *known = index as f32;
+                }
             }
+            self.aovs.add(pixel, Aov::Motion, found.motion.map(|x| x.lane(i)));
         }
     }
 

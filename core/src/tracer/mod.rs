@@ -8,10 +8,11 @@
 //! | `nee`, `occlude` | next event estimation: light samples, their shadow rays |
 //! | `scatter` | BSDF samples and values |
 //! | `trace` | closest hits |
+//! | `surfaces` | what is known of hits: triangles, surfaces of the host's own |
 //! | `emission` | emission that rays meet, weighted against light samples |
 //! | `shading` | the vertices that hits become |
 //! | `relief` | textures and shading normals of principled surfaces |
-//! | `aov` | auxiliary values of pixels |
+//! | `aov`, `first_surfaces` | auxiliary values of pixels |
 //! | `roulette`, `cache_key` | how many samples a vertex gets, and what is known where it lies |
 //! | `settle` | vertices go to the ring, finished paths to the books |
 //! | `vertex`, `ring`, `class` | path vertices, and the fixed ring in which they wait by class |
@@ -27,6 +28,7 @@ mod camera_rays;
 mod class;
 mod crossing;
 mod emission;
+mod first_surfaces;
 mod free_list;
 mod job;
 mod ledger;
@@ -51,6 +53,7 @@ mod shard;
 #[cfg(test)]
 mod stage_tests;
 mod state;
+mod surfaces;
 mod trace;
 mod vertex;
 

@@ -4,10 +4,11 @@
 use super::book::Bookkeeping;
 use super::crossing::{across, media_towards};
 use super::packets::{Samples8, ShadowRays8};
-use super::shading::{may_pass, places, straight_share};
+use super::shading::{may_pass, straight_share};
+use super::surfaces::surfaces;
 use crate::bsdf;
 use crate::cost::COST_SHADOW;
-use crate::geometry::{self, Hit8, NO_INSTANCE, Ray8, SurfaceHit8};
+use crate::geometry::{self, Hit8, NO_INSTANCE, Ray8};
 use crate::media::{self, Segment8};
 use crate::scene::blob::{MATERIAL_CUTOUT, Material, NONE};
 use crate::scene::{Effects, Scene};
@@ -78,10 +79,9 @@ fn walk<W: World>(world: &W, book: &mut Bookkeeping<'_>, samples: &Samples8, s: 
             hit = world.closest(&ray, search);
             hit.hit &= search;
         }
-        let mut surface = SurfaceHit8::gather(scene, &hit);
-        let point = if places::<W>(scene) { surface.place(scene, ray.time) } else { surface.point() };
+        let (surface, point, own) = surfaces(world, &ray, &mut hit);
         if hit.hit.any() {
-            let share = straight_share(world, &surface, -ray.d.normalize(), point.ng, media);
+            let share = straight_share(world, &surface, own.as_ref(), -ray.d.normalize(), point.ng, media);
             transmittance = Vec3x8::select(hit.hit, transmittance * share, transmittance);
         }
         if W::EFFECTS.contains(Effects::MEDIA) {

@@ -21,6 +21,7 @@
 use super::book::Beyond;
 use super::camera_rays::camera_rays;
 use super::emission;
+use super::first_surfaces::first_surfaces;
 use super::job::Job;
 use super::medium::{Collision8, arrive_in_media, cross_media};
 use super::nee::{sample_lights, shadow_rays};
@@ -32,11 +33,11 @@ use super::refill::{Refill, refill, samples};
 use super::roulette::roulette;
 use super::scatter::scatter;
 use super::settle::settle;
-use super::shading::{albedo, may_pass, moves, places, shade};
+use super::shading::{albedo, may_pass, moves, shade};
 use super::state::State;
+use super::surfaces::surfaces;
 use super::trace::trace;
 use crate::extension::Extension;
-use crate::geometry::SurfaceHit8;
 use crate::scene::Effects;
 use crate::world::World;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -89,12 +90,12 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
         rays.ray.time = book.roots.times(rays.path.root, rays.active);
     }
 
-    let mut hit = trace(world, book, &rays, kind);
+    let mut traced = trace(world, book, &rays, kind);
     let inside = if W::EFFECTS.contains(Effects::MEDIA) { rays.active & rays.media.inside() } else { Mask8::NONE };
     let in_media = inside.any();
     let mut light = F32x8::INFINITY;
     if emission::has_shapes::<W>(world.scene()) {
-        let (clear, upto) = (rays.active.and_not(inside), rays.travelled + hit.hit.select(hit.t, rays.ray.tmax));
+        let (clear, upto) = (rays.active.and_not(inside), rays.travelled + traced.hit.select(traced.t, rays.ray.tmax));
         let found = emission::shapes(world, &rays, upto, clear);
         book.accumulate(clear, &rays.path, &found, Beyond::Ray);
         if in_media {
@@ -102,20 +103,19 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
         }
     }
     let collision =
-        if in_media { cross_media(world, book, ring, &mut rays, &mut hit, light) } else { Collision8::NONE };
-    let escaped = rays.active.and_not(hit.hit | collision.mask);
+        if in_media { cross_media(world, book, ring, &mut rays, &mut traced, light) } else { Collision8::NONE };
+    let escaped = rays.active.and_not(traced.hit | collision.mask);
     if escaped.any() {
         if let Some(found) = emission::environment(world, &rays, escaped) {
             book.accumulate(escaped, &rays.path, &found, Beyond::Ray);
         }
         book.close_lanes(escaped, &rays.path);
     }
-    if (hit.hit | collision.mask).none() {
+    if (traced.hit | collision.mask).none() {
         return true;
     }
 
-    let mut hit = SurfaceHit8::gather(world.scene(), &hit);
-    let point = if places::<W>(world.scene()) { hit.place(world.scene(), rays.ray.time) } else { hit.point() };
+    let (mut hit, point, own) = surfaces(world, &rays.ray, &mut traced);
     if W::EFFECTS.intersects(Effects::STRAIGHT) {
         hit.t += rays.travelled;
     }
@@ -136,7 +136,7 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
         return true;
     }
 
-    let mut arrival = shade(world, &rays, &hit, &point);
+    let mut arrival = shade(world, &rays, &hit, &point, own.as_ref());
     let mut met = met;
     if may_pass {
         let passed = pass(world, book, ring, &rays, &hit, &arrival);
@@ -158,11 +158,13 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
         } else {
             hit.t
         };
-        let mut material = hit.material;
-        for i in collision.mask.lanes() {
-            material[i] = u32::MAX;
+        let good = book.record_first_hit(first, &rays.path, t, arrival.vertex.ns, albedo);
+        if book.wants_surfaces() {
+            let of_surfaces = good & hit.mask.and_not(collision.mask);
+            let of = (&traced, &hit, own.as_ref());
+            let found = first_surfaces(world, settings.size, of, of_surfaces, book.wants_motion());
+            book.record_surfaces(good, &rays.path, &found);
         }
-        book.record_first_hit(first, &rays.path, t, arrival.vertex.ns, albedo, &material);
     }
     arrival.albedo = if needs_albedo { albedo } else { Vec3x8::ZERO };
     book.close_lanes(met.and_not(arrival.active), &rays.path);

@@ -2,11 +2,13 @@
 //! is made of.
 
 use super::camera_rays::{CameraSamples8, camera_media, camera_samples};
+use super::first_surfaces::first_surfaces;
 use super::job::Job;
 use super::roulette::roulette;
 use super::settle::settle;
-use super::shading::{Arrival8, interpolated_normals, places};
+use super::shading::{Arrival8, interpolated_normals};
 use super::state::State;
+use super::surfaces::places;
 use super::vertex::PathVertex8;
 use crate::cost::COST_CAMERA;
 use crate::extension::Extension;
@@ -23,13 +25,16 @@ pub(super) fn begin_at_points<W: World>(world: &W, job: &Job, index: u32, state:
     let settings = &job.settings;
     let samples = camera_samples(world, job, index, cursor, book);
     let path = &samples.path;
-    let mut arrival = arrive(world, &samples);
+    let (mut arrival, traced, hit) = arrive(world, &samples);
     let first = arrival.active;
     book.counters.camera_rays += samples.count;
     book.charge(first, path, COST_CAMERA);
     if book.wants_first_hits() && first.any() {
-        let material = arrival.vertex.material.to_array();
-        book.record_first_hit(first, path, F32x8::ZERO, arrival.vertex.ns, Vec3x8::ONE, &material);
+        let good = book.record_first_hit(first, path, F32x8::ZERO, arrival.vertex.ns, Vec3x8::ONE);
+        if book.wants_surfaces() {
+            let found = first_surfaces(world, settings.size, (&traced, &hit, None), good, false);
+            book.record_surfaces(good, path, &found);
+        }
     }
     arrival.active &= path.depth.lt(U32x8::splat(world.max_depth()));
     book.count_longest(settings, first.and_not(arrival.active));
@@ -46,21 +51,21 @@ pub(super) fn begin_at_points<W: World>(world: &W, job: &Job, index: u32, state:
 }
 
 /// White diffuse vertices at the extension's points, seen along their shading normals. Lanes whose numbers cannot be used
-/// are not active.
-fn arrive<W: World>(world: &W, samples: &CameraSamples8) -> Arrival8 {
+/// are not active. With the hits that rays at the points would have.
+fn arrive<W: World>(world: &W, samples: &CameraSamples8) -> (Arrival8, Hit8, SurfaceHit8) {
     let scene = world.scene();
     let points = world.extension().points(scene, &samples.pixels);
     let [u, v] = points.weights;
     let known = points.triangle.lt(U32x8::splat(scene.triangles.len() as u32));
     let finite = u.is_finite() & v.is_finite() & points.scale.is_finite();
     let active = samples.asked & points.active & known & finite;
-    let hit = Hit8 { hit: active, t: F32x8::ZERO, triangle: points.triangle, u, v, instance: points.instance };
-    let mut hit = SurfaceHit8::gather(scene, &hit);
+    let traced = Hit8 { hit: active, t: F32x8::ZERO, triangle: points.triangle, u, v, instance: points.instance };
+    let mut hit = SurfaceHit8::gather(scene, &traced);
     let point = if places::<W>(scene) { hit.place(scene, samples.time) } else { hit.point() };
     let ns = interpolated_normals::<W>(scene, &hit, point.ng);
     // a normal that looks behind the surface is none of its front
     let ns = Vec3x8::select(ns.dot(point.ng).gt(F32x8::ZERO), ns, point.ng);
-    Arrival8 {
+    let arrival = Arrival8 {
         vertex: PathVertex8 {
             p: point.p,
             error: point.error,
@@ -84,5 +89,6 @@ fn arrive<W: World>(world: &W, samples: &CameraSamples8) -> Arrival8 {
         straight: F32x8::ZERO,
         weight: points.scale,
         albedo: Vec3x8::ZERO,
-    }
+    };
+    (arrival, traced, hit)
 }

@@ -6,8 +6,9 @@
 //! relief faces him. So no hit is black because of its normal. What the directions that are scattered need is in
 //! `bsdf/folded.rs`.
 
+use crate::accel::Intersector;
 use crate::bsdf::principled::{self, Textured8};
-use crate::geometry::SurfaceHit8;
+use crate::geometry::{OwnHits8, SurfaceHit8};
 use crate::scene::{Effects, Scene};
 use crate::world::World;
 use croupier_simd::{F32x8, Frame8, Mask8, Vec3x8};
@@ -30,35 +31,42 @@ pub(super) struct Relief8 {
 pub(super) fn relief<W: World>(
     scene: &Scene<'_>,
     hit: &SurfaceHit8,
+    own: Option<&OwnHits8>,
     wo: Vec3x8,
     ng: Vec3x8,
     ns: Vec3x8,
     active: Mask8,
 ) -> Relief8 {
+    let own = if W::Intersector::SURFACES { own } else { None };
     let textures = W::EFFECTS.contains(Effects::TEXTURES) && scene.effects.contains(Effects::TEXTURES);
     let normal_maps = W::EFFECTS.contains(Effects::NORMAL_MAPS) && scene.effects.contains(Effects::NORMAL_MAPS);
     let [wa, wb, wc] = hit.weights();
     let corner = |k: usize| hit.of_vertex(scene, k, |v| [v.uv[0], v.uv[1], 0.0]);
     let uvs = if textures { [corner(0), corner(1), corner(2)] } else { [Vec3x8::ZERO; 3] };
     let uv = uvs[0] * wa + uvs[1] * wb + uvs[2] * wc;
-    let t = principled::textured(scene, &hit.material, [uv.x, uv.y], active, [textures, normal_maps]);
+    let at = own.map_or([uv.x, uv.y], |own| own.coordinates([uv.x, uv.y]));
+    let t = principled::textured(scene, &hit.material, at, active, [textures, normal_maps]);
     // the winding says where the front is
     let mut ns = Vec3x8::select(ns.dot(ng).lt(F32x8::ZERO), -ns, ns);
     let mapped = active & t.mapped & (t.normal.x.abs() + t.normal.y.abs()).gt(F32x8::ZERO);
     if mapped.any() {
-        ns = Vec3x8::select(mapped, from_map(hit, uvs, ns, &t), ns);
+        ns = Vec3x8::select(mapped, from_map(hit, own, uvs, ns, &t), ns);
     }
     Relief8 { packed: t.surface.pack(), opacity: t.opacity, ns: facing(wo, ng, ns) }
 }
 
 /// Normals of the maps in world space.
 #[inline(always)]
-fn from_map(hit: &SurfaceHit8, uvs: [Vec3x8; 3], ns: Vec3x8, t: &Textured8) -> Vec3x8 {
+fn from_map(hit: &SurfaceHit8, own: Option<&OwnHits8>, uvs: [Vec3x8; 3], ns: Vec3x8, t: &Textured8) -> Vec3x8 {
     let [a, b, c] = hit.corners;
     let (edge1, edge2) = (b - a, c - a);
     let (uv1, uv2) = (uvs[1] - uvs[0], uvs[2] - uvs[0]);
-    let sign = F32x8::ONE.copysign(uv1.x * uv2.y - uv1.y * uv2.x);
-    let along_u = (edge1 * uv2.y - edge2 * uv1.y) * sign;
+    let mut sign = F32x8::ONE.copysign(uv1.x * uv2.y - uv1.y * uv2.x);
+    let mut along_u = (edge1 * uv2.y - edge2 * uv1.y) * sign;
+    if let Some(own) = own {
+        along_u = Vec3x8::select(own.lanes, own.surface.tangent, along_u);
+        sign = own.lanes.select(F32x8::ONE, sign);
+    }
     let tangent = along_u.normalize();
     let tangent = tangent - ns * ns.dot(tangent);
     let length = tangent.length();

@@ -4,10 +4,12 @@ use super::class::PHASE_KIND;
 use super::media_set::{MediaSet8, media_behind};
 use super::packets::RayState8;
 use super::relief::relief;
+use super::surfaces::places;
 use super::vertex::PathVertex8;
+use crate::accel::Intersector;
 use crate::bsdf::{self, Bsdf, Inputs8, Lobes, Visitor};
 use crate::extension::{Extension, TextureSamples8};
-use crate::geometry::{self, SurfaceHit8, SurfacePoint8};
+use crate::geometry::{self, OwnHits8, SurfaceHit8, SurfacePoint8};
 use crate::learn::cache::NO_BIN;
 use crate::scene::blob::{LAYERED_KINDS, MATERIAL_CUTOUT, MATERIAL_TWO_SIDED, MaterialKind, NONE};
 use crate::scene::{Effects, Scene};
@@ -43,9 +45,15 @@ impl Arrival8 {
 
 /// The vertices at the points of hits.
 #[inline(always)]
-pub(crate) fn shade<W: World>(world: &W, rays: &RayState8, hit: &SurfaceHit8, point: &SurfacePoint8) -> Arrival8 {
+pub(crate) fn shade<W: World>(
+    world: &W,
+    rays: &RayState8,
+    hit: &SurfaceHit8,
+    point: &SurfacePoint8,
+    own: Option<&OwnHits8>,
+) -> Arrival8 {
     let wo = -rays.ray.d;
-    let m = Materials8::gather(world, hit, wo, point.ng, rays.media);
+    let m = Materials8::gather(world, hit, own, wo, point.ng, rays.media);
     Arrival8 {
         vertex: PathVertex8 {
             p: point.p,
@@ -88,7 +96,15 @@ struct Materials8 {
 impl Materials8 {
     /// Materials, shading normals and textures of the hit lanes.
     #[inline(never)]
-    fn gather<W: World>(world: &W, hit: &SurfaceHit8, wo: Vec3x8, ng: Vec3x8, media: MediaSet8) -> Self {
+    fn gather<W: World>(
+        world: &W,
+        hit: &SurfaceHit8,
+        own: Option<&OwnHits8>,
+        wo: Vec3x8,
+        ng: Vec3x8,
+        media: MediaSet8,
+    ) -> Self {
+        let own = if W::Intersector::SURFACES { own } else { None };
         let scene = world.scene();
         let (mut kind, mut textures) = ([0u32; 8], [NONE; 8]);
         let (mut two_sided, mut through, mut textured, mut cutout) = (0u32, 0u32, 0u32, 0u32);
@@ -105,27 +121,28 @@ impl Materials8 {
         }
         let mut reflectance = Vec3x8::from_fn(|i| reflectance[i]);
         let mut straight = F32x8::ZERO;
-        let [wa, wb, wc] = hit.weights();
         let mut ns = interpolated_normals::<W>(scene, hit, ng);
+        if let Some(own) = own {
+            ns = own.normals(ns);
+        }
         if W::EFFECTS.contains(Effects::TEXTURES) && textured != 0 {
-            let uv = |k: usize| hit.of_vertex(scene, k, |v| [v.uv[0], v.uv[1], 0.0]);
-            let at = uv(0) * wa + uv(1) * wb + uv(2) * wc;
+            let at = coordinates(scene, hit, own);
             let mask = Mask8::from_bits(textured);
-            let texel = texture::lookup(scene, U32x8::new(textures), [at.x, at.y], mask);
+            let texel = texture::lookup(scene, U32x8::new(textures), at, mask);
             reflectance = Vec3x8::select(mask, texel, reflectance);
             if W::EFFECTS.contains(Effects::ALPHA) && cutout != 0 {
                 let mask = mask & Mask8::from_bits(cutout);
-                let alpha = texture::alpha(scene, U32x8::new(textures), [at.x, at.y], mask);
+                let alpha = texture::alpha(scene, U32x8::new(textures), at, mask);
                 straight = mask.zero_unless(1.0 - alpha);
             }
         }
         if W::Extension::TEXTURES {
-            reflectance = own_reflectance(world, hit, reflectance);
+            reflectance = own_reflectance(world, hit, own, reflectance);
         }
         if W::EFFECTS.contains(Effects::PRINCIPLED) && scene.effects.contains(Effects::PRINCIPLED) {
             let layered = hit.mask & bsdf::lanes_of(LAYERED_KINDS, &kind);
             if layered.any() {
-                let r = relief::<W>(scene, hit, wo, ng, ns, layered);
+                let r = relief::<W>(scene, hit, own, wo, ng, ns, layered);
                 reflectance = Vec3x8::select(layered, r.packed, reflectance);
                 straight = layered.select(1.0 - r.opacity, straight);
                 ns = Vec3x8::select(layered, r.ns, ns);
@@ -171,13 +188,21 @@ pub(super) fn interpolated_normals<W: World>(scene: &Scene<'_>, hit: &SurfaceHit
     Vec3x8::select(ok, sum / len, ng)
 }
 
-/// Reflectances that the host's extension makes of those of materials and texture files.
-fn own_reflectance<W: World>(world: &W, hit: &SurfaceHit8, reflectance: Vec3x8) -> Vec3x8 {
+/// Texture coordinates of hits.
+#[inline(always)]
+fn coordinates(scene: &Scene<'_>, hit: &SurfaceHit8, own: Option<&OwnHits8>) -> [F32x8; 2] {
     let [wa, wb, wc] = hit.weights();
-    let uv = |k: usize| hit.of_vertex(world.scene(), k, |v| [v.uv[0], v.uv[1], 0.0]);
+    let uv = |k: usize| hit.of_vertex(scene, k, |v| [v.uv[0], v.uv[1], 0.0]);
     let at = uv(0) * wa + uv(1) * wb + uv(2) * wc;
-    let (material, point) = (U32x8::new(hit.material), hit.point().p);
-    let samples = TextureSamples8 { material, uv: [at.x, at.y], point, active: hit.mask };
+    own.map_or([at.x, at.y], |own| own.coordinates([at.x, at.y]))
+}
+
+/// Reflectances that the host's extension makes of those of materials and texture files.
+fn own_reflectance<W: World>(world: &W, hit: &SurfaceHit8, own: Option<&OwnHits8>, reflectance: Vec3x8) -> Vec3x8 {
+    let uv = coordinates(world.scene(), hit, own);
+    let point = hit.point().p;
+    let point = own.map_or(point, |own| Vec3x8::select(own.lanes, own.surface.p, point));
+    let samples = TextureSamples8 { material: U32x8::new(hit.material), uv, point, active: hit.mask };
     let own = world.extension().reflectance(&samples, reflectance);
     // a NaN becomes 0
     let clamp = |x: F32x8| F32x8::ZERO.max(x).min(F32x8::ONE);
@@ -188,12 +213,6 @@ fn own_reflectance<W: World>(world: &W, hit: &SurfaceHit8, reflectance: Vec3x8) 
 #[inline(always)]
 pub(crate) fn may_pass<W: World>(scene: &Scene<'_>) -> bool {
     W::EFFECTS.intersects(Effects::STRAIGHT) && scene.effects.intersects(Effects::STRAIGHT)
-}
-
-/// Does the scene place triangles in instances?
-#[inline(always)]
-pub(crate) fn places<W: World>(scene: &Scene<'_>) -> bool {
-    W::EFFECTS.contains(Effects::INSTANCES) && scene.effects.contains(Effects::INSTANCES)
 }
 
 /// Does anything move while the shutter is open?
@@ -207,11 +226,12 @@ pub(crate) fn moves<W: World>(scene: &Scene<'_>) -> bool {
 pub(crate) fn straight_share<W: World>(
     world: &W,
     hit: &SurfaceHit8,
+    own: Option<&OwnHits8>,
     wo: Vec3x8,
     ng: Vec3x8,
     media: MediaSet8,
 ) -> F32x8 {
-    hit.mask.zero_unless(Materials8::gather(world, hit, wo, ng, media).straight)
+    hit.mask.zero_unless(Materials8::gather(world, hit, own, wo, ng, media).straight)
 }
 
 /// The kernel of one material kind that says what passes straight on.

@@ -7,6 +7,7 @@ use super::cache_key::cache_lookup;
 use super::camera_rays::{CameraCursor, camera_rays};
 use super::class::PacketClass;
 use super::emission;
+use super::first_surfaces::FirstSurfaces8;
 use super::ledger::NO_RECORD;
 use super::media_set::MediaSet8;
 use super::nee::{sample_lights, shadow_rays};
@@ -29,7 +30,7 @@ use crate::learn::cache::NO_BIN;
 use crate::light::power_heuristic;
 use crate::rng::Key8;
 use crate::rrs::{Space, Strategy};
-use crate::scene::blob::MaterialKind;
+use crate::scene::blob::{MaterialKind, NONE};
 use crate::settings::Settings;
 use crate::testing::{EMISSION, ENVIRONMENT, FLOOR, TestWorld, world};
 use crate::world::World;
@@ -96,7 +97,7 @@ fn arrive(world: &TestWorld<'_>, shard: &mut Shard<'_>, depth: u32) -> (RayState
     let mut rays = rays(shard);
     rays.path.depth = U32x8::splat(depth);
     let hit = SurfaceHit8::gather(world.scene(), &trace(world, &mut shard.state.book, &rays, RayKind::Camera));
-    let arrival = shade(world, &rays, &hit, &hit.point());
+    let arrival = shade(world, &rays, &hit, &hit.point(), None);
     (rays, hit, arrival)
 }
 
@@ -422,7 +423,11 @@ fn auxiliary_values_go_to_their_pixels() {
             let t = F32x8::from_fn(|i| if i == 1 { f32::NAN } else { hit.t.lane(i) });
             let first = Mask8::from_bits(0b0000_0111);
             let floor = Vec3x8::from_fn(|_| FLOOR);
-            shard.state.book.record_first_hit(first, &rays.path, t, a.vertex.ns, floor, &[7; 8]);
+            let good = shard.state.book.record_first_hit(first, &rays.path, t, a.vertex.ns, floor);
+            assert_eq!(good.bits(), 0b0000_0101);
+            let found =
+                FirstSurfaces8 { material: U32x8::splat(7), object: U32x8::splat(NONE), motion: [F32x8::ZERO; 2] };
+            shard.state.book.record_surfaces(good, &rays.path, &found);
             let mut of =
                 |pixel: usize, aov: Aov, channel: usize| *shard.state.book.aovs.get(pixel, aov, channel).unwrap();
             assert_eq!((of(0, Aov::Alpha, 0), of(0, Aov::Depth, 0), of(0, Aov::Material, 0)), (1.0, 0.5, 7.0));

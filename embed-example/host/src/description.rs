@@ -34,7 +34,7 @@ pub struct SceneDescription {
     pub vertices: Vec<Vertex>,
     /// Triangles of all objects.
     pub triangles: Vec<Triangle>,
-    /// Names of runs of triangles, by ascending `first_triangle`; only error messages read them.
+    /// Names of runs of triangles, by ascending `first_triangle`, for messages and for the auxiliary value `object`.
     pub objects: Vec<Object>,
     /// Materials.
     pub materials: Vec<Material>,
@@ -566,8 +566,13 @@ impl SceneDescription {
 
     /// Name of the object that a triangle belongs to.
     pub fn object_of(&self, triangle: u32) -> &str {
+        self.objects.get(self.object_number(triangle) as usize).map_or("unnamed object", |o| &o.name)
+    }
+
+    /// Index in `objects` of the object that a triangle belongs to; their number if it is before the first of them.
+    pub fn object_number(&self, triangle: u32) -> u32 {
         let next = self.objects.partition_point(|o| o.first_triangle <= triangle);
-        next.checked_sub(1).map_or("unnamed object", |i| &self.objects[i].name)
+        next.checked_sub(1).unwrap_or(self.objects.len()) as u32
     }
 
     /// Smallest and largest coordinates of the vertices that triangles use; `None` without triangles.

@@ -44,6 +44,8 @@ pub struct Picture {
     pub height: usize,
     /// Layers; the picture itself is the one with the empty name.
     pub layers: Vec<Layer>,
+    /// Texts in the header of an EXR file by their names; files that are read give none.
+    pub attributes: Vec<(String, String)>,
 }
 
 /// Linear RGB pixels, row 0 at the top.
@@ -136,7 +138,7 @@ impl Layer {
 impl Picture {
     /// A picture without layers.
     pub fn new(width: usize, height: usize) -> Self {
-        Self { width, height, layers: Vec::new() }
+        Self { width, height, layers: Vec::new(), attributes: Vec::new() }
     }
 
     /// Adds a layer of three channels: `names` is `["R", "G", "B"]` for colours, `["X", "Y", "Z"]` for vectors.
@@ -246,9 +248,17 @@ impl Picture {
                 channels.push(openexr::AnyChannel::new(text, openexr::FlatSamples::F32(channel.values.clone())));
             }
         }
+        let mut attributes = openexr::LayerAttributes::default();
+        for (name, text) in &self.attributes {
+            let latin = |text: &str| {
+                let refused = || ImageError::Encode(path.into(), format!("attribute {name:?} is not Latin-1"));
+                openexr::Text::new_or_none(text).ok_or_else(refused)
+            };
+            attributes.other.insert(latin(name)?, openexr::AttributeValue::Text(latin(text)?));
+        }
         let image = openexr::Image::from_layer(openexr::Layer::new(
             (self.width, self.height),
-            openexr::LayerAttributes::default(),
+            attributes,
             openexr::Encoding::SMALL_LOSSLESS,
             openexr::AnyChannels::sort(channels.into()),
         ));

@@ -27,6 +27,7 @@ pub mod bvh;
 pub mod checkpoint;
 pub mod compare;
 pub mod compensation;
+mod cryptomatte;
 pub mod description;
 pub mod drive;
 pub mod effects;

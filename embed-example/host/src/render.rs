@@ -3,6 +3,7 @@
 pub use crate::drive::{DriveError as RenderError, Observer, Progress, Target};
 
 use crate::checkpoint::Schedule;
+use crate::cryptomatte;
 use crate::drive::{self, Options, Rendered, drive_scene};
 use crate::image::{Channel, Picture};
 use crate::statistics::Statistics;
@@ -227,7 +228,7 @@ pub fn render_scene(
         ..Options::new(settings, options.target)
     };
     let rendered = drive_scene(scene, &o, observer)?;
-    let mut picture = picture(&rendered);
+    let mut picture = picture(&scene, &rendered);
     if options.denoise {
         picture.add3("denoised", RGB, &denoised(&rendered));
     }
@@ -264,7 +265,7 @@ fn denoised(r: &Rendered) -> Vec<[f32; 3]> {
 }
 
 /// Picture with all layers that the film holds.
-fn picture(r: &Rendered) -> Picture {
+fn picture(scene: &Scene<'_>, r: &Rendered) -> Picture {
     let mut picture = Picture::new(r.size[0] as usize, r.size[1] as usize);
     picture.add3("", RGB, &r.image());
     picture.add3("stderr", RGB, &r.stderr());
@@ -274,14 +275,27 @@ fn picture(r: &Rendered) -> Picture {
     }
     picture.add1("samples", "N", &r.pixels.iter().map(|p| p.samples as f32).collect::<Vec<_>>());
     for (aov, channels) in &r.planes {
-        add_aov(&mut picture, r, *aov, channels);
+        add_aov(&mut picture, scene, r, *aov, channels);
     }
     picture
 }
 
 /// Adds the layers of an auxiliary value. What is known of first hits becomes the mean over the camera samples that hit, if
 /// their share is known.
-fn add_aov(picture: &mut Picture, r: &Rendered, aov: Aov, channels: &[Vec<f32>]) {
+fn add_aov(picture: &mut Picture, scene: &Scene<'_>, r: &Rendered, aov: Aov, channels: &[Vec<f32>]) {
+    let ranks = <&[Vec<f32>; 4]>::try_from(channels);
+    let named = |name: &str, what: &str, i: u32| if name.is_empty() { format!("{what} {i}") } else { name.to_owned() };
+    match (aov, ranks) {
+        (Aov::MaterialCoverage, Ok(ranks)) => {
+            return cryptomatte::add(picture, "CryptoMaterial", ranks, |i| {
+                named(scene.material_name(i), "material", i)
+            });
+        }
+        (Aov::ObjectCoverage, Ok(ranks)) => {
+            return cryptomatte::add(picture, "CryptoObject", ranks, |i| named(scene.object_name(i), "object", i));
+        }
+        _ => {}
+    }
     let quotients = |over: &[f32], values: &[f32]| -> Vec<f32> {
         values.iter().zip(over).map(|(x, n)| if *n > 0.0 { x / n } else { 0.0 }).collect()
     };
@@ -296,7 +310,7 @@ fn add_aov(picture: &mut Picture, r: &Rendered, aov: Aov, channels: &[Vec<f32>])
             }
         }
         _ => {
-            let of_hits = matches!(aov, Aov::Albedo | Aov::Normal | Aov::Depth);
+            let of_hits = matches!(aov, Aov::Albedo | Aov::Normal | Aov::Depth | Aov::Motion);
             let alpha = r.channels(Aov::Alpha).and_then(<[_]>::first).filter(|_| of_hits);
             for (name, values) in aov.channels().iter().zip(channels) {
                 layer(aov.name(), name, alpha.map_or_else(|| values.clone(), |a| quotients(a, values)));

@@ -23,7 +23,7 @@ pub(super) fn vertices(scene: &Records<'_>) -> Result<(), SceneError> {
 pub(super) fn triangles(scene: &Records<'_>) -> Result<Effects, SceneError> {
     let mut effects = Effects::default();
     for (at, t) in records(SectionKind::Triangles, scene.triangles) {
-        at.zero(t.flags & !TRIANGLE_SMOOTH == 0)?;
+        at.zero(t.flags & ((1 << TRIANGLE_OBJECT_SHIFT) - 1) & !TRIANGLE_SMOOTH == 0)?;
         let smooth = t.flags & TRIANGLE_SMOOTH != 0;
         for v in t.vertex {
             let vertex = at.follow(SectionKind::Vertices, v, scene.vertices)?;

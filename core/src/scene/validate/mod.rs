@@ -37,6 +37,12 @@ pub(super) fn scene(scene: &Records<'_>) -> Result<Effects, SceneError> {
     Ok(surfaces.with(instances).with(lights).with(environment.effects).with(camera))
 }
 
+/// Effects that the materials of a validated scene call for, whether or not triangles have them.
+pub(super) fn effects_of_materials(scene: &Records<'_>) -> Effects {
+    let of = |m: &Material| materials::effects(scene, m).with(media::effects(scene, m));
+    scene.materials.iter().fold(Effects::default(), |all, m| all.with(of(m)))
+}
+
 /// Checks of single records that take the places of others in a validated scene; each gives the effects that it calls
 /// for.
 pub(crate) mod single {
@@ -104,7 +110,8 @@ fn camera(c: &Camera) -> Result<Effects, SceneError> {
 fn names(scene: &Records<'_>) -> Result<(), SceneError> {
     let lines = scene.names.iter().filter(|b| **b == b'\n').count();
     let whole = scene.names.last().is_none_or(|b| *b == b'\n') && core::str::from_utf8(scene.names).is_ok();
-    if whole && (scene.names.is_empty() || lines == scene.materials.len()) {
+    // those behind the materials are objects'
+    if whole && (scene.names.is_empty() || lines >= scene.materials.len()) {
         return Ok(());
     }
     let materials = u32::try_from(scene.materials.len()).unwrap_or(u32::MAX);

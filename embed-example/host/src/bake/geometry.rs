@@ -3,9 +3,12 @@
 use super::BakeError;
 use crate::description::{SceneDescription, Triangle, Vertex};
 use croupier::unstable::scene::blob::MAX_COORDINATE;
-use croupier::unstable::scene::blob::{self, NONE, TRIANGLE_SMOOTH};
+use croupier::unstable::scene::blob::{self, NONE, TRIANGLE_OBJECT_SHIFT, TRIANGLE_SMOOTH};
 use glam::Vec3;
 use std::ops::Range;
+
+/// Largest number of an object that the blob can hold; those behind it share it.
+const LAST_OBJECT: u32 = u32::MAX >> TRIANGLE_OBJECT_SHIFT;
 
 /// Geometry of the blob, and what else baking needs of it.
 pub(super) struct Geometry {
@@ -80,8 +83,9 @@ pub(super) fn bake(
     }
     for runs in runs {
         let first = g.triangles.len() as u32;
-        for t in runs.iter().flat_map(|run| &scene.triangles[run.start as usize..run.end as usize]) {
-            g.add(t, emission[t.material as usize] != [0.0; 3]);
+        for i in runs.iter().flat_map(Clone::clone) {
+            let t = &scene.triangles[i as usize];
+            g.add(t, scene.object_number(i), emission[t.material as usize] != [0.0; 3]);
         }
         g.objects.push(first..g.triangles.len() as u32);
     }
@@ -104,8 +108,8 @@ fn check(scene: &SceneDescription, index: u32, v: &Vertex) -> Result<(), BakeErr
 }
 
 impl Geometry {
-    /// Takes a triangle over unless it has no area.
-    fn add(&mut self, t: &Triangle, emits: bool) {
+    /// Takes a triangle over unless it has no area that `f32` can hold: no ray hits it, and it has no normal.
+    fn add(&mut self, t: &Triangle, object: u32, emits: bool) {
         let corner = t.vertices.map(|v| self.vertices[v as usize]);
         let corners = corner.map(|v| v.p);
         if !has_area(&corners) {
@@ -117,7 +121,8 @@ impl Geometry {
         // normal has no shading normal all around it.
         let smooth = t.smooth && corner.iter().all(|v| v.n != [0.0; 3]);
         self.flattened += u32::from(t.smooth && !smooth);
-        let flags = if smooth { TRIANGLE_SMOOTH } else { 0 };
+        let smooth = if smooth { TRIANGLE_SMOOTH } else { 0 };
+        let flags = smooth | object.min(LAST_OBJECT) << TRIANGLE_OBJECT_SHIFT;
         self.triangles.push(blob::Triangle { vertex: t.vertices, material: t.material, light: NONE, flags });
         self.corners.push(corners);
     }

@@ -191,7 +191,11 @@ pub(super) fn bake(scene: &SceneDescription) -> Result<Materials, BakeError> {
             principled::bake(scene, m, p, &mut shared, &mut tables.entries, &mut draft.out)?;
         }
         out.materials.push(draft.out);
-        out.names.extend(m.name.bytes().map(|b| if b == b'\n' { b' ' } else { b }));
+    }
+    let of_materials = scene.materials.iter().map(|m| &m.name);
+    let of_objects = scene.instances.iter().map(|i| &i.name).chain(scene.objects.iter().map(|o| &o.name));
+    for name in of_materials.chain(of_objects) {
+        out.names.extend(name.bytes().map(|b| if b"\n\r".contains(&b) { b' ' } else { b }));
         out.names.push(b'\n');
     }
     out.tables = tables.entries;
