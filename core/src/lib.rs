@@ -108,7 +108,7 @@ mod world;
 pub use counters::Counters;
 pub use edit::{EditError, EditableScene, SceneEdit};
 pub use film::{ErrorEstimate, Film};
-pub use instructions::{INSTRUCTION_SET, missing_instructions};
+pub use instructions::{INSTRUCTION_SET, missing_instructions, processor_instruction_set};
 pub use memory::{BLOCK_ALIGN, MemoryError};
 pub use plan::Plan;
 pub use rrs::Strategy;

@@ -2,6 +2,7 @@
 
 use super::blob::{MAX_CONDITION, MAX_SHAPE_LIGHTS, MAX_TREE_DEPTH, SectionKind, VERSION};
 use super::instances::InstanceFault;
+use crate::instructions::INSTRUCTION_SET;
 use core::fmt;
 
 /// A number of a record that must lie in a stated range.
@@ -185,6 +186,11 @@ pub enum ObjectFault {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum SceneError {
+    /// The processor lacks instructions that this build uses ([`crate::INSTRUCTION_SET`]): nothing was read.
+    Instructions {
+        /// The first set that is missing.
+        missing: &'static str,
+    },
     /// Fewer bytes than needed.
     Truncated {
         /// Bytes needed.
@@ -396,6 +402,9 @@ impl fmt::Display for InstanceFault {
 impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
+            Self::Instructions { missing } => {
+                write!(f, "this build needs a processor with {INSTRUCTION_SET}; this one lacks {missing}")
+            }
             Self::Truncated { needed, given } => write!(f, "scene blob needs {needed} bytes, {given} given"),
             Self::Magic => write!(f, "not a scene blob: the first bytes are not CROUPIER"),
             Self::Version(v) => write!(f, "scene blob of version {v}, this library reads version {VERSION}"),

@@ -6,6 +6,7 @@ use super::error::{SceneError, SectionFault};
 use super::records::Records;
 use super::sections::{SectionTable, Sections};
 use super::validate;
+use crate::instructions::missing_instructions;
 use core::ops::Deref;
 
 /// A validated scene: its [`Records`], to be read and not to be changed. [`Scene::from_bytes`] makes one if all of this
@@ -41,6 +42,15 @@ impl<'s> Scene<'s> {
 
     /// [`Self::from_bytes`], and where the sections are.
     pub(crate) fn validated(bytes: &'s [u8]) -> Result<(Self, SectionTable), SceneError> {
+        // Hosts begin with a scene: what follows is made of instructions that the processor may not have.
+        match missing_instructions() {
+            Some(missing) => Err(SceneError::Instructions { missing }),
+            None => Self::checked(bytes),
+        }
+    }
+
+    #[inline(never)]
+    fn checked(bytes: &'s [u8]) -> Result<(Self, SectionTable), SceneError> {
         let sections = Sections::new(bytes)?;
         let mut records = Self::records(&sections)?;
         records.effects = validate::scene(&records)?;

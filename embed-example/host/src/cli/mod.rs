@@ -24,16 +24,21 @@ mod values;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
+use std::sync::LazyLock;
 
 /// Path tracer with Russian roulette and splitting. Without a command it renders a built-in still life.
 #[derive(Parser)]
-#[command(name = "croupier", version, args_conflicts_with_subcommands = true)]
+#[command(name = "croupier", version, long_version = VERSION.as_str(), args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
     render: render::Flags,
 }
+
+/// `--version` says which instruction set is in use; `-V` is the version alone.
+static VERSION: LazyLock<String> =
+    LazyLock::new(|| format!("{} ({})", env!("CARGO_PKG_VERSION"), croupier::INSTRUCTION_SET));
 
 #[derive(Subcommand)]
 enum Command {
