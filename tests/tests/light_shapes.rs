@@ -169,6 +169,15 @@ fn cases() -> Vec<Case> {
     }
     let scaled: Vec<Case> = all.iter().flat_map(|c| [-20i32, 20].map(|k| c.scaled(2f32.powi(k)))).collect();
     all.extend(scaled);
+    // the ends of the range of coordinates and sizes
+    let huge = [[1e9, 0.0, 0.0], [0.0, 0.0, 1e9]];
+    all.push(Case::rectangle([0.0, 1e9, 1e9], huge, [0.0, -1e9, -1e9]).facing());
+    all.push(Case::rectangle([1e9, 1e9, 0.0], huge, [-1e9, -1e9, -1e9]).facing());
+    all.push(Case::rectangle([1e9, 1e9, 0.0], huge.map(|e| e.map(|x| 1e-18 * x)), [-1e9, -1e9, -1e9]).facing());
+    all.push(Case::disk([0.0, 1e9, 1e9], [0.0, -1.0, 0.0], 1e9, [0.0, -1e9, -1e9]));
+    all.push(Case::disk([0.0, 1e9, 1e9], [0.0, -1.0, 0.0], 1e-9, [0.0, -1e9, -1e9]));
+    all.push(Case::sphere([0.0, 1e9, 1e9], 1e9, [0.0, -1e9, -1e9]));
+    all.push(Case::sphere([0.0, 1e9, 1e9], 1e-9, [0.0, -1e9, -1e9]));
     all
 }
 
