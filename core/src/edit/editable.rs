@@ -2,10 +2,12 @@
 
 use super::error::EditError;
 use super::light_table;
-use crate::light::{self, SceneExtent, luminance};
+use crate::light::{self, SceneExtent};
 use crate::scene::blob::*;
 use crate::scene::{Effects, Records, Scene, SceneError, SectionTable, Sections, check};
 use bytemuck::Pod;
+use core::f64::consts::PI;
+use croupier_simd::{F32x8, LUMINANCE};
 
 /// A validated scene that owns its bytes, in whatever holds them (`Vec<u8>`, `&mut [u8]`, a static array), and that may be
 /// changed between frames. [`Self::scene`] shows it, in a fixed short time.
@@ -14,7 +16,8 @@ use bytemuck::Pod;
 /// the scene is and not on how it came about: an edit that is taken back restores it. (Light tables that were built
 /// anew are another state than baked ones.)
 ///
-/// The container must give the same bytes at the same place, or moved as a whole, whenever it is asked.
+/// The container must give the same bytes whenever it is asked, at the same place or moved as a whole to another multiple
+/// of 4: a container that holds them itself needs that alignment (a plain `[u8; N]` has none).
 ///
 /// ```
 /// use croupier::{EditableScene, SceneError};
@@ -37,8 +40,8 @@ pub struct EditableScene<B> {
     identity: u64,
     /// Largest values of the environment map.
     brightest: [f32; 3],
-    /// Power of the environment's light while its scale has a luminance of 1.
-    environment_power: f64,
+    /// Integral of the environment's radiance over all directions at a scale of 1, by channel.
+    sky: [f64; 3],
     /// The light table is no longer the baked one.
     relit: bool,
 }
@@ -54,15 +57,17 @@ impl<B: AsRef<[u8]>> EditableScene<B> {
     pub fn new(bytes: B) -> Result<Self, SceneError> {
         let (scene, table) = Scene::validated(bytes.as_ref())?;
         let (effects, identity, brightest) = (scene.effects, scene.hash, check::brightest(&scene));
-        let environment_power = environment_power(&scene);
-        Ok(Self { bytes, table, effects, identity, brightest, environment_power, relit: false })
+        let sky = sky(&scene);
+        Ok(Self { bytes, table, effects, identity, brightest, sky, relit: false })
     }
 
-    /// The scene as it is now.
+    /// The scene as it is now; an empty one with a hash of 0 if the container does not give the bytes any more, or not at
+    /// a multiple of 4.
     pub fn scene(&self) -> Scene<'_> {
         let sections = Sections::assume_sound(self.table, self.bytes.as_ref());
-        let records = Scene::records(&sections).unwrap_or(NOTHING);
-        Scene::assume_valid(Records { effects: self.effects, hash: self.identity, ..records })
+        let records = Scene::records(&sections);
+        let changed = |records| Records { effects: self.effects, hash: self.identity, ..records };
+        Scene::assume_valid(records.map_or(NOTHING, changed))
     }
 
     /// The bytes as they are now; see [`Self::into_bytes`].
@@ -87,10 +92,11 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> EditableScene<B> {
             effects: &mut self.effects,
             identity: &mut self.identity,
             brightest: self.brightest,
-            environment_power: self.environment_power,
+            sky: self.sky,
             relit: &mut self.relit,
             lights_changed: false,
-            moved: None,
+            world_moved: false,
+            moved_within: None,
         }
     }
 
@@ -108,16 +114,29 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> EditableScene<B> {
     }
 }
 
-/// Power of the environment's light at a scale of luminance 1, from its share of the baked table.
-fn environment_power(scene: &Scene<'_>) -> f64 {
-    let Some(e) = scene.environment else { return 0.0 };
-    let extent = SceneExtent { radius: radius(scene), environment: 0.0 };
-    let others: f64 = scene.lights.iter().map(|l| light::power(l, &extent)).sum();
-    let share = scene.light_alias.get(e.light as usize).map_or(0.0, |a| f64::from(a.probability));
-    let scale = luminance(e.radiance);
-    let power = if others > 0.0 { others * share / (1.0 - share).max(1e-9) } else { share };
-    // a constant one has the same power at every scale; a map that was scaled to black has an unknown one
-    if scale > 0.0 { power / scale } else { 1.0 }
+/// Integral of the environment's radiance over all directions at a scale of 1, by channel; of a map bilinear in polar angle
+/// and azimuth, as the kernels read it.
+fn sky(scene: &Records<'_>) -> [f64; 3] {
+    let Some(e) = scene.environment else { return [0.0; 3] };
+    if e.kind == EnvironmentKind::Constant as u32 {
+        return [4.0 * PI; 3];
+    }
+    let cells = f64::from(e.height.saturating_sub(1).max(1));
+    let step = PI / cells;
+    let sin = |turns: f64| f64::from(F32x8::splat(turns as f32).sin_cos_2pi().0.lane(0));
+    // integral of the sine times a row's share, which falls from 1 to 0 at the rows beside it
+    let weight = |row: u32| match f64::from(row) {
+        row if row > 0.0 && row < cells => 4.0 * sin(0.25 / cells) * sin(0.25 / cells) / step * sin(0.5 * row / cells),
+        _ => 1.0 - sin(0.5 / cells) / step,
+    };
+    let mut sum = [0.0; 3];
+    for (row, texels) in (0..).zip(scene.env_texels.chunks_exact(e.width.max(1) as usize)) {
+        let weight = weight(row) * 2.0 * PI / f64::from(e.width.max(1));
+        for texel in texels {
+            sum.iter_mut().zip(texel).for_each(|(sum, x)| *sum += weight * f64::from(*x));
+        }
+    }
+    sum
 }
 
 /// Radius of a sphere around the scene as the baker takes it.
@@ -180,11 +199,13 @@ pub struct SceneEdit<'a> {
     pub(super) effects: &'a mut Effects,
     identity: &'a mut u64,
     brightest: [f32; 3],
-    environment_power: f64,
+    sky: [f64; 3],
     relit: &'a mut bool,
     pub(super) lights_changed: bool,
-    /// First and last object whose instances have moved.
-    pub(super) moved: Option<[u32; 2]>,
+    /// An instance of the world has moved.
+    pub(super) world_moved: bool,
+    /// First and last object other than the world whose instances have moved.
+    pub(super) moved_within: Option<[u32; 2]>,
 }
 
 impl SceneEdit<'_> {
@@ -242,8 +263,8 @@ impl SceneEdit<'_> {
             // baked without any light that emits: there is no table to choose by
             return Err(EditError::Fixed { of, index });
         }
+        self.lights_changed |= bytemuck::bytes_of(&old) != bytemuck::bytes_of(&light);
         self.write(of, index, &light);
-        self.lights_changed = true;
         Ok(())
     }
 
@@ -268,7 +289,8 @@ impl SceneEdit<'_> {
     /// old ones.
     ///
     /// # Errors
-    /// No environment, one that breaks a rule of the blob, or one that differs in what cannot change.
+    /// No environment, one that breaks a rule of the blob, or one that differs in what cannot change; light from it in a scene
+    /// that was baked without any.
     pub fn environment(&mut self, environment: Environment) -> Result<(), EditError> {
         let (of, index) = (SectionKind::Environment, 0);
         let old: Environment = self.read(of, index)?;
@@ -277,6 +299,12 @@ impl SceneEdit<'_> {
             return Err(EditError::Fixed { of, index });
         }
         check::environment(&environment, self.brightest)?;
+        let constant = environment.kind == EnvironmentKind::Constant as u32;
+        let brightest = if constant { [1.0; 3] } else { self.brightest };
+        let emits = brightest.iter().zip(&environment.radiance).any(|(x, scale)| x * scale > 0.0);
+        if emits && self.records().is_some_and(|scene| scene.light_alias.is_empty()) {
+            return Err(EditError::Fixed { of, index });
+        }
         self.write(of, index, &environment);
         self.lights_changed |= old.radiance != environment.radiance;
         Ok(())
@@ -290,11 +318,15 @@ impl SceneEdit<'_> {
         Some((from.saturating_add(found as u32), *rest.get(found)?))
     }
 
-    /// Builds the table that chooses among lights.
+    /// Builds the table that chooses among lights, in four passes over them.
     fn relight(&mut self) {
         let Some(scene) = self.records() else { return };
-        let environment = scene.environment.map_or(0.0, |e| luminance(e.radiance) * self.environment_power);
-        let extent = SceneExtent { radius: radius(&scene), environment: 0.0 };
+        let of_channel = |e: &Environment| {
+            let channels = e.radiance.iter().zip(&self.sky).zip(LUMINANCE);
+            channels.map(|((scale, integral), weight)| weight * f64::from(*scale) * integral).sum()
+        };
+        let environment = scene.environment.map_or(0.0, of_channel);
+        let extent = SceneExtent { radius: radius(&scene), environment };
         let range = |kind| self.table.whole(kind);
         let of = [SectionKind::LightAlias, SectionKind::Lights].map(range);
         let instances = range(SectionKind::Instances).unwrap_or(0..0);
@@ -309,11 +341,7 @@ impl SceneEdit<'_> {
             outer.is_some_and(|i| i.flags & INSTANCE_HIDDEN != 0)
         };
         light_table::build(table, |i| {
-            lights.get(i as usize).map_or(0.0, |l| match LightKind::from_u32(l.kind) {
-                Some(LightKind::Environment) => environment,
-                _ if hidden(l) => 0.0,
-                _ => light::power(l, &extent),
-            })
+            lights.get(i as usize).filter(|l| !hidden(l)).map_or(0.0, |l| light::power(l, &extent))
         });
         if !core::mem::replace(self.relit, true) {
             *self.identity ^= RELIT;
@@ -323,9 +351,7 @@ impl SceneEdit<'_> {
 
 impl Drop for SceneEdit<'_> {
     fn drop(&mut self) {
-        if let Some(moved) = self.moved.take() {
-            self.settle_moves(moved);
-        }
+        self.settle_moves(None);
         if self.lights_changed {
             self.relight();
         }
