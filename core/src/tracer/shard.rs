@@ -101,6 +101,9 @@ struct ShardRecord {
     state: StateRecord,
 }
 
+/// Bytes of that.
+pub(crate) const SHARD_RECORD_BYTES: usize = size_of::<ShardRecord>();
+
 /// Mark of a block that holds a suspended shard.
 const SUSPENDED: u64 = u64::from_le_bytes(*b"SHARD  1");
 
