@@ -8,7 +8,6 @@ use crate::counters::Counters;
 use crate::film::PixelSums;
 use crate::learn::cache::Training;
 use crate::memory::{Carver, Measure, MemoryError};
-use crate::settings::Settings;
 use crate::tiles::TILE_PIXELS;
 use crate::world::{Identity, World};
 use bytemuck::{Pod, Zeroable};
@@ -220,9 +219,9 @@ impl<'m> Shard<'m> {
         self.state.begin(world, &self.job, self.index);
     }
 
-    /// Settings that the shard was made for.
-    pub(crate) fn settings(&self) -> &Settings {
-        &self.job.settings
+    /// Hash of the settings that the shard was made for, which tells plans.
+    pub(crate) fn fingerprint(&self) -> u64 {
+        self.job.fingerprint
     }
 
     /// What the shard has learned in this iteration.
