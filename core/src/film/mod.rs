@@ -200,7 +200,12 @@ impl<'m> Film<'m> {
         if let Some(r) = self.rays.get_mut(pixel) {
             *r = if fresh { rays } else { r.saturating_add(rays) };
         }
-        self.aovs.merge(pixel, before.samples as u32, sums.samples, aov);
+        let samples = before.samples as u32;
+        if self.weights.is_empty() || w <= 0.0 {
+            self.aovs.merge(pixel, samples, sums.samples, aov);
+        } else {
+            self.aovs.merge_weighted(pixel, samples, sums.samples, aov, before.weight / w);
+        }
     }
 
     /// Begins the merge of an iteration; of one that was abandoned no sums are left.
