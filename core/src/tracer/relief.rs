@@ -6,9 +6,11 @@
 //! relief faces him. So no hit is black because of its normal. What the directions that are scattered need is in
 //! `bsdf/folded.rs`.
 
+use super::shading::own_reflectance;
 use crate::bsdf::principled::{self, Textured8};
+use crate::extension::Extension;
 use crate::geometry::SurfaceHit8;
-use crate::scene::{Effects, Scene};
+use crate::scene::Effects;
 use crate::world::World;
 use croupier_simd::{F32x8, Frame8, Mask8, Vec3x8};
 
@@ -28,20 +30,24 @@ pub(super) struct Relief8 {
 /// The points in the lanes of `active` with the interpolated normals `ns` and the normals by winding `ng`.
 #[inline(never)]
 pub(super) fn relief<W: World>(
-    scene: &Scene<'_>,
+    world: &W,
     hit: &SurfaceHit8,
     wo: Vec3x8,
     ng: Vec3x8,
     ns: Vec3x8,
     active: Mask8,
 ) -> Relief8 {
+    let scene = world.scene();
     let textures = W::EFFECTS.contains(Effects::TEXTURES) && scene.effects.contains(Effects::TEXTURES);
     let normal_maps = W::EFFECTS.contains(Effects::NORMAL_MAPS) && scene.effects.contains(Effects::NORMAL_MAPS);
     let [wa, wb, wc] = hit.weights();
     let corner = |k: usize| hit.of_vertex(scene, k, |v| [v.uv[0], v.uv[1], 0.0]);
     let uvs = if textures { [corner(0), corner(1), corner(2)] } else { [Vec3x8::ZERO; 3] };
     let uv = uvs[0] * wa + uvs[1] * wb + uvs[2] * wc;
-    let t = principled::textured(scene, &hit.material, [uv.x, uv.y], active, [textures, normal_maps]);
+    let mut t = principled::textured(scene, &hit.material, [uv.x, uv.y], active, [textures, normal_maps]);
+    if W::Extension::TEXTURES {
+        t.surface.base = own_reflectance(world, hit, active, t.surface.base);
+    }
     // the winding says where the front is
     let mut ns = Vec3x8::select(ns.dot(ng).lt(F32x8::ZERO), -ns, ns);
     let mapped = active & t.mapped & (t.normal.x.abs() + t.normal.y.abs()).gt(F32x8::ZERO);

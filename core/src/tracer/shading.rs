@@ -131,12 +131,13 @@ impl Materials8 {
             }
         }
         if W::Extension::TEXTURES {
-            reflectance = own_reflectance(world, hit, reflectance);
+            let plain = hit.mask.and_not(bsdf::lanes_of(LAYERED_KINDS, &kind));
+            reflectance = own_reflectance(world, hit, plain, reflectance);
         }
         if W::EFFECTS.contains(Effects::PRINCIPLED) && scene.effects.contains(Effects::PRINCIPLED) {
             let layered = hit.mask & bsdf::lanes_of(LAYERED_KINDS, &kind);
             if layered.any() {
-                let r = relief::<W>(scene, hit, wo, ng, ns, layered);
+                let r = relief(world, hit, wo, ng, ns, layered);
                 reflectance = Vec3x8::select(layered, r.packed, reflectance);
                 straight = layered.select(1.0 - r.opacity, straight);
                 ns = Vec3x8::select(layered, r.ns, ns);
@@ -164,17 +165,17 @@ impl Materials8 {
     }
 }
 
-/// Reflectances that the host's extension makes of those of materials and texture files.
-fn own_reflectance<W: World>(world: &W, hit: &SurfaceHit8, reflectance: Vec3x8) -> Vec3x8 {
+/// Reflectances that the host's extension makes of those of materials and texture files, in the lanes of `active`.
+pub(super) fn own_reflectance<W: World>(world: &W, hit: &SurfaceHit8, active: Mask8, reflectance: Vec3x8) -> Vec3x8 {
     let [wa, wb, wc] = hit.weights();
     let uv = |k: usize| hit.of_vertex(world.scene(), k, |v| [v.uv[0], v.uv[1], 0.0]);
     let at = uv(0) * wa + uv(1) * wb + uv(2) * wc;
     let (material, point) = (U32x8::new(hit.material), hit.point().p);
-    let samples = TextureSamples8 { material, uv: [at.x, at.y], point, active: hit.mask };
+    let samples = TextureSamples8 { material, uv: [at.x, at.y], point, active };
     let own = world.extension().reflectance(&samples, reflectance);
     // a NaN becomes 0
     let clamp = |x: F32x8| F32x8::ZERO.max(x).min(F32x8::ONE);
-    Vec3x8::new(clamp(own.x), clamp(own.y), clamp(own.z))
+    Vec3x8::select(active, Vec3x8::new(clamp(own.x), clamp(own.y), clamp(own.z)), reflectance)
 }
 
 /// Does the scene hold anything that light may pass straight on?
