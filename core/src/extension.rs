@@ -36,6 +36,8 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 /// only then.
 pub trait Extension {
     /// Scattering model of materials of kind `own` (`bsdf`'s module documentation has the contract); [`NoBsdf`] without one.
+    /// What the tracer must know of the kind beforehand is that of [`NoBsdf`]: glossy, on both sides. `LOBES` and `straight`
+    /// of a host's model are not asked.
     type Bsdf: for<'s> Bsdf<'s>;
 
     /// Is there a scattering model? Without it, scenes with materials of kind `own` are refused.
@@ -68,8 +70,8 @@ pub trait Extension {
         SourcePoints8::NONE
     }
 
-    /// Reflectances (base colours) of eight hits, `reflectance` as materials and texture files give them. Between 0 and 1
-    /// per channel; what is not is clamped.
+    /// Reflectances of eight hits, of principled materials their base colours, `reflectance` as materials and texture files
+    /// give them. Between 0 and 1 per channel; what is not is clamped.
     fn reflectance(&self, _at: &TextureSamples8, reflectance: Vec3x8) -> Vec3x8 {
         reflectance
     }

@@ -6,10 +6,11 @@ use crate::learn::{LearnedScalars, Needs};
 use crate::scene::Scene;
 use crate::scene::blob::content_hash;
 use crate::settings::Settings;
-use crate::tracer::ShardCursor;
+use crate::tracer::{BYTES_PER_PATH, SHARD_RECORD_BYTES, ShardCursor};
 use crate::world::Iteration;
 use bytemuck::{Pod, Zeroable};
 use core::fmt::{self, Write};
+use croupier_simd::REPRODUCIBLE;
 
 /// First bytes of a record.
 const MAGIC: u64 = u64::from_le_bytes(*b"CRPSESSN");
@@ -141,12 +142,13 @@ impl SessionRecord {
     }
 }
 
-/// Hash of what the layout and the meaning of a block depend on: the settings, the version of this crate, the size of
-/// an address.
+/// Hash of what the layout and the meaning of a block depend on: the settings, the version of this crate, the sizes of an
+/// address and of the records at the head of blocks and in their slabs, how numbers are rounded.
 pub(crate) fn fingerprint(settings: &Settings) -> u64 {
     let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
     // nothing here fails
     let _ = write!(hash, "{} {}", env!("CARGO_PKG_VERSION"), size_of::<usize>());
+    let _ = write!(hash, " {} {SHARD_RECORD_BYTES} {BYTES_PER_PATH} {REPRODUCIBLE}", size_of::<SessionRecord>());
     for setting in Settings::TABLE {
         if let Some(value) = settings.value(setting.name) {
             let _ = write!(hash, " {}={value}", setting.name);

@@ -219,7 +219,7 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector, X: Extension> SessionBuil
 
     /// Goes on with the session that [`Session::suspend`] has left in a block of the same plan, with the bits that it
     /// would have had without the break. The time does not depend on the size of the picture. The scene may be another
-    /// one (edited, moved); its shards join the iteration anew then.
+    /// one (edited, moved): the picture begins anew then, with the statistics ([`SessionState::restart`]).
     ///
     /// # Errors
     /// As of [`Self::build`], and [`SessionError::Resume`] for a block without a suspended session of this plan. The
@@ -250,7 +250,8 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector, X: Extension> SessionBuil
             true => record.scalars(plan.fingerprint(), &needs).map_err(SessionError::Resume)?,
             false => SessionScalars::new(&scene, camera_media()),
         };
-        if scalars.scene != scene.hash {
+        let another = scalars.scene != scene.hash;
+        if another {
             scalars.camera_media = camera_media();
         }
         record.open();
@@ -269,7 +270,11 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector, X: Extension> SessionBuil
             scene: scene.hash,
             camera_media: scalars.camera_media,
         };
-        Ok(Session { scene, intersector, selector, extension, state, profile })
+        let mut session = Session { scene, intersector, selector, extension, state, profile };
+        if another {
+            session.restart(true);
+        }
+        Ok(session)
     }
 
     /// The state of a session with the parts of this builder, for shards to step; in a fixed short time, so that it can
@@ -478,10 +483,12 @@ impl<'m> SessionState<'m> {
     }
 
     /// Goes over to a scene that was edited, or another one: [`Self::restart`] for it. Sizes and depth stay those of
-    /// the settings.
+    /// the settings. In scenes with media it traces rays in eight directions to find those around the camera, without a
+    /// budget.
     ///
     /// # Errors
-    /// A scene that calls for effects outside the profile `P`; then nothing has changed.
+    /// A scene that calls for effects outside the profile `P`; then nothing of the session has changed. Edits of the scene
+    /// stay: they must be taken back, or the session is left with a scene that it cannot show.
     pub fn change_scene<P: Profile, I: Intersector, L: LightSelector, X: Extension>(
         &mut self,
         to: &SessionBuilder<'_, P, I, L, X>,
@@ -498,7 +505,8 @@ impl<'m> SessionState<'m> {
         Identity { scene: self.scene, epoch: self.epoch, iteration: self.iteration }
     }
 
-    /// Begins a round of `samples` camera samples per pixel. Shards notice at their next step.
+    /// Begins a round of `samples` camera samples per pixel. Shards notice at their next step. Takes a few instructions, with
+    /// [`Settings::adaptive`](crate::Settings::adaptive) a pass over the tiles of the picture.
     pub fn begin_iteration(&mut self, samples: u32) {
         let i = self.iteration;
         self.iteration = Iteration {

@@ -97,6 +97,23 @@ fn any_set_has_the_same_planes_and_picture() {
     }
 }
 
+/// Adaptive renders weigh iterations, and the parts of the light with them. Killed by: means over samples, of which
+/// adaptive iterations have different numbers.
+#[test]
+fn parts_of_adaptive_light_add_up_to_the_picture() {
+    let bytes = blob(&cornell([40, 40]));
+    let aovs = AovSet::of(&[Aov::Emission, Aov::Direct, Aov::Indirect, Aov::Depth]);
+    let s = Settings { aovs, adaptive: true, max_depth: 6, shards: 3, ..settings(&bytes, "ears") };
+    let seen = render(&bytes, &s, &[4, 5, 16, 7]);
+    let parts = [Aov::Emission, Aov::Direct, Aov::Indirect].map(|a| seen.of(a));
+    for (i, mean) in seen.mean.iter().enumerate() {
+        for c in 0..3 {
+            let sum: f64 = parts.iter().map(|p| f64::from(p[c][i])).sum();
+            assert!((sum - mean[c]).abs() <= 1e-5 * (mean[c] + 1e-3), "pixel {i}: {sum} and {}", mean[c]);
+        }
+    }
+}
+
 /// A plane before a camera of which a part sees nothing. Killed by: a divisor other than the camera samples, alpha that
 /// counts samples instead of hits, an index of a later sample.
 #[test]

@@ -9,6 +9,7 @@ use croupier_host::blob::AlignedBytes;
 use croupier_tests::runner::{finish, settings};
 use croupier_tests::scenes::*;
 use croupier_tests::stats::SplitMix;
+use std::cell::Cell;
 
 fn memory(bytes: usize, byte: u8) -> AlignedBytes {
     let mut block = AlignedBytes::zeroed(bytes);
@@ -129,6 +130,30 @@ fn shards_are_checked_at_every_piece() {
     finish(&session, &mut shards[1], 1 << 20);
     while session.finish_iteration(&shards, some).unwrap() == StepResult::More {}
     assert!(session.film().pixels().all(|p| p.samples == 2));
+}
+
+/// The end of an iteration looks at each shard a few times, also through iterators that reach an item by those before it,
+/// and begins in pieces too. Killed by: a search from the first shard for every piece, counters merged in one piece.
+#[test]
+fn the_end_is_linear_in_shards() {
+    let bytes = blob(&cornell([128, 128]));
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    let s = Settings { shards: 256, ..settings(&bytes, "classic") };
+    let plan = Plan::new(&s).unwrap();
+    let mut block = memory(plan.session().size, 0);
+    let mut own: Vec<_> = (0..s.shards).map(|i| memory(plan.shard_of(i).size, 0)).collect();
+    let mut shards: Vec<_> =
+        own.iter_mut().enumerate().map(|(i, b)| Shard::new(&plan, i as u32, b.as_mut()).unwrap()).collect();
+    let mut session = Session::new(scene, &plan, block.as_mut()).unwrap();
+    session.begin_iteration(1);
+    shards.iter_mut().for_each(|s| finish(&session, s, 1000));
+    assert_eq!(session.finish_iteration(&shards, Budget { rays: 1 }), Ok(StepResult::More));
+    assert_eq!(session.finishing_stage(), "start");
+    let items = Cell::new(0);
+    let all = shards.iter().inspect(|_| items.set(items.get() + 1));
+    assert_eq!(session.finish_iteration(all, Budget { rays: u64::MAX }), Ok(StepResult::Done));
+    assert!(items.get() <= 8 * 256, "{} items", items.get());
+    assert_eq!(session.counters().camera_samples, 128 * 128);
 }
 
 /// Starting a session and shards, beginning an iteration and joining it write to no memory that grows with the picture.

@@ -10,10 +10,12 @@ use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier::unstable::{camera, film::PixelStats, light::PowerSelector};
 use croupier::{Budget, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
-use croupier_host::description::{self, Emitter, Model, Reflectance, SceneDescription};
+use croupier_host::description::{self, Emitter, Model, Principled, Reflectance, SceneDescription};
 use croupier_tests::runner::settings;
 use croupier_tests::scenes::{add_quad, blob, camera as look, cornell, facing_y, grey, in_white_environment};
+use std::cell::Cell;
 use std::f32::consts::PI;
+use std::rc::Rc;
 
 /// Renders iterations of `spp` samples with an extension.
 fn render<X: Extension>(bytes: &[u8], s: &Settings, iterations: &[u32], extension: X) -> Vec<PixelStats> {
@@ -75,6 +77,46 @@ fn rays_of_the_host_are_rays_of_the_camera() {
         let [own, built_in] = [render(&bytes, &s, &[4, 4], OwnCamera), render(&bytes, &s, &[4, 4], ())];
         assert!(bits(&own) == bits(&built_in), "{strategy}");
     }
+}
+
+/// No rays but those of the last row, and how often it was asked.
+struct LastRow(Rc<Cell<u64>>);
+
+impl Extension for LastRow {
+    type Bsdf = NoBsdf;
+    const RAYS: bool = true;
+
+    fn rays(&self, scene: &Scene<'_>, s: &PixelSamples8) -> SourceRays8 {
+        self.0.set(self.0.get() + 1);
+        SourceRays8 { active: s.active & U32x8::splat(s.size[1] - 2).lt(s.row), ..OwnCamera.rays(scene, s) }
+    }
+}
+
+/// Samples without rays take of the budget as well: a step through an empty picture ends. Killed by: a budget of rays
+/// alone.
+#[test]
+fn steps_without_rays_are_bounded() {
+    let bytes = blob(&cornell([64, 64]));
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    let s = settings(&bytes, "classic");
+    let plan = Plan::new(&s).unwrap();
+    let [mut shared, mut block] = [plan.session(), plan.shard()].map(|l| AlignedBytes::zeroed(l.size));
+    let packets = Rc::new(Cell::new(0));
+    let mut session =
+        Session::builder(scene).extension(LastRow(packets.clone())).build(&plan, shared.as_mut()).unwrap();
+    let mut shard = Shard::new(&plan, 0, block.as_mut()).unwrap();
+    session.begin_iteration(4);
+    let (mut asked, mut steps) = (0, 0);
+    let mut left = StepResult::More;
+    while left == StepResult::More {
+        left = shard.step(&session, Budget { rays: 40 });
+        let now = packets.get();
+        assert!(now - asked <= 40, "{} packets in a step", now - asked);
+        (asked, steps) = (now, steps + 1);
+    }
+    assert!(asked >= 64 * 64 * 4 / 8 && steps > 100, "{asked} {steps}");
+    session.end_iteration([&shard]).unwrap();
+    assert!(session.film().pixels().all(|p| p.samples == 4));
 }
 
 /// Texels of a lightmap of the floor: irradiance over pi. The left half has no surface.
@@ -193,17 +235,24 @@ impl Extension for Stripes {
     }
 }
 
-/// Killed by: reflectance that is not handed on, that of other materials changed, no clamp.
+/// Killed by: reflectance that is not handed on, that of other materials changed, no clamp, base colours of principled
+/// materials that are left out.
 #[test]
 fn textures_of_the_host_are_reflectances() {
-    let mut scene = cornell([20, 12]);
-    let bytes = blob(&scene);
-    let s = settings(&bytes, "ears");
-    let own = render(&bytes, &s, &[4, 4], Stripes([0.25, 0.5, 2.0]));
-    scene.materials[0].model = Model::Diffuse { reflectance: Reflectance::Constant([0.25, 0.5, 1.0]) };
-    let painted = blob(&scene);
-    assert!(bits(&own) == bits(&render(&painted, &s, &[4, 4], ())));
-    assert!(bits(&own) != bits(&render(&bytes, &s, &[4, 4], ())), "the material is not seen");
+    let diffuse = |rgb| Model::Diffuse { reflectance: Reflectance::Constant(rgb) };
+    let layered = |rgb| Model::Principled(Principled { base_color: rgb, coat: 0.5, ..Principled::default() });
+    let models: [&dyn Fn([f32; 3]) -> Model; 2] = [&diffuse, &layered];
+    for model in models {
+        let mut scene = cornell([20, 12]);
+        scene.materials[0].model = model([0.75; 3]);
+        let bytes = blob(&scene);
+        let s = settings(&bytes, "ears");
+        let own = render(&bytes, &s, &[4, 4], Stripes([0.25, 0.5, 2.0]));
+        scene.materials[0].model = model([0.25, 0.5, 1.0]);
+        let painted = blob(&scene);
+        assert!(bits(&own) == bits(&render(&painted, &s, &[4, 4], ())));
+        assert!(bits(&own) != bits(&render(&bytes, &s, &[4, 4], ())), "the material is not seen");
+    }
 }
 
 /// A factor that follows no rule, now and then not finite.

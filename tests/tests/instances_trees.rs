@@ -255,3 +255,24 @@ fn instances_move_in_the_blob_s_memory() {
     }
     assert!(translation([0.0; 3])[0][0] == 1.0);
 }
+
+/// References have 27 bits for a leaf and 31 for a node. Killed by: numbers that run into the bits beside them.
+#[test]
+fn numbers_that_do_not_fit_are_refused() {
+    let corners = |id: u32| [[id as f32, 0.0, 0.0], [id as f32 + 1.0, 0.0, 0.0], [id as f32, 1.0, 0.0]];
+    let build = |first_node, first_leaf| {
+        let mut boxes: Vec<_> =
+            (0..64).map(|id| Primitive::new(id, [[id as f32, 0.0, 0.0], [id as f32 + 1.0, 1.0, 0.0]])).collect();
+        let (mut nodes, mut leaves): (Vec<Node>, Vec<Leaf>) =
+            (vec![bytemuck::Zeroable::zeroed(); 64], vec![bytemuck::Zeroable::zeroed(); 64]);
+        build_triangles(&mut boxes, &corners, (&mut nodes, first_node), (&mut leaves, first_leaf))
+    };
+    let built = build(0, 0).unwrap();
+    assert!(built.leaves >= 8 && built.nodes >= 1);
+    assert_eq!(build(0, (1 << 27) - built.leaves).unwrap().leaves, built.leaves);
+    assert_eq!(build(0, (1 << 27) - built.leaves + 1), Err(BuildError::Leaves { room: built.leaves as usize - 1 }));
+    assert!(matches!(build(0, u32::MAX), Err(BuildError::Leaves { .. })));
+    assert_eq!(build(LEAF_BIT - built.nodes, 0).unwrap().nodes, built.nodes);
+    assert!(matches!(build(LEAF_BIT - built.nodes + 1, 0), Err(BuildError::Nodes { .. })));
+    assert!(matches!(build(u32::MAX, 0), Err(BuildError::Nodes { .. })));
+}

@@ -3,7 +3,7 @@
 use croupier::unstable::learn::Learning;
 use croupier::unstable::scene::blob::content_hash;
 use croupier::unstable::{ResumeError, World};
-use croupier::{Budget, Plan, Scene, Session, SessionError, Settings, Shard};
+use croupier::{Budget, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
 use croupier_tests::runner::{finish, settings};
 use croupier_tests::scenes::*;
@@ -136,6 +136,50 @@ fn a_restarted_session_renders_what_a_new_one_does() {
         assert!(kept.is_none_or(|leaves| leaves > 6));
         render(&mut session, &mut shards);
         assert_eq!(everything(&session) == clean, s.strategy.name() == "classic", "{}", s.strategy);
+    }
+}
+
+/// A session that is resumed with another scene begins its picture anew, as a restart with the statistics does. Killed by:
+/// samples of the old scene in the picture of the new one, an iteration of the old one that goes on.
+#[test]
+fn another_scene_begins_another_picture() {
+    let bytes = blob(&cornell([20, 12]));
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    let mut other = cornell([20, 12]);
+    other.camera.origin[0] += 0.125;
+    let other = blob(&other);
+    let other = Scene::from_bytes(&other).unwrap();
+    for s in cases(&bytes) {
+        let plan = Plan::new(&s).unwrap();
+        let (mut block, mut own) = (memory(plan.session().size), blocks(&plan));
+        let mut shards = shards(&plan, &mut own);
+        let mut session = Session::new(scene, &plan, block.as_mut()).unwrap();
+        render(&mut session, &mut shards);
+        session.begin_iteration(8);
+        session.suspend();
+        let mut copy = memory(plan.session().size);
+        copy.as_mut().copy_from_slice(block.as_ref());
+
+        let mut resumed = Session::resume(other, &plan, block.as_mut()).unwrap();
+        assert!(resumed.film().pixels().all(|p| p.samples == 0));
+        assert_eq!(resumed.end_iteration(&shards), Err(SessionError::NoIteration));
+        render(&mut resumed, &mut shards);
+        let mut changed = Session::resume(scene, &plan, copy.as_mut()).unwrap();
+        changed.change_scene(&Session::builder(other), true).unwrap();
+        // what edits do, by another way
+        let mut state = changed.into_state();
+        for samples in ITERATIONS {
+            state.begin_iteration(samples);
+            let view = Session::builder(other).view(&state).unwrap();
+            for shard in &mut shards {
+                while shard.step(&view, Budget { rays: 1 << 20 }) == StepResult::More {}
+            }
+            state.end_iteration(&shards).unwrap();
+        }
+        let sums =
+            |film: &croupier::Film<'_>| bytemuck::cast_slice::<_, u8>(&film.pixels().collect::<Vec<_>>()).to_vec();
+        assert!(sums(resumed.film()) == sums(state.film()), "{}", s.strategy);
+        assert!(resumed.counters().camera_samples == 20 * 12 * 23);
     }
 }
 

@@ -15,7 +15,7 @@
 //! 4. Nodes and leaves are numbered as [`Node`] says: depth first, slots ascending. What waits lies on a stack: seven parts
 //!    a level, and those of the last.
 
-use crate::scene::blob::{LEAF_BIT, Leaf, MAX_TREE_DEPTH, NONE, Node};
+use crate::scene::blob::{CHILD_INDEX, LEAF_BIT, Leaf, MAX_TREE_DEPTH, NONE, Node};
 use bytemuck::{Pod, Zeroable};
 use core::fmt;
 
@@ -130,7 +130,7 @@ impl<F: Fn(u32) -> [[f32; 3]; 3]> Corners for F {
 /// nodes and leaves as triangles. Things whose box is not finite are left out, no ray finds them.
 ///
 /// # Errors
-/// Too little room for nodes or leaves.
+/// Too little room for nodes or leaves, or leaves whose numbers do not fit into references.
 pub fn build_triangles(
     things: &mut [Primitive],
     corners: &impl Corners,
@@ -141,6 +141,8 @@ pub fn build_triangles(
     let mut used = 0usize;
     let leaf = |part: &[Primitive]| {
         let leaf = leaves.get_mut(used).ok_or(BuildError::Leaves { room })?;
+        let index = u32::try_from(used).ok().and_then(|used| first_leaf.checked_add(used));
+        let index = index.filter(|i| *i <= CHILD_INDEX).ok_or(BuildError::Leaves { room: used })?;
         *leaf = Leaf { p: [[0.0; 8]; 9], triangle: [NONE; 8] };
         for (slot, thing) in part.iter().enumerate().take(WIDTH) {
             leaf.triangle[slot] = thing.id;
@@ -148,7 +150,7 @@ pub fn build_triangles(
                 leaf.p[row][slot] = *x;
             }
         }
-        let reference = LEAF_BIT | (part.len() as u32) << 27 | (first_leaf + used as u32);
+        let reference = LEAF_BIT | (part.len() as u32) << 27 | index;
         used += 1;
         Ok(reference)
     };
@@ -156,7 +158,8 @@ pub fn build_triangles(
 }
 
 /// Builds a top-level tree: the `id` of each thing is the child reference itself. See
-/// [`top_capacity`](crate::scene::blob::top_capacity) for the nodes that it takes at most.
+/// [`top_capacity`](crate::scene::blob::top_capacity) for the nodes that it takes at most. Primitives whose box is not finite
+/// are left out, no ray finds them.
 ///
 /// # Errors
 /// Too little room for nodes.
@@ -264,6 +267,8 @@ fn build<const LEAF: usize>(
         } else {
             let index = built.nodes;
             let node = nodes.get_mut(index as usize).ok_or(BuildError::Nodes { room })?;
+            let number = first.checked_add(index).filter(|i| *i < LEAF_BIT);
+            let number = number.ok_or(BuildError::Nodes { room: index as usize })?;
             *node = Node { bounds: [[0.0; 8]; 6], child: [NONE; 8], reserved: [0; 8] };
             for k in 0..3 {
                 (node.bounds[k], node.bounds[k + 3]) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
@@ -275,7 +280,7 @@ fn build<const LEAF: usize>(
                 waiting[sp] = Waiting { part: *part, parent: index, slot: slot as u32, level: level + 1 };
                 sp += 1;
             }
-            first + index
+            number
         };
         if let Some(parent) = nodes.get_mut(parent as usize) {
             let slot = slot as usize & 7;

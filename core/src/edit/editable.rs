@@ -1,63 +1,13 @@
 //! A validated blob in the host's memory that may change between frames.
 
+use super::error::EditError;
 use super::light_table;
-use crate::accel::{Primitive, TopLevel, set_hidden, set_transform};
-use crate::light::{self, SceneExtent, luminance};
+use crate::light::{self, SceneExtent};
 use crate::scene::blob::*;
-use crate::scene::{Effects, InstanceFault, Records, Scene, SceneError, SectionTable, Sections, check};
+use crate::scene::{Effects, Records, Scene, SceneError, SectionTable, Sections, check};
 use bytemuck::Pod;
-use core::fmt;
-
-/// Why a record of a scene cannot be replaced.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum EditError {
-    /// The scene has no such record.
-    Missing {
-        /// Section that was meant.
-        of: SectionKind,
-        /// Index that was asked for.
-        index: u32,
-    },
-    /// The new record breaks a rule of the blob.
-    Invalid(SceneError),
-    /// The new record differs in what cannot change without baking: the light's kind, triangle or area, the
-    /// environment's kind or size, the size of the material's tables.
-    Fixed {
-        /// Section that was meant.
-        of: SectionKind,
-        /// Index that was asked for.
-        index: u32,
-    },
-    /// A transform that an instance cannot have.
-    Transform {
-        /// Instance that was meant.
-        index: u32,
-        /// What is wrong.
-        fault: InstanceFault,
-    },
-}
-
-impl fmt::Display for EditError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Missing { of, index } => write!(f, "edit: the scene has no record {index} of {}", of.name()),
-            Self::Invalid(e) => write!(f, "edit: {e}"),
-            Self::Fixed { of, index } => {
-                write!(f, "edit: record {index} of {} differs in what only baking can change", of.name())
-            }
-            Self::Transform { index, fault } => write!(f, "edit: transform of instance {index}: {fault}"),
-        }
-    }
-}
-
-impl core::error::Error for EditError {}
-
-impl From<SceneError> for EditError {
-    fn from(e: SceneError) -> Self {
-        Self::Invalid(e)
-    }
-}
+use core::f64::consts::PI;
+use croupier_simd::{F32x8, LUMINANCE};
 
 /// A validated scene that owns its bytes, in whatever holds them (`Vec<u8>`, `&mut [u8]`, a static array), and that may be
 /// changed between frames. [`Self::scene`] shows it, in a fixed short time.
@@ -66,7 +16,8 @@ impl From<SceneError> for EditError {
 /// the scene is and not on how it came about: an edit that is taken back restores it. (Light tables that were built
 /// anew are another state than baked ones.)
 ///
-/// The container must give the same bytes at the same place, or moved as a whole, whenever it is asked.
+/// The container must give the same bytes whenever it is asked, at the same place or moved as a whole to another multiple
+/// of 4: a container that holds them itself needs that alignment (a plain `[u8; N]` has none).
 ///
 /// ```
 /// use croupier::{EditableScene, SceneError};
@@ -89,8 +40,8 @@ pub struct EditableScene<B> {
     identity: u64,
     /// Largest values of the environment map.
     brightest: [f32; 3],
-    /// Power of the environment's light while its scale has a luminance of 1.
-    environment_power: f64,
+    /// Integral of the environment's radiance over all directions at a scale of 1, by channel.
+    sky: [f64; 3],
     /// The light table is no longer the baked one.
     relit: bool,
 }
@@ -106,15 +57,17 @@ impl<B: AsRef<[u8]>> EditableScene<B> {
     pub fn new(bytes: B) -> Result<Self, SceneError> {
         let (scene, table) = Scene::validated(bytes.as_ref())?;
         let (effects, identity, brightest) = (scene.effects, scene.hash, check::brightest(&scene));
-        let environment_power = environment_power(&scene);
-        Ok(Self { bytes, table, effects, identity, brightest, environment_power, relit: false })
+        let sky = sky(&scene);
+        Ok(Self { bytes, table, effects, identity, brightest, sky, relit: false })
     }
 
-    /// The scene as it is now.
+    /// The scene as it is now; an empty one with a hash of 0 if the container does not give the bytes any more, or not at
+    /// a multiple of 4.
     pub fn scene(&self) -> Scene<'_> {
         let sections = Sections::assume_sound(self.table, self.bytes.as_ref());
-        let records = Scene::records(&sections).unwrap_or(NOTHING);
-        Scene::assume_valid(Records { effects: self.effects, hash: self.identity, ..records })
+        let records = Scene::records(&sections);
+        let changed = |records| Records { effects: self.effects, hash: self.identity, ..records };
+        Scene::assume_valid(records.map_or(NOTHING, changed))
     }
 
     /// The bytes as they are now; see [`Self::into_bytes`].
@@ -139,10 +92,11 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> EditableScene<B> {
             effects: &mut self.effects,
             identity: &mut self.identity,
             brightest: self.brightest,
-            environment_power: self.environment_power,
+            sky: self.sky,
             relit: &mut self.relit,
             lights_changed: false,
-            moved: None,
+            world_moved: false,
+            moved_within: None,
         }
     }
 
@@ -160,16 +114,29 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> EditableScene<B> {
     }
 }
 
-/// Power of the environment's light at a scale of luminance 1, from its share of the baked table.
-fn environment_power(scene: &Scene<'_>) -> f64 {
-    let Some(e) = scene.environment else { return 0.0 };
-    let extent = SceneExtent { radius: radius(scene), environment: 0.0 };
-    let others: f64 = scene.lights.iter().map(|l| light::power(l, &extent)).sum();
-    let share = scene.light_alias.get(e.light as usize).map_or(0.0, |a| f64::from(a.probability));
-    let scale = luminance(e.radiance);
-    let power = if others > 0.0 { others * share / (1.0 - share).max(1e-9) } else { share };
-    // a constant one has the same power at every scale; a map that was scaled to black has an unknown one
-    if scale > 0.0 { power / scale } else { 1.0 }
+/// Integral of the environment's radiance over all directions at a scale of 1, by channel; of a map bilinear in polar angle
+/// and azimuth, as the kernels read it.
+fn sky(scene: &Records<'_>) -> [f64; 3] {
+    let Some(e) = scene.environment else { return [0.0; 3] };
+    if e.kind == EnvironmentKind::Constant as u32 {
+        return [4.0 * PI; 3];
+    }
+    let cells = f64::from(e.height.saturating_sub(1).max(1));
+    let step = PI / cells;
+    let sin = |turns: f64| f64::from(F32x8::splat(turns as f32).sin_cos_2pi().0.lane(0));
+    // integral of the sine times a row's share, which falls from 1 to 0 at the rows beside it
+    let weight = |row: u32| match f64::from(row) {
+        row if row > 0.0 && row < cells => 4.0 * sin(0.25 / cells) * sin(0.25 / cells) / step * sin(0.5 * row / cells),
+        _ => 1.0 - sin(0.5 / cells) / step,
+    };
+    let mut sum = [0.0; 3];
+    for (row, texels) in (0..).zip(scene.env_texels.chunks_exact(e.width.max(1) as usize)) {
+        let weight = weight(row) * 2.0 * PI / f64::from(e.width.max(1));
+        for texel in texels {
+            sum.iter_mut().zip(texel).for_each(|(sum, x)| *sum += weight * f64::from(*x));
+        }
+    }
+    sum
 }
 
 /// Radius of a sphere around the scene as the baker takes it.
@@ -227,31 +194,33 @@ const NOTHING: Records<'static> = {
 /// A round of edits of an [`EditableScene`].
 #[derive(Debug)]
 pub struct SceneEdit<'a> {
-    bytes: &'a mut [u8],
-    table: &'a SectionTable,
-    effects: &'a mut Effects,
+    pub(super) bytes: &'a mut [u8],
+    pub(super) table: &'a SectionTable,
+    pub(super) effects: &'a mut Effects,
     identity: &'a mut u64,
     brightest: [f32; 3],
-    environment_power: f64,
+    sky: [f64; 3],
     relit: &'a mut bool,
-    lights_changed: bool,
-    /// First and last object whose instances have moved.
-    moved: Option<[u32; 2]>,
+    pub(super) lights_changed: bool,
+    /// An instance of the world has moved.
+    pub(super) world_moved: bool,
+    /// First and last object other than the world whose instances have moved.
+    pub(super) moved_within: Option<[u32; 2]>,
 }
 
 impl SceneEdit<'_> {
-    fn records(&self) -> Option<Records<'_>> {
+    pub(super) fn records(&self) -> Option<Records<'_>> {
         Scene::records(&Sections::assume_sound(*self.table, self.bytes)).ok()
     }
 
-    fn read<T: Pod>(&self, of: SectionKind, index: u32) -> Result<T, EditError> {
+    pub(super) fn read<T: Pod>(&self, of: SectionKind, index: u32) -> Result<T, EditError> {
         let bytes = self.table.record(of, index).and_then(|range| self.bytes.get(range));
         let record = bytes.filter(|b| b.len() == size_of::<T>()).map(bytemuck::pod_read_unaligned);
         record.ok_or(EditError::Missing { of, index })
     }
 
     /// Replaces a record that was checked.
-    fn write<T: Pod>(&mut self, of: SectionKind, index: u32, record: &T) {
+    pub(super) fn write<T: Pod>(&mut self, of: SectionKind, index: u32, record: &T) {
         let Some(place) = self.table.record(of, index).and_then(|range| self.bytes.get_mut(range)) else { return };
         let new = bytemuck::bytes_of(record);
         if place.len() == new.len() {
@@ -269,45 +238,6 @@ impl SceneEdit<'_> {
     pub fn camera(&mut self, camera: Camera) -> Result<(), EditError> {
         let effects = check::camera(&camera)?;
         self.write(SectionKind::Cameras, 0, &camera);
-        *self.effects = self.effects.with(effects);
-        Ok(())
-    }
-
-    /// Replaces a material and the tables that it refers to: as many entries as its kind has, in their order, computed
-    /// by whoever bakes materials; they must fit where the old ones are. Kind, texture and medium may change; triangles
-    /// and lights stay as they are.
-    ///
-    /// The effects of the scene grow by those of the material and never shrink: a session must have a profile with them.
-    ///
-    /// # Errors
-    /// No such material, one that breaks a rule of the blob, or more tables than there is room for.
-    pub fn material(&mut self, index: u32, material: Material, tables: &[f32]) -> Result<(), EditError> {
-        let of = SectionKind::Materials;
-        let old: Material = self.read(of, index)?;
-        let room = |m: &Material| {
-            let compensated = m.flags & MATERIAL_COMPENSATED != 0;
-            let used = |p: &&Parameter| compensated || !p.compensates();
-            let facts = MaterialKind::from_u32(m.kind).map(MaterialKind::facts);
-            facts.map_or(0, |f| f.parameters.iter().filter(used).map(|p| p.entries()).sum::<usize>())
-        };
-        let first = if tables.is_empty() { NONE } else { old.table };
-        let material = Material { table: first, ..material };
-        if tables.len() != room(&material) || tables.len() > room(&old) {
-            return Err(EditError::Fixed { of, index });
-        }
-        let kept = Tables::new(self, first, tables);
-        let checked = match kept.edit.records() {
-            Some(scene) => check::material(&scene, index, &material).map_err(EditError::Invalid),
-            None => Err(EditError::Missing { of, index }),
-        };
-        let effects = match checked {
-            Ok(effects) => effects,
-            Err(e) => {
-                kept.restore();
-                return Err(e);
-            }
-        };
-        self.write(of, index, &material);
         *self.effects = self.effects.with(effects);
         Ok(())
     }
@@ -335,8 +265,8 @@ impl SceneEdit<'_> {
             // baked without any light that emits: there is no table to choose by
             return Err(EditError::Fixed { of, index });
         }
+        self.lights_changed |= bytemuck::bytes_of(&old) != bytemuck::bytes_of(&light);
         self.write(of, index, &light);
-        self.lights_changed = true;
         Ok(())
     }
 
@@ -361,7 +291,8 @@ impl SceneEdit<'_> {
     /// old ones.
     ///
     /// # Errors
-    /// No environment, one that breaks a rule of the blob, or one that differs in what cannot change.
+    /// No environment, one that breaks a rule of the blob, or one that differs in what cannot change; light from it in a scene
+    /// that was baked without any.
     pub fn environment(&mut self, environment: Environment) -> Result<(), EditError> {
         let (of, index) = (SectionKind::Environment, 0);
         let old: Environment = self.read(of, index)?;
@@ -370,147 +301,34 @@ impl SceneEdit<'_> {
             return Err(EditError::Fixed { of, index });
         }
         check::environment(&environment, self.brightest)?;
+        let constant = environment.kind == EnvironmentKind::Constant as u32;
+        let brightest = if constant { [1.0; 3] } else { self.brightest };
+        let emits = brightest.iter().zip(&environment.radiance).any(|(x, scale)| x * scale > 0.0);
+        if emits && self.records().is_some_and(|scene| scene.light_alias.is_empty()) {
+            return Err(EditError::Fixed { of, index });
+        }
         self.write(of, index, &environment);
         self.lights_changed |= old.radiance != environment.radiance;
         Ok(())
     }
 
-    /// Moves an instance: the maps to the space around it when the shutter opens and when it closes (the same twice if it
-    /// stands still). Its lights move along. The top-level trees around it are refitted once all edits are made, in a time
-    /// that grows with their instances; after far moves [`Self::rebuild`] makes rays faster again.
-    ///
-    /// # Errors
-    /// No such instance, or maps that cannot be: not finite, singular or nearly, or out of the range of coordinates.
-    pub fn transform(&mut self, index: u32, to_world: [[[f32; 4]; 3]; 2]) -> Result<(), EditError> {
-        let of = SectionKind::Instances;
-        let mut instance: Instance = self.read(of, index)?;
-        let object: Object = self.read(SectionKind::Objects, instance.object)?;
-        set_transform(&mut instance, to_world, &object).map_err(|fault| EditError::Transform { index, fault })?;
-        self.write(of, index, &instance);
-        if instance.flags & INSTANCE_MOVING != 0 {
-            *self.effects = self.effects.with(Effects::MOTION);
-        }
-        let around = self.object_around(index);
-        let [first, last] = self.moved.unwrap_or([around; 2]);
-        self.moved = Some([first.min(around), last.max(around)]);
-        Ok(())
-    }
-
-    /// Shows or hides an instance, with its lights.
-    ///
-    /// # Errors
-    /// No such instance.
-    pub fn visible(&mut self, index: u32, visible: bool) -> Result<(), EditError> {
-        let of = SectionKind::Instances;
-        let mut instance: Instance = self.read(of, index)?;
-        set_hidden(&mut instance, !visible);
-        self.write(of, index, &instance);
-        self.lights_changed |= self.records().is_some_and(|s| s.lights.iter().any(|l| l.instance > 0));
-        Ok(())
-    }
-
-    /// Object whose own instance this is.
-    fn object_around(&self, instance: u32) -> u32 {
-        let holds = |o: &Object| (o.first_instance..o.first_instance.saturating_add(o.instances)).contains(&instance);
-        self.records().and_then(|s| s.objects.iter().position(holds)).map_or(0, |i| i as u32)
-    }
-
-    /// Brings what follows from transforms up to date: boxes of top-level trees, the scene's bounds, areas of lights.
-    fn settle_moves(&mut self, [first, last]: [u32; 2]) {
-        // objects that instances place come before the world is refitted, whose boxes hold them
-        for object in (first.max(1)..=last).rev() {
-            self.with_top(|top| top.refit(object).is_ok());
-            let placers = self.records().map_or(0, |s| s.instances.len() as u32);
-            for index in 0..placers {
-                let Ok(mut placer) = self.read::<Instance>(SectionKind::Instances, index) else { continue };
-                let (to_world, placed) = (placer.to_world, self.read::<Object>(SectionKind::Objects, object));
-                if let (true, Ok(placed)) = (placer.object == object, placed)
-                    && set_transform(&mut placer, to_world, &placed).is_ok()
-                {
-                    self.write(SectionKind::Instances, index, &placer);
-                }
-            }
-        }
-        self.with_top(|top| top.refit(0).is_ok());
-        self.settle_world();
-    }
-
-    /// Takes over what object 0 says of the whole scene, and the areas of lights in instances.
-    fn settle_world(&mut self) {
-        let (world, info) =
-            (self.read::<Object>(SectionKind::Objects, 0), self.read::<SceneInfo>(SectionKind::Info, 0));
-        if let (Ok(world), Ok(info)) = (world, info) {
-            let (bounds_min, bounds_max) = (world.bounds_min, world.bounds_max);
-            self.write(SectionKind::Info, 0, &SceneInfo { bounds_min, bounds_max, ..info });
-        }
-        let mut next = 0;
-        while let Some((index, light)) = self.next_light(next, |_, l| l.instance > 0) {
-            next = index.saturating_add(1);
-            let Some(scene) = self.records() else { return };
-            let area = light::area_of(&Scene::assume_valid(scene), index, &light);
-            if area > 0.0 && area.is_finite() && area.to_bits() != light.area.to_bits() {
-                self.write(SectionKind::Lights, index, &Light { area, ..light });
-                self.lights_changed = true;
-            }
-        }
-    }
-
     /// The first light from `from` on that `is` wanted.
-    fn next_light(&self, from: u32, is: impl Fn(&Records<'_>, &Light) -> bool) -> Option<(u32, Light)> {
+    pub(super) fn next_light(&self, from: u32, is: impl Fn(&Records<'_>, &Light) -> bool) -> Option<(u32, Light)> {
         let scene = self.records()?;
         let rest = scene.lights.get(from as usize..)?;
         let found = rest.iter().position(|l| is(&scene, l))?;
         Some((from.saturating_add(found as u32), *rest.get(found)?))
     }
 
-    /// Room that [`Self::rebuild`] needs.
-    pub fn rebuild_len(&mut self) -> usize {
-        let mut room = 0;
-        self.with_top(|top| {
-            room = (0..top.objects.len() as u32).map(|object| top.scratch_len(object)).max().unwrap_or(0);
-            true
-        });
-        room
-    }
-
-    /// Builds the world's top-level tree anew over its instances as they are, with this memory for them
-    /// ([`Self::rebuild_len`]): after moves that are large against the distances between instances.
-    ///
-    /// # Errors
-    /// Too little room; the tree is as it was.
-    pub fn rebuild(&mut self, scratch: &mut [Primitive]) -> Result<(), EditError> {
-        let none = EditError::Missing { of: SectionKind::Objects, index: 0 };
-        if self.rebuild_len() > scratch.len() {
-            return Err(none);
-        }
-        if let Some(moved) = self.moved.take() {
-            self.settle_moves(moved);
-        }
-        let built = self.with_top(|top| top.rebuild(0, scratch).is_ok());
-        self.settle_world();
-        if built { Ok(()) } else { Err(none) }
-    }
-
-    /// Calls `change` with the top-level trees, if the scene has any.
-    fn with_top(&mut self, change: impl FnOnce(&mut TopLevel<'_>) -> bool) -> bool {
-        let range = |kind| self.table.whole(kind);
-        let of = [SectionKind::Objects, SectionKind::Instances, SectionKind::Nodes].map(range);
-        let [Some(objects), Some(instances), Some(nodes)] = of else { return false };
-        let Ok([objects, instances, nodes]) = self.bytes.get_disjoint_mut([objects, instances, nodes]) else {
-            return false;
-        };
-        let objects = bytemuck::try_cast_slice_mut::<u8, Object>(objects);
-        let instances = bytemuck::try_cast_slice::<u8, Instance>(instances);
-        let nodes = bytemuck::try_cast_slice_mut::<u8, Node>(nodes);
-        let (Ok(objects), Ok(instances), Ok(nodes)) = (objects, instances, nodes) else { return false };
-        change(&mut TopLevel { objects, instances, nodes })
-    }
-
-    /// Builds the table that chooses among lights.
+    /// Builds the table that chooses among lights, in four passes over them.
     fn relight(&mut self) {
         let Some(scene) = self.records() else { return };
-        let environment = scene.environment.map_or(0.0, |e| luminance(e.radiance) * self.environment_power);
-        let extent = SceneExtent { radius: radius(&scene), environment: 0.0 };
+        let of_channel = |e: &Environment| {
+            let channels = e.radiance.iter().zip(&self.sky).zip(LUMINANCE);
+            channels.map(|((scale, integral), weight)| weight * f64::from(*scale) * integral).sum()
+        };
+        let environment = scene.environment.map_or(0.0, of_channel);
+        let extent = SceneExtent { radius: radius(&scene), environment };
         let range = |kind| self.table.whole(kind);
         let of = [SectionKind::LightAlias, SectionKind::Lights].map(range);
         let instances = range(SectionKind::Instances).unwrap_or(0..0);
@@ -525,11 +343,7 @@ impl SceneEdit<'_> {
             outer.is_some_and(|i| i.flags & INSTANCE_HIDDEN != 0)
         };
         light_table::build(table, |i| {
-            lights.get(i as usize).map_or(0.0, |l| match LightKind::from_u32(l.kind) {
-                Some(LightKind::Environment) => environment,
-                _ if hidden(l) => 0.0,
-                _ => light::power(l, &extent),
-            })
+            lights.get(i as usize).filter(|l| !hidden(l)).map_or(0.0, |l| light::power(l, &extent))
         });
         if !core::mem::replace(self.relit, true) {
             *self.identity ^= RELIT;
@@ -539,40 +353,9 @@ impl SceneEdit<'_> {
 
 impl Drop for SceneEdit<'_> {
     fn drop(&mut self) {
-        if let Some(moved) = self.moved.take() {
-            self.settle_moves(moved);
-        }
+        self.settle_moves(None);
         if self.lights_changed {
             self.relight();
-        }
-    }
-}
-
-/// Tables of a material, replaced, and how to take that back.
-struct Tables<'e, 'a> {
-    edit: &'e mut SceneEdit<'a>,
-    first: u32,
-    old: [f32; TABLE_ROOM],
-    count: usize,
-}
-
-/// Most entries that a material's tables have.
-const TABLE_ROOM: usize = TRANSMITTANCE_ENTRIES + 2 * COMPENSATION_ENTRIES;
-
-impl<'e, 'a> Tables<'e, 'a> {
-    fn new(edit: &'e mut SceneEdit<'a>, first: u32, new: &[f32]) -> Self {
-        let mut old = [0.0; TABLE_ROOM];
-        let count = new.len().min(TABLE_ROOM);
-        for (i, (slot, x)) in (first..=u32::MAX).zip(old.iter_mut().zip(new)) {
-            *slot = edit.read(SectionKind::Tables, i).unwrap_or(0.0);
-            edit.write(SectionKind::Tables, i, x);
-        }
-        Self { edit, first, old, count }
-    }
-
-    fn restore(self) {
-        for (i, x) in (self.first..=u32::MAX).zip(self.old.iter().take(self.count)) {
-            self.edit.write(SectionKind::Tables, i, x);
         }
     }
 }

@@ -3,10 +3,16 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `editable` | [`EditableScene`]: a validated blob that may change |
+//! | `editable` | [`EditableScene`]: a validated blob that may change; edits of camera, lights and environment |
+//! | `materials` | edits of materials and their tables |
+//! | `instances` | edits of instances, and what follows from them |
 //! | `light_table` | the table that chooses among lights, built in place |
 
 mod editable;
+mod error;
+mod instances;
 mod light_table;
+mod materials;
 
-pub use editable::{EditError, EditableScene, SceneEdit};
+pub use editable::{EditableScene, SceneEdit};
+pub use error::EditError;

@@ -28,7 +28,7 @@ pub enum Aov {
     /// ([`PixelStats::rays`](super::PixelStats::rays)), which are sums.
     Cost,
     /// Radiance of what is seen directly: emitters and environment, rgb. Emission, direct and indirect light add up to the
-    /// picture, but for rounding in `f32`.
+    /// picture, but for rounding in `f32`; in adaptive renders they are weighted means like it.
     Emission,
     /// Radiance of light that scattered once, rgb.
     Direct,
@@ -371,6 +371,27 @@ impl<'m> AovPlanes<'m> {
             for (at, x) in places.iter().zip(merged.as_flattened()) {
                 if let Some(value) = self.values.get_mut(*at) {
                     *value = *x;
+                }
+            }
+        }
+    }
+
+    /// Merges as [`Self::merge`], but parts of the radiance as the picture: their means over earlier samples count as those of
+    /// `weight` samples of now.
+    pub(crate) fn merge_weighted(&mut self, pixel: usize, before: u32, more: u32, sums: &[f32], weight: f64) {
+        const LIGHT: [Aov; 3] = [Aov::Emission, Aov::Direct, Aov::Indirect];
+        if more == 0 || !self.layout.any(AovSet::LIGHT) {
+            return self.merge(pixel, before, more, sums);
+        }
+        let old = LIGHT.map(|aov| [0, 1, 2].map(|c| if before == 0 { 0.0 } else { self.value(aov, c, pixel) }));
+        self.merge(pixel, before, more, sums);
+        let more = f64::from(more);
+        for (aov, old) in LIGHT.into_iter().zip(old) {
+            let Some(first) = self.layout.first(aov) else { continue };
+            for (plane, old) in (first..).zip(old) {
+                let sum = sums.get(plane).copied().map_or(0.0, f64::from);
+                if let Some(mean) = self.values.get_mut(plane * self.pixels + pixel) {
+                    *mean = (old + (sum - more * old) / (weight + more)) as f32;
                 }
             }
         }

@@ -202,7 +202,17 @@ impl<'m> Film<'m> {
         if let Some(r) = self.rays.get_mut(pixel) {
             *r = if fresh { rays } else { r.saturating_add(rays) };
         }
-        self.aovs.merge(pixel, before.samples as u32, sums.samples, aov);
+        let samples = before.samples as u32;
+        if self.weights.is_empty() || w <= 0.0 {
+            self.aovs.merge(pixel, samples, sums.samples, aov);
+        } else {
+            self.aovs.merge_weighted(pixel, samples, sums.samples, aov, before.weight / w);
+        }
+    }
+
+    /// Begins the merge of an iteration; of one that was abandoned no sums are left.
+    pub(crate) fn begin_merge(&mut self) {
+        self.scalars.differences = Differences::default();
     }
 
     /// Ends the merge of an iteration: all its pixels were added.
@@ -244,5 +254,34 @@ impl<'m> Film<'m> {
             rel_mse_all: ratio * (t.sum + t.rest) / self.pixels.len().max(1) as f64,
             independence: ratio,
         };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::memory::BLOCK_ALIGN;
+    use std::vec;
+
+    /// What an end that was abandoned has gathered of the correlation does not count in the next one. Killed by: sums that
+    /// are forgotten at the end of a merge only.
+    #[test]
+    fn an_abandoned_merge_is_forgotten() {
+        let layout = FilmLayout { size: [1, 1], weights: false, rays: false, aovs: AovSet::NONE };
+        let needed = Film::measure(Measure::new(), &layout).layout().expect("a small film");
+        let mut memory = vec![0u8; needed.size + BLOCK_ALIGN];
+        let from = memory.as_ptr().align_offset(BLOCK_ALIGN);
+        let mut c = Carver::new(&mut memory[from..], needed).expect("room");
+        let mut film = Film::carve(&mut c, &layout, FilmScalars::new()).expect("room");
+        let mut sums = PixelSums::default();
+        (0..4u8).for_each(|i| sums.add([f64::from(i); 3]));
+        let nothing = |film: &Film<'_>| bytemuck::bytes_of(&film.scalars.differences).iter().all(|b| *b == 0);
+        film.merge(0, &sums, 0, &[], 1.0);
+        film.end_merge();
+        film.merge(0, &sums, 0, &[], 1.0);
+        assert!(!nothing(&film));
+        film.begin_merge();
+        assert!(nothing(&film));
     }
 }

@@ -13,11 +13,11 @@
 //! Work is counted in units of a ray of the tracer, some 300 instructions ([`Budget::rays`]).
 
 use super::{Phase, SessionError, SessionState};
-use crate::counters::Counters;
 use crate::film::Film;
 use crate::learn::LearnedState;
 use crate::record::Finishing;
 use crate::tracer::{Budget, Shard, ShardCursor, StepResult};
+use core::iter::Fuse;
 
 // the stages in order; `START` between iterations
 const START: u32 = 0;
@@ -54,6 +54,37 @@ pub(super) trait Shards<'a, 'b: 'a>: IntoIterator<Item = &'a Shard<'b>> + Clone 
 
 impl<'a, 'b: 'a, T: IntoIterator<Item = &'a Shard<'b>> + Clone> Shards<'a, 'b> for T {}
 
+/// The shards one after the other: an iterator that stays where it is between two pieces, since most iterators reach an
+/// item only by those before it.
+struct Walk<'a, 'b, S: Shards<'a, 'b>> {
+    shards: S,
+    rest: Fuse<S::IntoIter>,
+    /// Number of the first item of `rest`.
+    next: u32,
+    current: Option<(u32, &'a Shard<'b>)>,
+}
+
+impl<'a, 'b: 'a, S: Shards<'a, 'b>> Walk<'a, 'b, S> {
+    fn new(shards: S) -> Self {
+        let rest = shards.clone().into_iter().fuse();
+        Self { shards, rest, next: 0, current: None }
+    }
+
+    /// Shard `number`, `None` behind the last.
+    fn shard(&mut self, number: u32) -> Option<&'a Shard<'b>> {
+        if let Some((_, shard)) = self.current.filter(|(current, _)| *current == number) {
+            return Some(shard);
+        }
+        if number < self.next {
+            *self = Self::new(self.shards.clone());
+        }
+        let found = self.rest.nth((number - self.next) as usize);
+        self.next = if found.is_some() { number.saturating_add(1) } else { u32::MAX };
+        self.current = found.map(|shard| (number, shard));
+        found
+    }
+}
+
 impl SessionState<'_> {
     /// Goes on with the end of an iteration: merges what the shards gathered, in shard order, learns of it, estimates the
     /// error. All shards must be there and have finished (or have been stopped and drained), and must be the same ones
@@ -61,7 +92,8 @@ impl SessionState<'_> {
     ///
     /// The budget is in units of a ray of the tracer, some 300 instructions, where the rays of [`Shard::step`] take their
     /// shading along; many small calls and one big call give the same bits. It is exceeded by a few pixels, or by a piece
-    /// of work that is larger than it: the largest is a row of the denoiser that loads 16 others, 4 units per column. A
+    /// of work that is larger than it: the largest is a row of the denoiser that loads 16 others, 4 units per column. Each
+    /// call looks at all shards first, at some 20 instructions each, whatever the budget. A
     /// budget of 0 checks the shards and does nothing. Until the end the film has the
     /// iteration in some pixels and not in others, and the estimates of before. [`Self::begin_iteration`] abandons
     /// what is left to do: pixels that have been merged keep the iteration, others do not.
@@ -74,13 +106,14 @@ impl SessionState<'_> {
         budget: Budget,
     ) -> Result<StepResult, SessionError> {
         self.check(&shards)?;
+        let mut shards = Walk::new(shards);
         let mut spent = 0;
         while spent < budget.rays {
             // rows are not divided
             if spent > 0 && self.finishing.stage == REFRESH && self.rays_of_row() > budget.rays - spent {
                 break;
             }
-            spent += self.finish_some(&shards, budget.rays - spent);
+            spent += self.finish_some(&mut shards, budget.rays - spent);
             if self.finishing.stage == DONE {
                 self.finishing = Finishing::default();
                 self.running = false;
@@ -147,7 +180,7 @@ impl SessionState<'_> {
                 return Err(SessionError::Shards { expected });
             }
             // its sums would go to the wrong pixels
-            if s.settings() != self.plan.settings() {
+            if s.fingerprint() != self.plan.fingerprint() {
                 return Err(SessionError::Plan { shard: s.index() });
             }
             if !s.is_done(identity) {
@@ -168,14 +201,20 @@ impl SessionState<'_> {
     }
 
     /// A piece of the current stage, of about `rays` units at most; units done.
-    fn finish_some<'a, 'b: 'a>(&mut self, shards: &impl Shards<'a, 'b>, rays: u64) -> u64 {
+    fn finish_some<'a, 'b: 'a>(&mut self, shards: &mut Walk<'a, 'b, impl Shards<'a, 'b>>, rays: u64) -> u64 {
         match self.finishing.stage {
             START => {
-                let mut counters = Counters::default();
-                shards.clone().into_iter().for_each(|s| counters.merge(s.counters()));
-                self.finishing = Finishing { counters, ..Finishing::default() };
-                self.finishing.selection.begin(self.digits);
-                self.next_stage();
+                match shards.shard(self.finishing.shard) {
+                    Some(s) => {
+                        self.finishing.counters.merge(s.counters());
+                        self.finishing.shard += 1;
+                    }
+                    None => {
+                        self.film.begin_merge();
+                        self.finishing.selection.begin(self.digits);
+                        self.next_stage();
+                    }
+                }
                 1
             }
             MEASURE => self.measure(shards, rays, false),
@@ -228,14 +267,14 @@ impl SessionState<'_> {
     }
 
     /// Measures the picture of the iteration; `first` if it is the first one, and the estimate its own.
-    fn measure<'a, 'b: 'a>(&mut self, shards: &impl Shards<'a, 'b>, rays: u64, first: bool) -> u64 {
+    fn measure<'a, 'b: 'a>(&mut self, shards: &mut Walk<'a, 'b, impl Shards<'a, 'b>>, rays: u64, first: bool) -> u64 {
         if !self.learned.measures(first) {
             self.next_stage();
             return 1;
         }
         let Finishing { selection, cursor, shard, counters, .. } = &mut self.finishing;
         let (learned, digits) = (&mut self.learned, &mut *self.digits);
-        if let Some(s) = shards.clone().into_iter().nth(*shard as usize) {
+        if let Some(s) = shards.shard(*shard) {
             let first_visit = selection.is_first_visit();
             let limit = rays.saturating_mul(MEASURED_PER_RAY);
             let (n, done) = s.visit(cursor, limit, |film, sums, _, _| {
@@ -255,10 +294,10 @@ impl SessionState<'_> {
     }
 
     /// Merges pixels into the film.
-    fn merge<'a, 'b: 'a>(&mut self, shards: &impl Shards<'a, 'b>, rays: u64) -> u64 {
+    fn merge<'a, 'b: 'a>(&mut self, shards: &mut Walk<'a, 'b, impl Shards<'a, 'b>>, rays: u64) -> u64 {
         let Finishing { cursor, shard, counters, .. } = &mut self.finishing;
         let (film, learned) = (&mut self.film, &self.learned);
-        if let Some(s) = shards.clone().into_iter().nth(*shard as usize) {
+        if let Some(s) = shards.shard(*shard) {
             let (n, done) = s.visit(cursor, rays.div_ceil(RAYS_PER_MERGED), |i, sums, rays, aov| {
                 film.merge(i, sums, rays, aov, learned.weight_of(i));
             });
@@ -275,9 +314,9 @@ impl SessionState<'_> {
     }
 
     /// Adds what the shards learned of the scene.
-    fn absorb<'a, 'b: 'a>(&mut self, shards: &impl Shards<'a, 'b>, rays: u64) -> u64 {
+    fn absorb<'a, 'b: 'a>(&mut self, shards: &mut Walk<'a, 'b, impl Shards<'a, 'b>>, rays: u64) -> u64 {
         let f = &mut self.finishing;
-        let Some(s) = shards.clone().into_iter().nth(f.shard as usize) else {
+        let Some(s) = shards.shard(f.shard) else {
             self.learned.begin_freeze();
             self.next_stage();
             return 1;

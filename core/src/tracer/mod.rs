@@ -60,8 +60,8 @@ mod vertex;
 pub(crate) use job::Job;
 pub(crate) use media_set::media_at;
 pub use occlude::MAX_PASSED;
-pub(crate) use shard::ShardCursor;
 pub use shard::{Budget, Shard, ShardError, StepResult};
+pub(crate) use shard::{SHARD_RECORD_BYTES, ShardCursor};
 
 /// Bytes of the state of a path in flight: a waiting vertex with its link in the ring, and a camera sample.
 pub const BYTES_PER_PATH: usize = ring::BYTES_PER_VERTEX + root::BYTES_PER_ROOT;

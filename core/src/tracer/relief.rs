@@ -6,10 +6,12 @@
 //! relief faces him. So no hit is black because of its normal. What the directions that are scattered need is in
 //! `bsdf/folded.rs`.
 
+use super::shading::own_reflectance;
 use crate::accel::Intersector;
 use crate::bsdf::principled::{self, Textured8};
+use crate::extension::Extension;
 use crate::geometry::{OwnHits8, SurfaceHit8};
-use crate::scene::{Effects, Scene};
+use crate::scene::Effects;
 use crate::world::World;
 use croupier_simd::{F32x8, Frame8, Mask8, Vec3x8};
 
@@ -29,7 +31,7 @@ pub(super) struct Relief8 {
 /// The points in the lanes of `active` with the interpolated normals `ns` and the normals by winding `ng`.
 #[inline(never)]
 pub(super) fn relief<W: World>(
-    scene: &Scene<'_>,
+    world: &W,
     hit: &SurfaceHit8,
     own: Option<&OwnHits8>,
     wo: Vec3x8,
@@ -37,6 +39,7 @@ pub(super) fn relief<W: World>(
     ns: Vec3x8,
     active: Mask8,
 ) -> Relief8 {
+    let scene = world.scene();
     let own = if W::Intersector::SURFACES { own } else { None };
     let textures = W::EFFECTS.contains(Effects::TEXTURES) && scene.effects.contains(Effects::TEXTURES);
     let normal_maps = W::EFFECTS.contains(Effects::NORMAL_MAPS) && scene.effects.contains(Effects::NORMAL_MAPS);
@@ -45,7 +48,10 @@ pub(super) fn relief<W: World>(
     let uvs = if textures { [corner(0), corner(1), corner(2)] } else { [Vec3x8::ZERO; 3] };
     let uv = uvs[0] * wa + uvs[1] * wb + uvs[2] * wc;
     let at = own.map_or([uv.x, uv.y], |own| own.coordinates([uv.x, uv.y]));
-    let t = principled::textured(scene, &hit.material, at, active, [textures, normal_maps]);
+    let mut t = principled::textured(scene, &hit.material, at, active, [textures, normal_maps]);
+    if W::Extension::TEXTURES {
+        t.surface.base = own_reflectance(world, hit, own, active, t.surface.base);
+    }
     // the winding says where the front is
     let mut ns = Vec3x8::select(ns.dot(ng).lt(F32x8::ZERO), -ns, ns);
     let mapped = active & t.mapped & (t.normal.x.abs() + t.normal.y.abs()).gt(F32x8::ZERO);

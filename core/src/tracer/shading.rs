@@ -137,12 +137,13 @@ impl Materials8 {
             }
         }
         if W::Extension::TEXTURES {
-            reflectance = own_reflectance(world, hit, own, reflectance);
+            let plain = hit.mask.and_not(bsdf::lanes_of(LAYERED_KINDS, &kind));
+            reflectance = own_reflectance(world, hit, own, plain, reflectance);
         }
         if W::EFFECTS.contains(Effects::PRINCIPLED) && scene.effects.contains(Effects::PRINCIPLED) {
             let layered = hit.mask & bsdf::lanes_of(LAYERED_KINDS, &kind);
             if layered.any() {
-                let r = relief::<W>(scene, hit, own, wo, ng, ns, layered);
+                let r = relief(world, hit, own, wo, ng, ns, layered);
                 reflectance = Vec3x8::select(layered, r.packed, reflectance);
                 straight = layered.select(1.0 - r.opacity, straight);
                 ns = Vec3x8::select(layered, r.ns, ns);
@@ -197,16 +198,22 @@ fn coordinates(scene: &Scene<'_>, hit: &SurfaceHit8, own: Option<&OwnHits8>) -> 
     own.map_or([at.x, at.y], |own| own.coordinates([at.x, at.y]))
 }
 
-/// Reflectances that the host's extension makes of those of materials and texture files.
-fn own_reflectance<W: World>(world: &W, hit: &SurfaceHit8, own: Option<&OwnHits8>, reflectance: Vec3x8) -> Vec3x8 {
+/// Reflectances that the host's extension makes of those of materials and texture files, in the lanes of `active`.
+pub(super) fn own_reflectance<W: World>(
+    world: &W,
+    hit: &SurfaceHit8,
+    own: Option<&OwnHits8>,
+    active: Mask8,
+    reflectance: Vec3x8,
+) -> Vec3x8 {
     let uv = coordinates(world.scene(), hit, own);
     let point = hit.point().p;
     let point = own.map_or(point, |own| Vec3x8::select(own.lanes, own.surface.p, point));
-    let samples = TextureSamples8 { material: U32x8::new(hit.material), uv, point, active: hit.mask };
+    let samples = TextureSamples8 { material: U32x8::new(hit.material), uv, point, active };
     let own = world.extension().reflectance(&samples, reflectance);
     // a NaN becomes 0
     let clamp = |x: F32x8| F32x8::ZERO.max(x).min(F32x8::ONE);
-    Vec3x8::new(clamp(own.x), clamp(own.y), clamp(own.z))
+    Vec3x8::select(active, Vec3x8::new(clamp(own.x), clamp(own.y), clamp(own.z)), reflectance)
 }
 
 /// Does the scene hold anything that light may pass straight on?

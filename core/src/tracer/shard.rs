@@ -8,7 +8,6 @@ use crate::counters::Counters;
 use crate::film::PixelSums;
 use crate::learn::cache::Training;
 use crate::memory::{Carver, Measure, MemoryError};
-use crate::settings::Settings;
 use crate::tiles::TILE_PIXELS;
 use crate::world::{Identity, World};
 use bytemuck::{Pod, Zeroable};
@@ -18,9 +17,13 @@ use core::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
     /// Rays of all kinds, and as many steps through media as cost the same ([`Counters::work`]); exceeded by less than one
-    /// packet (16 rays, unless they pass surfaces or media).
+    /// packet (16 rays, unless they pass surfaces or media). A packet without any ray counts as 4: eight camera samples for
+    /// which an [`Extension`](crate::unstable::extension::Extension) has no rays.
     pub rays: u64,
 }
+
+/// What a packet without any ray counts in a budget.
+const EMPTY_TURN: u64 = 4;
 
 /// What to do after a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,6 +99,9 @@ struct ShardRecord {
     joined: Identity,
     state: StateRecord,
 }
+
+/// Bytes of that.
+pub(crate) const SHARD_RECORD_BYTES: usize = size_of::<ShardRecord>();
 
 /// Mark of a block that holds a suspended shard.
 const SUSPENDED: u64 = u64::from_le_bytes(*b"SHARD  1");
@@ -179,7 +185,8 @@ impl<'m> Shard<'m> {
     }
 
     /// Works until the budget is used or the iteration is finished. Many small steps and one big step give the same
-    /// bits. `world` is the session.
+    /// bits. `world` is the session. The first step of an iteration joins it, with a pass over the links of the ring
+    /// (4 bytes for each path in flight) that no budget counts; statistics of the one before are cleared within budgets.
     pub fn step<W: World>(&mut self, world: &W, budget: Budget) -> StepResult {
         if self.joined != world.identity() {
             self.begin(world);
@@ -192,11 +199,16 @@ impl<'m> Shard<'m> {
             self.state.book.clear_some();
             cleared += 1;
         }
-        let start = self.state.book.counters.work();
-        while self.state.book.counters.work() - start + cleared < budget.rays {
+        let mut spent = cleared;
+        while spent < budget.rays {
+            let before = self.state.book.counters.work();
             if !turn(world, &self.job, self.index, &mut self.state) {
                 return StepResult::Done;
             }
+            spent += match self.state.book.counters.work() - before {
+                0 => EMPTY_TURN,
+                work => work,
+            };
         }
         StepResult::More
     }
@@ -207,9 +219,9 @@ impl<'m> Shard<'m> {
         self.state.begin(world, &self.job, self.index);
     }
 
-    /// Settings that the shard was made for.
-    pub(crate) fn settings(&self) -> &Settings {
-        &self.job.settings
+    /// Hash of the settings that the shard was made for, which tells plans.
+    pub(crate) fn fingerprint(&self) -> u64 {
+        self.job.fingerprint
     }
 
     /// What the shard has learned in this iteration.

@@ -117,7 +117,8 @@ fn half_edges(at: Record, [a, b, c, x, y, z]: [f32; 6]) -> Result<(), SceneError
     at.within(Field::Edges, cos_sqr as f32, 0.0, 1e-6)
 }
 
-/// The table that chooses among the lights; only where none emits may it be missing.
+/// The table that chooses among the lights; only where none emits may it be missing, and only where none can be seen to
+/// emit may all probabilities be 0.
 pub(super) fn table(scene: &Records<'_>, environment_emits: bool) -> Result<(), SceneError> {
     let (of, table) = (SectionKind::LightAlias, scene.light_alias);
     let emits = environment_emits || scene.lights.iter().any(|l| l.emission != [0.0; 3]);
@@ -128,6 +129,15 @@ pub(super) fn table(scene: &Records<'_>, environment_emits: bool) -> Result<(), 
         return Err(SceneError::Section { kind: of, fault: SectionFault::Count(table.len() as u64) });
     }
     alias::well_formed(of, 0, table)?;
+    // where all that emit are hidden, no light has a share
+    let hidden = |l: &Light| {
+        let outer = l.instance.checked_sub(1).and_then(|i| scene.instances.get(i as usize));
+        outer.is_some_and(|i| i.flags & INSTANCE_HIDDEN != 0)
+    };
+    let shines = environment_emits || scene.lights.iter().any(|l| l.emission != [0.0; 3] && !hidden(l));
+    if !shines && table.iter().all(|a| a.probability == 0.0) {
+        return Ok(());
+    }
     alias::consistent(of, 0, table)
 }
 
