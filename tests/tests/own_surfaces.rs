@@ -66,7 +66,7 @@ impl Intersector for WithBalls<'_> {
         for (name, ball) in (FIRST_OWN_SURFACE..).zip(self.balls) {
             let t = ball.meets(rays, active);
             let nearer = t.lt(hit.t);
-            hit.hit = hit.hit | nearer;
+            hit.hit |= nearer;
             hit.t = nearer.select(t, hit.t);
             hit.triangle = U32x8::select(nearer, U32x8::splat(name), hit.triangle);
             // these are the host's own to use
