@@ -100,8 +100,8 @@ fn gradients_are_in_their_coefficients() {
         [0.5 / PI.sqrt(), first, first, first, 2.0 * band2, 2.0 * band2, 0.25 * (5.0 / PI).sqrt(), 2.0 * band2, band2];
     let probe = render(&scene, &[[0.0; 3]], &options("classic", 16384))[0];
     for i in 0..COEFFICIENTS {
-        for c in 0..3 {
-            let wanted = exact[c][i] / unit[i];
+        for (c, exact) in exact.iter().enumerate() {
+            let wanted = exact[i] / unit[i];
             let (found, noise) = (probe.radiance.0[i][c], probe.stderr.0[i][c]);
             assert!(noise < 0.02, "{i}: {noise}");
             // the map is linear between its texels
