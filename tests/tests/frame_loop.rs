@@ -5,16 +5,28 @@
 #[path = "../../embed-example/host/examples/frame_loop.rs"]
 mod example;
 
-use croupier::Settings;
+use croupier::unstable::film::Aov;
+use croupier::{Scene, Settings};
+use croupier_host::description::SceneDescription;
+use croupier_host::renderer::{Keep, Renderer};
 use croupier_tests::runner::settings;
 use croupier_tests::scenes::{blob, cornell, everything};
 use example::{FrameLoop, SHARDS, hash, input, offline};
+
+/// The example's own scene, small: a room in which an instance moves.
+fn room() -> SceneDescription {
+    let mut scene = example::scene();
+    scene.camera.size = [40, 40];
+    scene
+}
 
 /// Killed by: a change that keeps anything it must not, an edit that `into_blob` does not have, a call whose end moves a
 /// bit, a loop that begins with a shard or a stage of before.
 #[test]
 fn frames_end_with_the_picture_of_an_offline_render() {
-    for (description, strategy) in [(everything([48, 32]), "ears"), (cornell([64, 36]), "classic")] {
+    let scenes =
+        [(room(), "ears"), (room(), "classic"), (everything([48, 32]), "ears"), (cornell([64, 36]), "classic")];
+    for (description, strategy) in scenes {
         let bytes = blob(&description);
         let untouched = blob(&description);
         let s = Settings { shards: SHARDS.min(6), aovs: true.into(), ..settings(&bytes, strategy) };
@@ -29,6 +41,40 @@ fn frames_end_with_the_picture_of_an_offline_render() {
         assert_eq!(of_frames, hash(&offline(renderer.into_blob(), &s, 3).unwrap()), "{strategy}");
         assert_ne!(of_frames, hash(&offline(untouched, &s, 3).unwrap()), "{strategy}: nothing has moved");
     }
+}
+
+/// The object is where the last input says, in the picture and in the blob that the renderer leaves: rays of a scene that
+/// was baked with the instance there go as far, those of one with it elsewhere do not. Killed by: a move that tree, inverse
+/// map or blob do not follow; a move of another instance, or on top of the one before.
+#[test]
+fn the_object_moves() {
+    let mut target = room();
+    let offset = input(20, 20).unwrap().offset;
+    for (row, by) in target.instances[0].to_world.iter_mut().zip(offset) {
+        row[3] = by;
+    }
+    let bytes = blob(&room());
+    let s = Settings { shards: 2, aovs: true.into(), ..settings(&bytes, "classic") };
+    let mut engine = FrameLoop::new(bytes, &s).unwrap();
+    let mut frames = 0;
+    while frames <= 20 || engine.finished() < 1 {
+        engine.frame(input(frames, 20).as_ref()).unwrap();
+        frames += 1;
+    }
+    let depths = |renderer: &Renderer| renderer.with_film(|film| film.plane(Aov::Depth, 0).unwrap().to_vec());
+    let (camera, of_frames) = (engine.renderer.with_scene(|scene| *scene.camera), depths(&engine.renderer));
+    let left = engine.renderer.into_blob();
+    let found = Scene::from_bytes(&left).unwrap().instances[0];
+    let baked = |description: &SceneDescription| {
+        let renderer: Renderer = Renderer::new(blob(description), &s).unwrap();
+        renderer.edit(Keep::Nothing, |scene| scene.camera(camera)).unwrap();
+        depths(&offline(renderer.into_blob(), &s, 1).unwrap())
+    };
+    assert_eq!(found.to_world, Scene::from_bytes(&blob(&target)).unwrap().instances[0].to_world);
+    assert!(of_frames == baked(&target), "distances are not those of a scene that was baked so");
+    let elsewhere = baked(&room());
+    let changed = elsewhere.iter().zip(&of_frames).filter(|(a, b)| a != b).count();
+    assert!(changed > 30, "{changed} of 1600 pixels show that something has moved");
 }
 
 /// While the first iteration runs the preview has the pixels of the shards at work, then those of the film. Killed by: a

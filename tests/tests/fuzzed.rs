@@ -1,15 +1,20 @@
 //! Damaged inputs of every format, a fixed number from a fixed seed: no panic, and never more than a gibibyte. What happens
 //! to each is in `fuzz/src/inputs.rs`, which `cargo fuzz` runs as well (`.ci/fuzz`). Alone in its binary, because the
 //! counting allocator is global.
+//!
+//! `CROUPIER_FUZZED=N` runs N inputs of each format, with another seed for each N: longer runs where there is no fuzzer.
 
 #[path = "../fuzz/src/inputs.rs"]
 #[expect(unreachable_pub, reason = "the file is part of a library as well")]
 mod inputs;
 
+#[path = "../fuzz/src/memory.rs"]
+#[expect(dead_code, unreachable_pub, reason = "the file is part of a library as well")]
+mod memory;
+
 use croupier_tests::stats::SplitMix;
 use inputs::{FORMATS, Workbench};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::path::Path;
 
 /// Inputs of each format of scene files.
 const INPUTS: usize = 2_000;
@@ -20,46 +25,8 @@ const SESSIONS: usize = 1_000;
 /// Most bytes in use at a time, of all tests of this binary.
 const LIMIT: usize = 1 << 30;
 
-static USED: AtomicUsize = AtomicUsize::new(0);
-static PEAK: AtomicUsize = AtomicUsize::new(0);
-
-struct Counting;
-
-fn grow(bytes: usize) {
-    let used = USED.fetch_add(bytes, Ordering::Relaxed) + bytes;
-    PEAK.fetch_max(used, Ordering::Relaxed);
-}
-
-// SAFETY: every call is passed on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        grow(layout.size());
-        // SAFETY: the caller's promise.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        grow(layout.size());
-        // SAFETY: the caller's promise.
-        unsafe { System.alloc_zeroed(layout) }
-    }
-
-    unsafe fn dealloc(&self, p: *mut u8, layout: Layout) {
-        USED.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: the caller's promise.
-        unsafe { System.dealloc(p, layout) }
-    }
-
-    unsafe fn realloc(&self, p: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        grow(size);
-        USED.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: the caller's promise.
-        unsafe { System.realloc(p, layout, size) }
-    }
-}
-
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
+static ALLOCATOR: memory::Counting = memory::Counting::new();
 
 /// One to four changes: bits, bytes and words that are telling, parts cut out, doubled, or taken from another seed.
 fn mutate(seed: &[u8], other: &[u8], words: &[&str], rng: &mut SplitMix) -> Vec<u8> {
@@ -99,6 +66,15 @@ fn mutate(seed: &[u8], other: &[u8], words: &[&str], rng: &mut SplitMix) -> Vec<
     out
 }
 
+/// Files of the corpus of a format in the repository; those named `found-*` have once failed.
+fn corpus(name: &str) -> Vec<std::path::PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus").join(name);
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let mut files: Vec<_> = entries.map(|e| e.unwrap().path()).collect();
+    files.sort();
+    files
+}
+
 fn check(name: &str) {
     let format = FORMATS.iter().find(|f| f.name == name).unwrap();
     let seeds = (format.seeds)();
@@ -106,8 +82,13 @@ fn check(name: &str) {
     for (i, seed) in seeds.iter().enumerate() {
         assert!((format.run)(&mut bench, seed), "seed {i} of {name} is refused");
     }
-    let inputs = if matches!(name, "blob" | "cache" | "checkpoint") { SESSIONS } else { INPUTS };
-    let mut rng = SplitMix(name.bytes().map(u64::from).sum());
+    for file in corpus(name) {
+        // also what the fuzzer has found, whatever becomes of it: no panic
+        (format.run)(&mut bench, &std::fs::read(file).unwrap());
+    }
+    let more = std::env::var("CROUPIER_FUZZED").ok().map(|n| n.parse::<usize>().unwrap());
+    let inputs = more.unwrap_or(if matches!(name, "blob" | "cache" | "checkpoint") { SESSIONS } else { INPUTS });
+    let mut rng = SplitMix(name.bytes().map(u64::from).sum::<u64>() + more.unwrap_or(0) as u64);
     let mut accepted = 0;
     for i in 0..inputs {
         let seed = &seeds[i % seeds.len()];
@@ -119,7 +100,7 @@ fn check(name: &str) {
             Err(_) => panic!("{name} {i}: {:?}", String::from_utf8_lossy(&input)),
         }
     }
-    let peak = PEAK.load(Ordering::Relaxed);
+    let peak = ALLOCATOR.peak();
     println!("{name}: {accepted} of {inputs} accepted, {} MiB at most", peak >> 20);
     assert!(peak <= LIMIT, "{name}: {peak} bytes");
     // Inputs that are all refused or all accepted test little.
@@ -142,4 +123,4 @@ macro_rules! formats {
         }
     };
 }
-formats!(obj, mtl, json, png, jpeg, exr, blob, cache, checkpoint);
+formats!(obj, mtl, gltf, glb, ply, stl, json, png, jpeg, exr, hdr, blob, cache, checkpoint);

@@ -1,5 +1,5 @@
 //! An engine's frame loop with a path tracer in it: each frame applies what has moved, renders for some 4 ms on the
-//! engine's own thread, and shows what there is. Copy it.
+//! engine's own thread, and shows what there is. Camera, an object and a light change. Copy it.
 //!
 //! ```text
 //! cargo run --release -p croupier-host --example frame_loop -- [COLUMNS ROWS [ITERATIONS [STRATEGY]]]
@@ -10,11 +10,12 @@
 //! picture does not depend on how it is cut into calls. At the end the same scene is rendered offline, with a new
 //! renderer and in whole iterations: the bits are the same.
 
-use croupier::unstable::scene::blob::{Camera, LightKind, content_hash};
+use croupier::unstable::scene::blob::{Camera, Instance, LightKind, content_hash};
 use croupier::{Budget, Scene, SceneEdit, Settings, StepResult, Strategy};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin;
+use croupier_host::description::{self, Prototype, SceneDescription};
 use croupier_host::renderer::{Keep, Renderer, RendererError};
 use std::error::Error;
 
@@ -41,8 +42,10 @@ enum Work {
 pub struct Input {
     /// Angle of the camera about the vertical axis, radians.
     pub angle: f32,
-    /// Brightness of the lamp over that of the scene as baked.
-    pub lamp: f32,
+    /// How far the object has moved from where it was baked, in world space.
+    pub offset: [f32; 3],
+    /// Radiance of the area light over that of the scene as baked.
+    pub light: f32,
     /// Whether statistics serve on: they do while things move. The last change before a picture that is to be
     /// reproducible keeps nothing.
     pub keep: Keep,
@@ -55,8 +58,10 @@ pub struct FrameLoop {
     work: Work,
     /// The camera as baked.
     camera: Camera,
-    /// Material of the first light that is a surface, and its radiance as baked.
-    lamp: Option<(u32, [f32; 3])>,
+    /// The first instance as baked: the object that moves. Scenes without instances have none.
+    object: Option<Instance>,
+    /// Material of the first area light, and its radiance as baked.
+    light: Option<(u32, [f32; 3])>,
     /// What a frame shows, row by row.
     pub preview: Vec<[f32; 3]>,
     shown_until: usize,
@@ -68,25 +73,29 @@ impl FrameLoop {
     /// Allocates all that frames need.
     pub fn new(blob: AlignedBytes, settings: &Settings) -> Result<Self, RendererError> {
         let renderer = Renderer::new(blob, settings)?;
-        let (camera, lamp) = renderer.with_scene(|scene| {
-            let lamp = scene.lights.iter().find(|l| l.kind == LightKind::Area as u32);
-            let triangle = lamp.and_then(|l| scene.triangles.get(l.triangle as usize));
-            (*scene.camera, lamp.zip(triangle).map(|(l, t)| (t.material, l.emission)))
+        let (camera, object, light) = renderer.with_scene(|scene| {
+            let light = scene.lights.iter().find(|l| l.kind == LightKind::Area as u32);
+            let triangle = light.and_then(|l| scene.triangles.get(l.triangle as usize));
+            let light = light.zip(triangle).map(|(l, t)| (t.material, l.emission));
+            (*scene.camera, scene.instances.first().copied(), light)
         });
         let [columns, rows] = settings.size.map(|n| n as usize);
         let preview = vec![[0.0; 3]; columns * rows];
-        Ok(Self { renderer, work: Work::Begin, camera, lamp, preview, shown_until: 0, iterations: 0 })
+        Ok(Self { renderer, work: Work::Begin, camera, object, light, preview, shown_until: 0, iterations: 0 })
     }
 
     /// One frame of the engine.
     pub fn frame(&mut self, input: Option<&Input>) -> Result<(), RendererError> {
         if let Some(input) = input {
-            let (camera, lamp) = (turned(&self.camera, input.angle), self.lamp);
+            let (camera, object, light) = (turned(&self.camera, input.angle), self.object, self.light);
             self.renderer.edit(input.keep, |scene: &mut SceneEdit<'_>| {
-                // whatever else moves goes here
+                // whatever else changes goes here
                 scene.camera(camera)?;
-                match lamp {
-                    Some((material, radiance)) => scene.emission(material, radiance.map(|x| x * input.lamp)).map(drop),
+                if let Some(object) = object {
+                    scene.transform(0, moved(&object, input.offset))?;
+                }
+                match light {
+                    Some((material, radiance)) => scene.emission(material, radiance.map(|x| x * input.light)).map(drop),
                     None => Ok(()),
                 }
             })?;
@@ -162,11 +171,37 @@ fn turned(camera: &Camera, angle: f32) -> Camera {
     Camera { origin: turn(origin), forward: turn(forward), right: turn(right), down: turn(down), ..*camera }
 }
 
-/// The script of this program: the camera turns for `moving` frames, the lamp flickers now and then, then all rests.
+/// The maps of an instance, as baked and then moved: when the shutter opens and when it closes. One that is given the
+/// place of the last frame for its opening is blurred by its motion.
+fn moved(object: &Instance, offset: [f32; 3]) -> [[[f32; 4]; 3]; 2] {
+    let mut maps = object.to_world;
+    for rows in &mut maps {
+        rows.iter_mut().zip(offset).for_each(|(row, by)| row[3] += by);
+    }
+    maps
+}
+
+/// The scene of this program: the built-in Cornell box, whose metal sphere is an object that can move.
+pub fn scene() -> SceneDescription {
+    let mut scene = builtin::cornell_box();
+    let starts: Vec<u32> = scene.objects.iter().map(|o| o.first_triangle).collect();
+    if let Some(i) = scene.objects.iter().position(|o| o.name == "metal sphere") {
+        let end = starts.get(i + 1).copied().unwrap_or(scene.triangles.len() as u32);
+        let name = "metal sphere".to_string();
+        let placed = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+        scene.instances.push(description::Instance::new(&name, scene.prototypes.len() as u32, placed));
+        scene.prototypes.push(Prototype { name, triangles: starts[i]..end, instances: Vec::new() });
+    }
+    scene
+}
+
+/// The script of this program: the camera turns and the object hops for `moving` frames, the light flickers now and
+/// then, then all rests.
 pub fn input(frame: u32, moving: u32) -> Option<Input> {
     (frame <= moving).then_some(Input {
         angle: 0.005 * frame as f32,
-        lamp: if frame % 7 == 3 { 0.5 } else { 1.0 },
+        offset: [0.0, 0.4 * (0.13 * frame as f32).sin().abs(), 0.002 * frame as f32],
+        light: if frame % 7 == 3 { 0.5 } else { 1.0 },
         keep: if frame < moving { Keep::Statistics } else { Keep::Nothing },
     })
 }
@@ -194,7 +229,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let number = |i: usize, default| args.get(i).map_or(Ok(default), |a| a.parse::<u32>());
     let (size, iterations) = ([number(0, 1920)?, number(1, 1080)?], u64::from(number(2, 2)?));
-    let blob = bake(&builtin::cornell_box(), &BakeOptions::default(), |_, _| {})?.bytes;
+    let blob = bake(&scene(), &BakeOptions::default(), |_, _| {})?.bytes;
     let strategy = Strategy::parse(args.get(3).map_or("ears", |s| s))?;
     let scene = Scene::from_bytes(&blob)?;
     let settings = Settings { size, strategy, shards: SHARDS, aovs: true.into(), ..Settings::for_scene(&scene) };

@@ -229,13 +229,13 @@ fn light(
     let closed = around.room && around.open_side.is_none();
     let needs = !lit && look.environment.is_none() && look.sun.is_none();
     if needs && closed && scene.emitters.is_empty() {
-        // no sky reaches it: a lamp below the ceiling, as bright as daylight on the floor
+        // no sky reaches it: a point light below the ceiling, as bright as daylight on the floor
         let [lo, hi] = around.bounds;
         let height = 0.9 * (hi[1] - lo[1]);
         let position = axes.vector([around.middle()[0], lo[1] + height, around.middle()[2]]).map(|x| x as f32);
         let intensity = [(std::f64::consts::PI * height * height) as f32; 3];
         scene.emitters.push(Emitter::Point { position, intensity });
-        notes.push("the file is a closed room without light: a lamp was added below its ceiling".into());
+        notes.push("the file is a closed room without light: a point light was added below its ceiling".into());
         return;
     }
     if needs || look.sun.is_some() {

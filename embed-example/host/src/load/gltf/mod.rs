@@ -85,12 +85,12 @@ pub(super) fn load(loader: &mut Loader, path: &Path) -> Result<SceneDescription,
     let perspective = scene.cameras.iter().find(|c| c.camera.projection == Projection::Perspective);
     let camera = perspective.or(scene.cameras.first()).map(|c| c.camera);
     scene.camera = camera.unwrap_or_default();
-    // Emission that a texture modulates is no light: displays and eyes have it.
-    let lamp = |m: &Material| match &m.model {
+    // Emission that a texture modulates lights nothing: displays and eyes have it.
+    let emits = |m: &Material| match &m.model {
         Model::Principled(p) => p.emission != [0.0; 3] && p.emission_texture.is_none(),
         _ => false,
     };
-    let light = !scene.emitters.is_empty() || scene.materials.iter().any(lamp);
+    let light = !scene.emitters.is_empty() || scene.materials.iter().any(emits);
     loader.given = Given { camera: camera.is_some(), light, up: Up::Y, up_is_known: true };
     Ok(scene)
 }
