@@ -3,6 +3,13 @@
 
 use croupier_simd::{F32x8, U32x8};
 
+/// Finaliser of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014, fig. 16): each bit of the result depends on all of `x`.
+pub(crate) fn mix(x: u64) -> u64 {
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
 /// Eight 64-bit keys, one per path vertex or sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Key8 {

@@ -1,18 +1,18 @@
 //! A builder of trees in the caller's memory: no allocation, a stack of fixed size, the same tree for the same input.
 //!
 //! ```text
-//! node(things):
-//!     while there are fewer than eight parts: split the part of largest area that is too large for a leaf
-//!     each part becomes a leaf or a node, those of leaves and large boxes first
+//! node(primitives):
+//!     while there are fewer than eight ranges: split the range of largest area that is too large for a leaf
+//!     each range becomes a leaf or a node, those of leaves and large boxes first
 //! ```
 //!
-//! 1. A part is split where the surface area heuristic says (Wald, "On fast construction of SAH-based bounding volume
-//!    hierarchies", 2007): up to 128 things at the best of all places along each axis, more at the best of 31 planes
-//!    between 32 bins. A leaf of eight triangles costs as much as one of one, so parts count by eights.
-//! 2. Parts whose centres coincide are cut in half in the order of their things.
-//! 3. Where the levels left are no more than halving needs, parts are halved by count, so that no tree is deeper than
+//! 1. A range is split where the surface area heuristic says (Wald, "On fast construction of SAH-based bounding volume
+//!    hierarchies", 2007): up to 128 primitives at the best of all places along each axis, more at the best of 31 planes
+//!    between 32 bins. A leaf of eight triangles costs as much as one of one, so ranges count by eights.
+//! 2. Ranges whose centres coincide are cut in half in the order of their primitives.
+//! 3. Where the levels left are no more than halving needs, ranges are halved by count, so that no tree is deeper than
 //!    [`MAX_TREE_DEPTH`].
-//! 4. Nodes and leaves are numbered as [`Node`] says: depth first, slots ascending. What waits lies on a stack: seven parts
+//! 4. Nodes and leaves are numbered as [`Node`] says: depth first, slots ascending. What waits lies on a stack: seven ranges
 //!    a level, and those of the last.
 
 use crate::scene::blob::{CHILD_INDEX, LEAF_BIT, Leaf, MAX_TREE_DEPTH, NONE, Node};
@@ -23,12 +23,12 @@ use core::fmt;
 const WIDTH: usize = 8;
 /// Bins along an axis.
 const BINS: usize = 32;
-/// Most things for which every place is looked at.
+/// Most primitives for which every place is looked at.
 const SWEEP: usize = 128;
-/// Parts that wait: seven siblings a level, eight at the last.
+/// Ranges that wait: seven siblings a level, eight at the last.
 const WAITING: usize = 7 * MAX_TREE_DEPTH as usize + 8;
 
-/// A thing with a box that a tree is built over.
+/// A box that a tree is built over, and what is in it.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Primitive {
@@ -38,12 +38,12 @@ pub struct Primitive {
     pub id: u32,
     /// Largest coordinates.
     pub max: [f32; 3],
-    /// Anything.
+    /// Not read.
     pub reserved: u32,
 }
 
 impl Primitive {
-    /// A thing with a box.
+    /// A primitive in a box.
     pub const fn new(id: u32, [min, max]: [[f32; 3]; 2]) -> Self {
         Self { min, id, max, reserved: 0 }
     }
@@ -76,11 +76,11 @@ pub enum BuildError {
         /// Room for leaves.
         room: usize,
     },
-    /// More things than there is room for.
+    /// More primitives than there is room for.
     Scratch {
-        /// Things.
+        /// Primitives.
         needed: usize,
-        /// Room for things.
+        /// Room for primitives.
         room: usize,
     },
     /// An object that is not there, or whose runs are not.
@@ -92,7 +92,7 @@ impl fmt::Display for BuildError {
         match self {
             Self::Nodes { room } => write!(f, "the tree needs more than {room} nodes"),
             Self::Leaves { room } => write!(f, "the tree needs more than {room} leaves"),
-            Self::Scratch { needed, room } => write!(f, "{needed} things to build over, room for {room}"),
+            Self::Scratch { needed, room } => write!(f, "{needed} primitives to build over, room for {room}"),
             Self::Object(o) => write!(f, "there is no object {o}"),
         }
     }
@@ -109,7 +109,7 @@ pub struct Built {
     pub leaves: u32,
     /// Levels of nodes.
     pub depth: u32,
-    /// Box of everything; zeros without things.
+    /// Box of everything; zeros without primitives.
     pub bounds: [[f32; 3]; 2],
 }
 
@@ -125,46 +125,50 @@ impl<F: Fn(u32) -> [[f32; 3]; 3]> Corners for F {
     }
 }
 
-/// Builds a tree over triangles: `things` are their boxes with their indices, in an order that is lost. The tree takes the
+/// Builds a tree over triangles: `primitives` are their boxes with their indices, in an order that is lost. The tree takes the
 /// first of `nodes` and `leaves`, which are numbered from `first_node` and `first_leaf` on. Enough are as many
-/// nodes and leaves as triangles. Things whose box is not finite are left out, no ray finds them.
+/// nodes and leaves as triangles. Primitives whose box is not finite are left out, no ray finds them.
 ///
 /// # Errors
 /// Too little room for nodes or leaves, or leaves whose numbers do not fit into references.
 pub fn build_triangles(
-    things: &mut [Primitive],
+    primitives: &mut [Primitive],
     corners: &impl Corners,
     (nodes, first_node): (&mut [Node], u32),
     (leaves, first_leaf): (&mut [Leaf], u32),
 ) -> Result<Built, BuildError> {
     let room = leaves.len();
     let mut used = 0usize;
-    let leaf = |part: &[Primitive]| {
+    let leaf = |range: &[Primitive]| {
         let leaf = leaves.get_mut(used).ok_or(BuildError::Leaves { room })?;
         let index = u32::try_from(used).ok().and_then(|used| first_leaf.checked_add(used));
         let index = index.filter(|i| *i <= CHILD_INDEX).ok_or(BuildError::Leaves { room: used })?;
         *leaf = Leaf { p: [[0.0; 8]; 9], triangle: [NONE; 8] };
-        for (slot, thing) in part.iter().enumerate().take(WIDTH) {
-            leaf.triangle[slot] = thing.id;
-            for (row, x) in corners.corners(thing.id).as_flattened().iter().enumerate().take(9) {
+        for (slot, primitive) in range.iter().enumerate().take(WIDTH) {
+            leaf.triangle[slot] = primitive.id;
+            for (row, x) in corners.corners(primitive.id).as_flattened().iter().enumerate().take(9) {
                 leaf.p[row][slot] = *x;
             }
         }
-        let reference = LEAF_BIT | (part.len() as u32) << 27 | index;
+        let reference = LEAF_BIT | (range.len() as u32) << 27 | index;
         used += 1;
         Ok(reference)
     };
-    build::<WIDTH>(things, nodes, first_node, leaf)
+    build::<WIDTH>(primitives, nodes, first_node, leaf)
 }
 
-/// Builds a top-level tree: the `id` of each thing is the child reference itself. See
+/// Builds a top-level tree: the `id` of each primitive is the child reference itself. See
 /// [`top_capacity`](crate::scene::blob::top_capacity) for the nodes that it takes at most. Primitives whose box is not finite
 /// are left out, no ray finds them.
 ///
 /// # Errors
 /// Too little room for nodes.
-pub fn build_references(things: &mut [Primitive], nodes: &mut [Node], first_node: u32) -> Result<Built, BuildError> {
-    build::<1>(things, nodes, first_node, |part| Ok(part.first().map_or(NONE, |thing| thing.id)))
+pub fn build_references(
+    primitives: &mut [Primitive],
+    nodes: &mut [Node],
+    first_node: u32,
+) -> Result<Built, BuildError> {
+    build::<1>(primitives, nodes, first_node, |range| Ok(range.first().map_or(NONE, |primitive| primitive.id)))
 }
 
 /// A closed box.
@@ -190,26 +194,26 @@ impl Box3 {
         x * y + y * z + z * x
     }
 
-    fn of(things: &[Primitive]) -> Self {
+    fn of(primitives: &[Primitive]) -> Self {
         let mut b = Self::EMPTY;
-        things.iter().for_each(|p| b.grow(&p.bounds()));
+        primitives.iter().for_each(|p| b.grow(&p.bounds()));
         b
     }
 }
 
-/// Things that belong together: a run of all.
+/// Primitives that belong together: a run of all.
 #[derive(Clone, Copy)]
-struct Part {
+struct Range {
     start: u32,
     end: u32,
     bounds: Box3,
 }
 
-impl Part {
+impl Range {
     const NONE: Self = Self { start: 0, end: 0, bounds: Box3::EMPTY };
 
-    fn of(things: &[Primitive], start: usize, end: usize) -> Self {
-        let bounds = Box3::of(things.get(start..end).unwrap_or(&[]));
+    fn of(primitives: &[Primitive], start: usize, end: usize) -> Self {
+        let bounds = Box3::of(primitives.get(start..end).unwrap_or(&[]));
         Self { start: start as u32, end: end as u32, bounds }
     }
 
@@ -218,16 +222,16 @@ impl Part {
     }
 }
 
-/// A part that waits to become the child `slot` of node `parent`, at `level`.
+/// A range that waits to become the child `slot` of node `parent`, at `level`.
 #[derive(Clone, Copy)]
 struct Waiting {
-    part: Part,
+    range: Range,
     parent: u32,
     slot: u32,
     level: u32,
 }
 
-/// Levels of nodes over `n` things if each halves them three times.
+/// Levels of nodes over `n` primitives if each halves them three times.
 fn levels(n: usize, leaf: usize) -> u32 {
     let (mut levels, mut holds) = (1u32, leaf.saturating_mul(WIDTH));
     while holds < n {
@@ -238,29 +242,29 @@ fn levels(n: usize, leaf: usize) -> u32 {
 }
 
 fn build<const LEAF: usize>(
-    things: &mut [Primitive],
+    primitives: &mut [Primitive],
     nodes: &mut [Node],
     first: u32,
     mut leaf: impl FnMut(&[Primitive]) -> Result<u32, BuildError>,
 ) -> Result<Built, BuildError> {
     let room = nodes.len();
     let mut kept = 0;
-    for i in 0..things.len() {
-        if things[i].is_sound() {
-            things.swap(kept, i);
+    for i in 0..primitives.len() {
+        if primitives[i].is_sound() {
+            primitives.swap(kept, i);
             kept += 1;
         }
     }
-    let Some(things) = things.get_mut(..kept).filter(|t| !t.is_empty()) else { return Ok(Built::default()) };
-    let whole = Part::of(things, 0, things.len());
+    let Some(primitives) = primitives.get_mut(..kept).filter(|t| !t.is_empty()) else { return Ok(Built::default()) };
+    let whole = Range::of(primitives, 0, primitives.len());
     let mut built = Built { bounds: [whole.bounds.min, whole.bounds.max], ..Built::default() };
-    let root = Waiting { part: whole, parent: NONE, slot: 0, level: 1 };
+    let root = Waiting { range: whole, parent: NONE, slot: 0, level: 1 };
     let mut waiting = [root; WAITING];
     let mut sp = 1;
     while sp > 0 {
         sp -= 1;
-        let Waiting { part, parent, slot, level } = waiting[sp];
-        let own = things.get_mut(part.start as usize..part.end as usize).unwrap_or(&mut []);
+        let Waiting { range, parent, slot, level } = waiting[sp];
+        let own = primitives.get_mut(range.start as usize..range.end as usize).unwrap_or(&mut []);
         let reference = if own.len() <= LEAF && parent != NONE {
             built.leaves += 1;
             leaf(own)?
@@ -275,9 +279,9 @@ fn build<const LEAF: usize>(
             }
             built.nodes += 1;
             built.depth = built.depth.max(level);
-            let (parts, count) = divide::<LEAF>(things, part, level);
-            for (slot, part) in parts.iter().enumerate().take(count).rev() {
-                waiting[sp] = Waiting { part: *part, parent: index, slot: slot as u32, level: level + 1 };
+            let (ranges, count) = divide::<LEAF>(primitives, range, level);
+            for (slot, range) in ranges.iter().enumerate().take(count).rev() {
+                waiting[sp] = Waiting { range: *range, parent: index, slot: slot as u32, level: level + 1 };
                 sp += 1;
             }
             number
@@ -286,80 +290,80 @@ fn build<const LEAF: usize>(
             let slot = slot as usize & 7;
             parent.child[slot] = reference;
             for k in 0..3 {
-                parent.bounds[k][slot] = part.bounds.min[k];
-                parent.bounds[k + 3][slot] = part.bounds.max[k];
+                parent.bounds[k][slot] = range.bounds.min[k];
+                parent.bounds[k + 3][slot] = range.bounds.max[k];
             }
         }
     }
     Ok(built)
 }
 
-/// The children of a node at `level` over `part`: how many there are, in the order of their slots.
-fn divide<const LEAF: usize>(things: &mut [Primitive], part: Part, level: u32) -> ([Part; WIDTH], usize) {
-    let mut parts = [Part::NONE; WIDTH];
-    parts[0] = part;
+/// The children of a node at `level` over `range`: how many there are, in the order of their slots.
+fn divide<const LEAF: usize>(primitives: &mut [Primitive], range: Range, level: u32) -> ([Range; WIDTH], usize) {
+    let mut ranges = [Range::NONE; WIDTH];
+    ranges[0] = range;
     let mut count = 1;
-    let halve = level + levels(part.len(), LEAF) > MAX_TREE_DEPTH;
+    let halve = level + levels(range.len(), LEAF) > MAX_TREE_DEPTH;
     while count < WIDTH {
-        let large = |p: &Part| if halve { p.len() as f32 } else { p.bounds.area() };
+        let large = |p: &Range| if halve { p.len() as f32 } else { p.bounds.area() };
         let mut best: Option<(usize, f32)> = None;
-        for (i, p) in parts.iter().enumerate().take(count).filter(|(_, p)| p.len() > LEAF) {
+        for (i, p) in ranges.iter().enumerate().take(count).filter(|(_, p)| p.len() > LEAF) {
             if best.is_none_or(|(_, size)| large(p) > size) {
                 best = Some((i, large(p)));
             }
         }
         // leaves are split further where that leaves less area to be met
         let split = match best {
-            Some((i, _)) => Some((i, split::<LEAF>(things, &parts[i], halve))),
+            Some((i, _)) => Some((i, split::<LEAF>(primitives, &ranges[i], halve))),
             None if halve => None,
-            None => tighten(things, &parts, count),
+            None => tighten(primitives, &ranges, count),
         };
         let Some((i, at)) = split else { break };
-        let Part { start, end, .. } = parts[i];
-        parts[i] = Part::of(things, start as usize, at);
-        parts[count] = Part::of(things, at, end as usize);
+        let Range { start, end, .. } = ranges[i];
+        ranges[i] = Range::of(primitives, start as usize, at);
+        ranges[count] = Range::of(primitives, at, end as usize);
         count += 1;
     }
-    // any-hit rays try slots in this order: most hits for the least work. Few parts, and equal ones stay in order
-    let before = |a: &Part, b: &Part| match (a.len() <= LEAF, b.len() <= LEAF) {
+    // any-hit rays try slots in this order: most hits for the least work. Few ranges, and equal ones stay in order
+    let before = |a: &Range, b: &Range| match (a.len() <= LEAF, b.len() <= LEAF) {
         (true, false) => true,
         (false, true) => false,
         _ => a.bounds.area() > b.bounds.area(),
     };
     for i in 1..count {
         let mut j = i;
-        while j > 0 && before(&parts[j], &parts[j - 1]) {
-            parts.swap(j, j - 1);
+        while j > 0 && before(&ranges[j], &ranges[j - 1]) {
+            ranges.swap(j, j - 1);
             j -= 1;
         }
     }
-    (parts, count)
+    (ranges, count)
 }
 
 /// The leaf, and where to split it, for which both halves together have the least area against it; if any has less.
-fn tighten(things: &mut [Primitive], parts: &[Part; WIDTH], count: usize) -> Option<(usize, usize)> {
+fn tighten(primitives: &mut [Primitive], ranges: &[Range; WIDTH], count: usize) -> Option<(usize, usize)> {
     let mut best: Option<(usize, f32)> = None;
-    for (i, part) in parts.iter().enumerate().take(count).filter(|(_, p)| p.len() > 1) {
-        let own = things.get_mut(part.start as usize..part.end as usize)?;
+    for (i, range) in ranges.iter().enumerate().take(count).filter(|(_, p)| p.len() > 1) {
+        let own = primitives.get_mut(range.start as usize..range.end as usize)?;
         let (_, _, cost) = sweep::<1>(own, false)?;
-        let gain = part.bounds.area() - cost;
+        let gain = range.bounds.area() - cost;
         if gain > 0.0 && best.is_none_or(|(_, most)| gain > most) {
             best = Some((i, gain));
         }
     }
     let (i, _) = best?;
-    let part = parts[i];
-    let own = things.get_mut(part.start as usize..part.end as usize)?;
+    let range = ranges[i];
+    let own = primitives.get_mut(range.start as usize..range.end as usize)?;
     let (axis, at, _) = sweep::<1>(own, false)?;
     sort(own, axis);
-    Some((i, part.start as usize + at))
+    Some((i, range.start as usize + at))
 }
 
-/// Orders the things of a part so that it can be split, and says where.
-fn split<const LEAF: usize>(things: &mut [Primitive], part: &Part, halve: bool) -> usize {
-    let start = part.start as usize;
-    let middle = part.len().div_ceil(2);
-    let Some(own) = things.get_mut(start..part.end as usize) else { return start + middle };
+/// Orders the primitives of a range so that it can be split, and says where.
+fn split<const LEAF: usize>(primitives: &mut [Primitive], range: &Range, halve: bool) -> usize {
+    let start = range.start as usize;
+    let middle = range.len().div_ceil(2);
+    let Some(own) = primitives.get_mut(start..range.end as usize) else { return start + middle };
     let centres =
         |f: fn(f32, f32) -> f32, from: f32| own.iter().fold([from; 3], |c, p| [0, 1, 2].map(|k| f(c[k], p.centre(k))));
     let (low, high) = (centres(f32::min, f32::INFINITY), centres(f32::max, f32::NEG_INFINITY));
@@ -390,32 +394,32 @@ fn order(a: &Primitive, b: &Primitive, axis: usize) -> core::cmp::Ordering {
     a.centre(axis).total_cmp(&b.centre(axis)).then(a.id.cmp(&b.id))
 }
 
-fn sort(things: &mut [Primitive], axis: usize) {
-    things.sort_unstable_by(|a, b| order(a, b, axis));
+fn sort(primitives: &mut [Primitive], axis: usize) {
+    primitives.sort_unstable_by(|a, b| order(a, b, axis));
 }
 
-/// How many leaves of `LEAF` things `n` things fill.
+/// How many leaves of `LEAF` primitives `n` primitives fill.
 fn fill<const LEAF: usize>(n: usize) -> f32 {
     n.div_ceil(LEAF) as f32
 }
 
-/// The best place to split up to [`SWEEP`] things: axis, things before it, cost. `weigh`: areas times leaves, else areas
-/// alone. The order of the things changes.
-fn sweep<const LEAF: usize>(things: &mut [Primitive], weigh: bool) -> Option<(usize, usize, f32)> {
-    let n = things.len();
+/// The best place to split up to [`SWEEP`] primitives: axis, primitives before it, cost. `weigh`: areas times leaves, else areas
+/// alone. The order of the primitives changes.
+fn sweep<const LEAF: usize>(primitives: &mut [Primitive], weigh: bool) -> Option<(usize, usize, f32)> {
+    let n = primitives.len();
     let weight = |n: usize| if weigh { fill::<LEAF>(n) } else { 1.0 };
     let mut best: Option<(usize, usize, f32)> = None;
     let mut before = [0.0f32; SWEEP];
     for axis in 0..3 {
-        sort(things, axis);
+        sort(primitives, axis);
         let mut b = Box3::EMPTY;
-        for (area, p) in before.iter_mut().zip(things.iter()) {
+        for (area, p) in before.iter_mut().zip(primitives.iter()) {
             b.grow(&p.bounds());
             *area = b.area();
         }
         let mut b = Box3::EMPTY;
         for at in (1..n.min(SWEEP)).rev() {
-            b.grow(&things[at].bounds());
+            b.grow(&primitives[at].bounds());
             let cost = before[at - 1] * weight(at) + b.area() * weight(n - at);
             if best.is_none_or(|(_, _, least)| cost < least) {
                 best = Some((axis, at, cost));
@@ -425,7 +429,7 @@ fn sweep<const LEAF: usize>(things: &mut [Primitive], weigh: bool) -> Option<(us
     best
 }
 
-/// Bin of a thing along an axis on which not all centres are equal.
+/// Bin of a primitive along an axis on which not all centres are equal.
 fn bin_of(p: &Primitive, axis: usize, low: [f32; 3], high: [f32; 3]) -> usize {
     let scale = BINS as f32 / (high[axis] - low[axis]);
     // a conversion saturates, and makes 0 of NaN
@@ -433,9 +437,9 @@ fn bin_of(p: &Primitive, axis: usize, low: [f32; 3], high: [f32; 3]) -> usize {
 }
 
 /// The best plane between bins: axis, and the first bin behind it.
-fn binned<const LEAF: usize>(things: &[Primitive], low: [f32; 3], high: [f32; 3]) -> Option<(usize, usize)> {
+fn binned<const LEAF: usize>(primitives: &[Primitive], low: [f32; 3], high: [f32; 3]) -> Option<(usize, usize)> {
     let mut bins = [[(Box3::EMPTY, 0usize); BINS]; 3];
-    for p in things {
+    for p in primitives {
         for (axis, bins) in bins.iter_mut().enumerate() {
             let bin = &mut bins[bin_of(p, axis, low, high) & (BINS - 1)];
             bin.0.grow(&p.bounds());
@@ -468,11 +472,11 @@ fn binned<const LEAF: usize>(things: &[Primitive], low: [f32; 3], high: [f32; 3]
 }
 
 /// Brings those for which `first` holds to the front; returns how many.
-fn partition(things: &mut [Primitive], first: impl Fn(&Primitive) -> bool) -> usize {
+fn partition(primitives: &mut [Primitive], first: impl Fn(&Primitive) -> bool) -> usize {
     let mut count = 0;
-    for i in 0..things.len() {
-        if first(&things[i]) {
-            things.swap(count, i);
+    for i in 0..primitives.len() {
+        if first(&primitives[i]) {
+            primitives.swap(count, i);
             count += 1;
         }
     }

@@ -41,7 +41,7 @@ pub struct TopLevel<'a> {
 }
 
 impl TopLevel<'_> {
-    /// Things that [`Self::rebuild`] of object `object` needs room for.
+    /// Primitives that [`Self::rebuild`] of object `object` needs room for.
     pub fn scratch_len(&self, object: u32) -> usize {
         self.objects.get(object as usize).map_or(0, |o| o.instances as usize + usize::from(o.nodes > 0))
     }
@@ -56,21 +56,21 @@ impl TopLevel<'_> {
     pub fn rebuild(&mut self, object: u32, scratch: &mut [Primitive]) -> Result<Built, BuildError> {
         let o = *self.objects.get(object as usize).ok_or(BuildError::Object(object))?;
         let (needed, room) = (self.scratch_len(object), scratch.len());
-        let things = scratch.get_mut(..needed).ok_or(BuildError::Scratch { needed, room })?;
+        let primitives = scratch.get_mut(..needed).ok_or(BuildError::Scratch { needed, room })?;
         let own = o.first_instance as usize..o.first_instance as usize + o.instances as usize;
         let own = self.instances.get(own).ok_or(BuildError::Object(object))?;
         let mut condition = 0.0f32;
-        for (thing, (index, i)) in things.iter_mut().zip((o.first_instance..).zip(own)) {
-            *thing = Primitive::new(LEAF_BIT | index & CHILD_INDEX, self.bounds_of(i));
+        for (primitive, (index, i)) in primitives.iter_mut().zip((o.first_instance..).zip(own)) {
+            *primitive = Primitive::new(LEAF_BIT | index & CHILD_INDEX, self.bounds_of(i));
             condition = condition.max(i.condition);
         }
-        if let Some(last) = things.last_mut().filter(|_| o.nodes > 0) {
+        if let Some(last) = primitives.last_mut().filter(|_| o.nodes > 0) {
             let root = self.nodes.get(o.first_node as usize).ok_or(BuildError::Object(object))?;
             *last = Primitive::new(o.first_node, node_bounds(root));
         }
         let top = o.first_top as usize..o.first_top as usize + o.top_capacity as usize;
         let nodes = self.nodes.get_mut(top).ok_or(BuildError::Object(object))?;
-        let built = build_references(things, nodes, o.first_top)?;
+        let built = build_references(primitives, nodes, o.first_top)?;
         if let Some(o) = self.objects.get_mut(object as usize) {
             (o.top_nodes, o.condition) = (built.nodes, condition);
             [o.bounds_min, o.bounds_max] = built.bounds;

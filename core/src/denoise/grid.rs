@@ -99,6 +99,7 @@ pub(super) fn store_pixels(plane: &mut [f32], (at, lanes): (usize, usize), x: F3
     }
 }
 
+/// Eight values from `at` of a row, 0 behind its end.
 #[inline(always)]
 pub(super) fn load(row: &[f32], at: usize) -> F32x8 {
     match row.get(at..).and_then(|r| r.first_chunk()) {
@@ -107,6 +108,7 @@ pub(super) fn load(row: &[f32], at: usize) -> F32x8 {
     }
 }
 
+/// Writes eight values from `at` of a row on, if there is room for all.
 #[inline(always)]
 pub(super) fn store(row: &mut [f32], at: usize, x: F32x8) {
     if let Some(a) = row.get_mut(at..).and_then(|r| r.first_chunk_mut()) {

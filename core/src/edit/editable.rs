@@ -3,6 +3,7 @@
 use super::error::EditError;
 use super::light_table;
 use crate::light::{self, SceneExtent};
+use crate::rng::mix;
 use crate::scene::blob::*;
 use crate::scene::{Effects, Records, Scene, SceneError, SectionTable, Sections, check};
 use bytemuck::Pod;
@@ -225,8 +226,8 @@ impl SceneEdit<'_> {
         let new = bytemuck::bytes_of(record);
         if place.len() == new.len() {
             // each record counts in the identity by its place and content, whatever the order of edits
-            let mark = |bytes: &[u8]| content_hash(bytes) ^ (u64::from(index) << 8 | of as u64).wrapping_mul(RELIT | 1);
-            *self.identity ^= mix(mark(place)) ^ mix(mark(new));
+            let at = (u64::from(index) << 8 | of as u64).wrapping_mul(RELIT | 1);
+            *self.identity ^= mix(content_hash(place) ^ at) ^ mix(content_hash(new) ^ at);
             place.copy_from_slice(new);
         }
     }
@@ -358,11 +359,4 @@ impl Drop for SceneEdit<'_> {
             self.relight();
         }
     }
-}
-
-/// A well-mixed number (the finaliser of SplitMix64).
-fn mix(x: u64) -> u64 {
-    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
 }

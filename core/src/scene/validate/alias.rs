@@ -1,6 +1,6 @@
 //! Alias tables: what picking does against what the stated probabilities say.
 
-use super::record::{Record, mark};
+use super::record::{Record, hash_of};
 use crate::scene::blob::{Alias, SectionKind};
 use crate::scene::error::{Field, SceneError};
 
@@ -67,9 +67,9 @@ pub(super) fn consistent(of: SectionKind, first: usize, table: &[Alias]) -> Resu
     Err(SceneError::AliasTable { of, first, length, deviation: sum as f32 })
 }
 
-/// h_i: sign and size in [1/2, 1] from the mark of the item.
+/// h_i: sign and size in [1/2, 1] from the hash of the item.
 fn weight(item: u64) -> f64 {
-    let bits = mark(item);
+    let bits = hash_of(item);
     // 2^31 values of [1/2, 1), sign from bit 0.
     let size = 0.5 + (bits >> 33) as f64 / 4_294_967_296.0;
     if bits & 1 == 0 { size } else { -size }

@@ -1,5 +1,6 @@
 //! What the checks of all sections share: the record that is being checked, and a little arithmetic.
 
+use crate::rng::mix;
 use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError};
 
@@ -86,10 +87,7 @@ pub(super) fn dot64([ax, ay, az]: [f64; 3], [bx, by, bz]: [f64; 3]) -> f64 {
     ax * bx + ay * by + az * bz
 }
 
-/// A well-mixed number per index (the finaliser of SplitMix64: Steele, Lea and Flood, OOPSLA 2014, fig. 16).
-pub(super) fn mark(index: u64) -> u64 {
-    let x = index.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
+/// A hash of an index.
+pub(super) fn hash_of(index: u64) -> u64 {
+    mix(index.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }

@@ -8,7 +8,7 @@
 //! With instances there is such a walk for each tree of each object, through its own runs of nodes and leaves.
 
 use super::instances::run;
-use super::record::mark;
+use super::record::hash_of;
 use crate::scene::Records;
 use crate::scene::blob::*;
 use crate::scene::error::{ChildFault, ObjectFault, SceneError, SlotFault};
@@ -67,9 +67,9 @@ struct Met {
     nodes: u32,
     leaves: u32,
     slots: u64,
-    /// Sum of [`mark`]s of the triangles met.
-    marks: u64,
-    /// Instances met in the current top-level tree, and the sum of their marks.
+    /// Sum of [`hash_of`] of the triangles met.
+    hashes: u64,
+    /// Instances met in the current top-level tree, and the sum of their hashes.
     instances: (u32, u64),
     /// Box of the reference from the current top-level tree to the tree of the object's triangles.
     own: Option<Bounds>,
@@ -99,10 +99,10 @@ pub(super) fn tree(scene: &Records<'_>) -> Result<(), SceneError> {
     for (index, o) in (0u32..).zip(scene.objects) {
         object(scene, index, o, bounds, &mut met)?;
     }
-    // As many slots as triangles, all in range, and equal sums of 64-bit marks: a multiset other than {0, 1, ... n-1}
+    // As many slots as triangles, all in range, and equal sums of 64-bit hashes: a multiset other than {0, 1, ... n-1}
     // passes by accident with probability 2^-64. On purpose it can; that wrongs the picture, not memory.
-    let marks = (0..triangles).fold(0u64, |sum, t| sum.wrapping_add(mark(u64::from(t))));
-    if met.slots != u64::from(triangles) || met.marks != marks {
+    let hashes = (0..triangles).fold(0u64, |sum, t| sum.wrapping_add(hash_of(u64::from(t))));
+    if met.slots != u64::from(triangles) || met.hashes != hashes {
         return Err(SceneError::Coverage { triangles, slots: met.slots });
     }
     Ok(())
@@ -122,10 +122,10 @@ fn object(scene: &Records<'_>, index: u32, o: &Object, world: Bounds, met: &mut 
         let end_node = o.first_top.saturating_add(o.top_nodes);
         walk(scene, &Tree { end_node, end_leaf: met.leaves, bounds, triangles: 0..0, top: Some(o) }, met)?;
         let last = o.first_instance.saturating_add(o.instances);
-        let marks = (o.first_instance..last).fold(0u64, |sum, i| sum.wrapping_add(mark(u64::from(i))));
+        let hashes = (o.first_instance..last).fold(0u64, |sum, i| sum.wrapping_add(hash_of(u64::from(i))));
         let coverage = ObjectFault::Coverage { instances: o.instances, met: met.instances.0 };
         let fault = SceneError::Object { object: index, fault: coverage };
-        if met.instances != (o.instances, marks) || met.own.is_some() != (o.nodes > 0) {
+        if met.instances != (o.instances, hashes) || met.own.is_some() != (o.nodes > 0) {
             return Err(fault);
         }
         bounds = met.own.unwrap_or(bounds);
@@ -230,7 +230,7 @@ fn instance(scene: &Records<'_>, o: &Object, index: u32, own: &Bounds, met: &mut
         return Err(ChildFault::Outside(x));
     }
     met.instances.0 = met.instances.0.saturating_add(1);
-    met.instances.1 = met.instances.1.wrapping_add(mark(u64::from(index)));
+    met.instances.1 = met.instances.1.wrapping_add(hash_of(u64::from(index)));
     Ok(())
 }
 
@@ -268,7 +268,7 @@ fn leaf(
             }
         }
         met.slots = met.slots.saturating_add(1);
-        met.marks = met.marks.wrapping_add(mark(u64::from(t)));
+        met.hashes = met.hashes.wrapping_add(hash_of(u64::from(t)));
     }
     Ok(())
 }
