@@ -332,7 +332,7 @@ fn scattering_in_fog_finds_lights_alike() {
     s.emitters.push(Emitter::Shape(sphere([1.0, 0.5, 0.0], 0.6, [2.0, 3.0, 4.0])));
     s.emitters.push(Emitter::Shape(rectangle([0.0, -1.0, 0.0], [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]], [1.0; 3])));
     let (both, alone) = (render_as(&s, "none", 2, 8192), by_scattering(&s, 32_768));
-    let expected = std::array::from_fn(|c| alone.channel(c));
+    let expected: [f64; 3] = std::array::from_fn(|c| alone.channel(c));
     for c in 0..3 {
         let error = both.error_of_channel(c).hypot(alone.error_of_channel(c));
         assert!(error < 0.008 * expected[c], "channel {c}: {error} of {}", expected[c]);
