@@ -166,8 +166,8 @@ fn the_map_is_what_a_camera_sees() {
         let map = render(&scene, "floor", &options(size, strategy, 512));
         let (mut squares, mut means) = (0.0, [0.0; 2]);
         for (texel, pixel) in seen.pixels.iter().enumerate() {
-            for c in 0..3 {
-                let scale = PI / albedo[c];
+            for (c, albedo) in albedo.iter().enumerate() {
+                let scale = PI / albedo;
                 let (a, b) = (f64::from(map.raw[texel][c]), pixel.mean()[c] * scale);
                 let noise = f64::from(map.stderr[texel][c]).hypot(pixel.variance_of_mean()[c].sqrt() * scale);
                 assert!(noise < 0.06 * b, "{strategy}, texel {texel}: {noise} of {b}");
