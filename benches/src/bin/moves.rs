@@ -48,6 +48,7 @@ const REFERENCE: u32 = 8;
 const OUTLIERS: f64 = 1e-3;
 const SHARDS: u32 = 16;
 
+/// An edit.
 type Change = fn(&mut SceneEdit<'_>, &Before) -> Result<(), EditError>;
 
 /// What edits change, as it was baked.
@@ -72,11 +73,14 @@ fn shift(scene: &mut SceneEdit<'_>, x: f32) -> Result<(), EditError> {
     scene.transform(0, [map; 2])
 }
 
+/// Edits with their names.
+type Edits = &'static [(&'static str, Change)];
+
 /// Index of the red wall's material, and of the lamp's.
 const RED: u32 = 1;
 const LAMP: u32 = 3;
 
-const BOX_EDITS: [(&str, Change); 6] = [
+const BOX_EDITS: Edits = &[
     ("camera turned by 1 degree", |s, b| turn(s, b, 1.0)),
     ("camera turned by 10 degrees", |s, b| turn(s, b, 10.0)),
     ("sphere moved by 0.05", |s, _| shift(s, 0.05)),
@@ -89,8 +93,8 @@ const BOX_EDITS: [(&str, Change); 6] = [
     ("lamp twice as bright", |s, _| s.emission(LAMP, [34.0, 24.0, 8.0]).map(drop)),
 ];
 
-const STILL_EDITS: [(&str, Change); 2] =
-    [("camera turned by 1 degree", |s, b| turn(s, b, 1.0)), ("camera turned by 10 degrees", |s, b| turn(s, b, 10.0))];
+const STILL_EDITS: Edits =
+    &[("camera turned by 1 degree", |s, b| turn(s, b, 1.0)), ("camera turned by 10 degrees", |s, b| turn(s, b, 10.0))];
 
 /// The built-in box, its metal sphere as an instance.
 fn movable_box() -> SceneDescription {
