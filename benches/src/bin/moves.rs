@@ -274,8 +274,8 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
     let mut results = Results::of_this_run(NAME);
     let columns = "edit, iterations, cost forgotten, cost kept, relMSE forgotten, relMSE kept, \
         kept over forgotten at equal cost, classic over forgotten at equal cost";
-    let (boxed, still) = (("built-in box", movable_box()), ("still life", builtin::showcase()));
-    for ((name, scene), edits) in [(boxed, &BOX_EDITS[..]), (still, &STILL_EDITS[..])] {
+    let scenes = [("built-in box", movable_box(), BOX_EDITS), ("still life", builtin::showcase(), STILL_EDITS)];
+    for (name, scene, edits) in scenes {
         let subject = Subject::new(&scene, args.side)?;
         let mut table = Table::new(name, columns);
         println!("{name}\n{}", table.head());
