@@ -333,10 +333,10 @@ fn scattering_in_fog_finds_lights_alike() {
     s.emitters.push(Emitter::Shape(rectangle([0.0, -1.0, 0.0], [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]], [1.0; 3])));
     let (both, alone) = (render_as(&s, "none", 2, 8192), by_scattering(&s, 32_768));
     let expected: [f64; 3] = std::array::from_fn(|c| alone.channel(c));
-    for c in 0..3 {
+    for (c, expected) in expected.into_iter().enumerate() {
         let error = both.error_of_channel(c).hypot(alone.error_of_channel(c));
-        assert!(error < 0.008 * expected[c], "channel {c}: {error} of {}", expected[c]);
-        let off = both.channel(c) - expected[c];
-        assert!(off.abs() < LIMIT * error, "channel {c}: {} and {}, +- {error}", both.channel(c), expected[c]);
+        assert!(error < 0.008 * expected, "channel {c}: {error} of {}", expected);
+        let off = both.channel(c) - expected;
+        assert!(off.abs() < LIMIT * error, "channel {c}: {} and {}, +- {error}", both.channel(c), expected);
     }
 }
