@@ -3,8 +3,8 @@
 //!
 //! They hide nothing: a ray that meets one takes its radiance along, weighted against the light sample that could have
 //! found it, and goes on, as in Cycles and Arnold. Surfaces hide them. Every ray is tested against each of them, one
-//! after the other, at 13 (sphere), 15 (disk) or 25 (rectangle) instructions per ray and light (AVX2); they are the last lights of the scene, so that the search
-//! ends at the first one of another kind.
+//! after the other, at 13 (sphere), 15 (disk) or 25 (rectangle) instructions per ray and light (AVX2); they are the last
+//! lights of the scene, so that the search ends at the first one of another kind.
 //!
 //! A ray may be traced in pieces, because it passes things straight on. Whether it meets a light is decided from the point
 //! where it left its last vertex, for the whole ray; a piece takes the lights whose distance from there lies in its part, and

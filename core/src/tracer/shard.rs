@@ -199,16 +199,14 @@ impl<'m> Shard<'m> {
             self.state.book.clear_some();
             cleared += 1;
         }
-        let mut spent = cleared;
+        let (mut spent, mut before) = (cleared, self.state.book.counters.work());
         while spent < budget.rays {
-            let before = self.state.book.counters.work();
             if !turn(world, &self.job, self.index, &mut self.state) {
                 return StepResult::Done;
             }
-            spent += match self.state.book.counters.work() - before {
-                0 => EMPTY_TURN,
-                work => work,
-            };
+            let now = self.state.book.counters.work();
+            spent += if now == before { EMPTY_TURN } else { now - before };
+            before = now;
         }
         StepResult::More
     }
