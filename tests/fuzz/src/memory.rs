@@ -12,8 +12,7 @@ pub struct Counting {
 
 impl Counting {
     /// Counts from 0, without a limit.
-    #[expect(clippy::new_without_default, reason = "a default value is no constant")]
-    pub const fn new() -> Self {
+    pub const fn unlimited() -> Self {
         Self { used: AtomicUsize::new(0), peak: AtomicUsize::new(0), limit: AtomicUsize::new(usize::MAX) }
     }
 
