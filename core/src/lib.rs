@@ -63,8 +63,9 @@
 //!
 //! The picture is a function of scene bytes, settings and samples per iteration: threads, order of the shards and step
 //! sizes do not change a bit of it, and neither does the instruction set unless the feature `fast` is on. The crate
-//! computes with the instructions it is compiled for; on x86-64 set `-C target-cpu=x86-64-v3` in the program's own
-//! build.
+//! computes with the instructions it is compiled for ([`INSTRUCTION_SET`]); on x86-64 set `-C target-cpu=x86-64-v3` in the
+//! program's own build. A processor that lacks them is an error of [`Scene::from_bytes`] and [`Session::new`]; a host that is
+//! there in several builds chooses by [`processor_instruction_set`].
 //!
 //! Comments that say `NUMERICS XXX-n` refer to the rows of docs/NUMERICS.md: hard numerical cases and their tests.
 #![no_std]

@@ -26,7 +26,7 @@ const SESSIONS: usize = 1_000;
 const LIMIT: usize = 1 << 30;
 
 #[global_allocator]
-static ALLOCATOR: memory::Counting = memory::Counting::from_zero();
+static ALLOCATOR: memory::Counting = memory::Counting::unlimited();
 
 /// One to four changes: bits, bytes and words that are telling, parts cut out, doubled, or taken from another seed.
 fn mutate(seed: &[u8], other: &[u8], words: &[&str], rng: &mut SplitMix) -> Vec<u8> {

@@ -9,10 +9,6 @@ use std::process::Command;
 /// Environment variable of the process that is emulated.
 const EMULATED: &str = "CROUPIER_TEST_EMULATED";
 
-/// Exit statuses of that process.
-const REFUSED: i32 = 42;
-const READ: i32 = 43;
-
 /// This test runs itself under an emulator of a processor of 2008. Killed by: a check that comes behind the first vector
 /// instruction, or not at all; a build for every processor that uses newer instructions.
 #[test]
@@ -21,10 +17,9 @@ fn old_processors_are_refused() {
     static BYTES: [u32; 4096] = [0; 4096];
     if std::env::var_os(EMULATED).is_some() {
         // nothing is moved or printed: that would be vector instructions of this test
-        std::process::exit(match &Scene::from_bytes(bytemuck::cast_slice(&BYTES)) {
-            Err(SceneError::Instructions { .. }) => REFUSED,
-            _ => READ,
-        });
+        let refused = matches!(&Scene::from_bytes(bytemuck::cast_slice(&BYTES)), Err(SceneError::Instructions { .. }));
+        assert!(refused == cfg!(target_feature = "avx2"));
+        return;
     }
     assert_eq!(missing_instructions(), None);
     assert_eq!(Scene::from_bytes(bytemuck::cast_slice(&BYTES)).err(), Some(SceneError::Magic));
@@ -37,7 +32,10 @@ fn old_processors_are_refused() {
         return;
     };
     let said = String::from_utf8_lossy(&output.stdout);
-    let expected = if cfg!(target_feature = "avx2") { REFUSED } else { READ };
     let errors = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(expected), "{INSTRUCTION_SET}, {}: {said} {errors}", output.status);
+    assert!(
+        output.status.success() && said.contains("1 passed"),
+        "{INSTRUCTION_SET}, {}: {said} {errors}",
+        output.status
+    );
 }

@@ -9,7 +9,7 @@ pub use libfuzzer_sys::fuzz_target;
 pub const LIMIT: usize = 1 << 30;
 
 #[global_allocator]
-static ALLOCATOR: memory::Counting = memory::Counting::from_zero();
+static ALLOCATOR: memory::Counting = memory::Counting::unlimited();
 
 /// Runs an input of the format of this name.
 pub fn run(name: &str, bench: &mut inputs::Workbench, data: &[u8]) -> bool {

@@ -12,7 +12,7 @@ pub struct Counting {
 
 impl Counting {
     /// Counts from 0, without a limit.
-    pub const fn from_zero() -> Self {
+    pub const fn unlimited() -> Self {
         Self { used: AtomicUsize::new(0), peak: AtomicUsize::new(0), limit: AtomicUsize::new(usize::MAX) }
     }
 
