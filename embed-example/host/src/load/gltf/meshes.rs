@@ -158,9 +158,7 @@ fn load_primitive(
     let smooth = normals.is_some();
     let mut out = Primitive { vertices, triangles, smooth, material: material.index, influences };
     if let Some(colors) = colors.filter(|_| constant.is_none()) {
-        if let Some(volume) = paint(loader, scene, asset, &mut out, material, &colors, at)? {
-            materials.volumes.push(volume);
-        }
+        materials.volumes.extend(paint(loader, scene, asset, &mut out, material, &colors, at)?);
     }
     Ok(Some(out))
 }
