@@ -50,38 +50,54 @@ impl Visitor<'static> for Boxed {
     type Out = Box<dyn Model>;
 
     fn visit<B: Bsdf<'static>>(self) -> Box<dyn Model> {
-        struct Holder<B>(B);
-        impl<B: Bsdf<'static>> Model for Holder<B> {
-            fn delta_only(&self) -> bool {
-                B::DELTA
+        boxed(B::gather(&self.scene, &self.inputs, self.active), Straight::Lobe)
+    }
+}
+
+/// What [`Model::sample`] does with light that passes straight on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Straight {
+    /// It is one more lobe, chosen first by the number that chooses the lobe, as the tracer does.
+    Lobe,
+    /// It is left out, as by [`Bsdf::sample`].
+    Apart,
+}
+
+/// A kernel as an object.
+pub fn boxed<B: Bsdf<'static>>(kernel: B, straight: Straight) -> Box<dyn Model> {
+    struct Holder<B>(B, Straight);
+    impl<B: Bsdf<'static>> Model for Holder<B> {
+        fn delta_only(&self) -> bool {
+            B::DELTA
+        }
+        fn eval(&self, wo: Vec3x8, wi: Vec3x8) -> Eval8 {
+            self.0.eval(wo, wi)
+        }
+        fn sample(&self, wo: Vec3x8, u: [F32x8; 3]) -> Sample8 {
+            if self.1 == Straight::Apart {
+                return self.0.sample(wo, u);
             }
-            fn eval(&self, wo: Vec3x8, wi: Vec3x8) -> Eval8 {
-                self.0.eval(wo, wi)
-            }
-            fn sample(&self, wo: Vec3x8, u: [F32x8; 3]) -> Sample8 {
-                // as the tracer: what passes straight on is chosen first
-                let straight = self.0.straight(wo);
-                let passes = u[2].lt(straight);
-                let rest = F32x8::ZERO.max((u[2] - straight) / (1.0 - straight));
-                let rest = F32x8::splat(1.0 - f32::EPSILON).min(straight.gt(F32x8::ZERO).select(rest, u[2]));
-                let s = self.0.sample(wo, [u[0], u[1], rest]);
-                Sample8 {
-                    wi: Vec3x8::select(passes, -wo, s.wi),
-                    weight: Vec3x8::select(passes, Vec3x8::ONE, s.weight),
-                    pdf: passes.select(F32x8::ZERO, s.pdf),
-                    delta: s.delta | passes,
-                    valid: s.valid | passes,
-                }
-            }
-            fn albedo(&self, wo: Vec3x8) -> Vec3x8 {
-                self.0.albedo(wo)
-            }
-            fn straight(&self, wo: Vec3x8) -> F32x8 {
-                self.0.straight(wo)
+            let straight = self.0.straight(wo);
+            let passes = u[2].lt(straight);
+            let rest = F32x8::ZERO.max((u[2] - straight) / (1.0 - straight));
+            let rest = F32x8::splat(1.0 - f32::EPSILON).min(straight.gt(F32x8::ZERO).select(rest, u[2]));
+            let s = self.0.sample(wo, [u[0], u[1], rest]);
+            Sample8 {
+                wi: Vec3x8::select(passes, -wo, s.wi),
+                weight: Vec3x8::select(passes, Vec3x8::ONE, s.weight),
+                pdf: passes.select(F32x8::ZERO, s.pdf),
+                delta: s.delta | passes,
+                valid: s.valid | passes,
             }
         }
-        Box::new(Holder(B::gather(&self.scene, &self.inputs, self.active)))
+        fn albedo(&self, wo: Vec3x8) -> Vec3x8 {
+            self.0.albedo(wo)
+        }
+        fn straight(&self, wo: Vec3x8) -> F32x8 {
+            self.0.straight(wo)
+        }
     }
+    Box::new(Holder(kernel, straight))
 }
 
 /// [`Bsdf`] as an object, so that tests can run over a table of cases.
@@ -90,7 +106,7 @@ pub trait Model {
     fn delta_only(&self) -> bool;
     /// [`Bsdf::eval`].
     fn eval(&self, wo: Vec3x8, wi: Vec3x8) -> Eval8;
-    /// [`Bsdf::sample`], with what passes straight on as one more lobe: the number that chooses the lobe chooses it.
+    /// [`Bsdf::sample`]; [`Straight`] says what becomes of light that passes straight on.
     fn sample(&self, wo: Vec3x8, u: [F32x8; 3]) -> Sample8;
     /// [`Bsdf::albedo`].
     fn albedo(&self, wo: Vec3x8) -> Vec3x8;

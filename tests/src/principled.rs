@@ -3,9 +3,9 @@
 //! which tests/tests/bsdf_principled.rs checks by quadrature of its own.
 
 use crate::bsdf::{V, Value, combine, dot, fresnel_dielectric, ggx_d, ggx_g1, unit};
-use crate::model::Model;
+use crate::model::{Model, Straight, boxed};
 use croupier::unstable::bsdf::principled::Surface8;
-use croupier::unstable::bsdf::{Bsdf, Eval8, Inputs8, Sample8, Visitor, dispatch};
+use croupier::unstable::bsdf::{Bsdf, Inputs8, Visitor, dispatch};
 use croupier::unstable::scene::Scene;
 use croupier::unstable::scene::blob::{
     EnergyRow, LayerRecord, MaterialKind, NONE, PRINCIPLED_ENERGY_ROWS, PRINCIPLED_ROWS, PrincipledRecord,
@@ -69,32 +69,14 @@ impl Layered {
         .pack()
     }
 
-    /// The kernel under test in all lanes.
+    /// The kernel under test in all lanes; samples leave out what passes straight on.
     pub fn model(&self) -> Box<dyn Model> {
         struct Boxed<'a>(&'a Layered);
         impl Visitor<'static> for Boxed<'_> {
             type Out = Box<dyn Model>;
             fn visit<B: Bsdf<'static>>(self) -> Box<dyn Model> {
-                struct Holder<B>(B);
-                impl<B: Bsdf<'static>> Model for Holder<B> {
-                    fn delta_only(&self) -> bool {
-                        B::DELTA
-                    }
-                    fn eval(&self, wo: Vec3x8, wi: Vec3x8) -> Eval8 {
-                        self.0.eval(wo, wi)
-                    }
-                    fn sample(&self, wo: Vec3x8, u: [F32x8; 3]) -> Sample8 {
-                        self.0.sample(wo, u)
-                    }
-                    fn albedo(&self, wo: Vec3x8) -> Vec3x8 {
-                        self.0.albedo(wo)
-                    }
-                    fn straight(&self, wo: Vec3x8) -> F32x8 {
-                        self.0.straight(wo)
-                    }
-                }
                 let inputs = Inputs8 { material: U32x8::splat(1), reflectance: self.0.packed() };
-                Box::new(Holder(B::gather(&self.0.scene, &inputs, Mask8::all_lanes())))
+                boxed(B::gather(&self.0.scene, &inputs, Mask8::all_lanes()), Straight::Apart)
             }
         }
         dispatch(MaterialKind::Principled, Boxed(self))

@@ -2,8 +2,8 @@
 
 use croupier::unstable::accel::{Intersector, WideBvh};
 use croupier::unstable::film::{PixelAov, PixelStats};
-use croupier::unstable::learn::PictureStatistics;
 use croupier::unstable::learn::cache::CacheError;
+use croupier::unstable::learn::{Learning, PictureStatistics, PixelEstimator};
 use croupier::unstable::profile::{AnyProfile, Profile, ProfileVisitor};
 use croupier::{
     Budget, Counters, ErrorEstimate, Plan, Scene, Session, SessionError, SessionState, Settings, Shard, StepResult,
@@ -267,4 +267,47 @@ fn run<P: Profile + Sync, I: Intersector + Sync>(
             }
         }),
     }
+}
+
+/// A block in which every byte is `byte`.
+pub fn memory(bytes: usize, byte: u8) -> AlignedBytes {
+    let mut block = AlignedBytes::zeroed(bytes);
+    block.as_mut().fill(byte);
+    block
+}
+
+/// Strategies and settings with all kinds of statistics; the second has auxiliary values and learns.
+pub fn kinds_of_statistics(scene: &[u8], shards: u32) -> Vec<Settings> {
+    let learning = Learning { cache_bytes: 1 << 20, subdivide_count: 300.0, ..Learning::default() };
+    let blocks = Learning { pixel_estimator: PixelEstimator::Blocks, ..learning };
+    let of = |strategy: &str, aovs: bool, adaptive, learning| Settings {
+        aovs: aovs.into(),
+        adaptive,
+        learning,
+        shards,
+        ..settings(scene, strategy)
+    };
+    vec![
+        of("classic", false, false, learning),
+        of("ears", true, false, learning),
+        of("ears", true, true, learning),
+        of("ears", false, true, blocks),
+        of("bolin-meyer", true, true, learning),
+    ]
+}
+
+/// All that a session shows, as bytes.
+pub fn shown<P: Profile, I: Intersector>(session: &Session<'_, '_, P, I>) -> Vec<u8> {
+    let film = session.film();
+    let mut all = format!("{:?} {:?} {:?}", session.counters(), film.error_estimate(), session.picture_statistics());
+    all += &format!("{:?}", session.estimate());
+    let mut all = all.into_bytes();
+    all.extend_from_slice(bytemuck::cast_slice(&film.pixels().collect::<Vec<_>>()));
+    all.extend_from_slice(bytemuck::cast_slice(&film.aovs().collect::<Vec<_>>()));
+    if let Some(cache) = session.cache() {
+        let mut saved = vec![0; cache.saved_len()];
+        cache.save(&mut saved).expect("room for it");
+        all.extend(saved);
+    }
+    all
 }

@@ -2,54 +2,14 @@
 //! pixels.
 
 use croupier::unstable::film::{Aov, AovSet};
-use croupier::unstable::learn::{Learning, PixelEstimator};
+use croupier::unstable::learn::Learning;
 use croupier::unstable::{STACK_BYTES, World};
 use croupier::{Budget, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
-use croupier_tests::runner::{finish, settings};
+use croupier_tests::runner::{finish, kinds_of_statistics, memory, settings, shown};
 use croupier_tests::scenes::*;
 use croupier_tests::stats::SplitMix;
 use std::cell::Cell;
-
-fn memory(bytes: usize, byte: u8) -> AlignedBytes {
-    let mut block = AlignedBytes::zeroed(bytes);
-    block.as_mut().fill(byte);
-    block
-}
-
-fn cases(bytes: &[u8]) -> Vec<Settings> {
-    let learning = Learning { cache_bytes: 1 << 20, subdivide_count: 300.0, ..Learning::default() };
-    let blocks = Learning { pixel_estimator: PixelEstimator::Blocks, ..learning };
-    let of = |strategy: &str, aovs: bool, adaptive, learning| Settings {
-        aovs: aovs.into(),
-        adaptive,
-        learning,
-        shards: 3,
-        ..settings(bytes, strategy)
-    };
-    vec![
-        of("classic", false, false, learning),
-        of("ears", true, false, learning),
-        of("ears", false, true, blocks),
-        of("bolin-meyer", true, true, learning),
-    ]
-}
-
-/// All that a session shows.
-fn everything(session: &Session<'_, '_>) -> Vec<u8> {
-    let film = session.film();
-    let mut all = format!("{:?} {:?} {:?}", session.counters(), film.error_estimate(), session.picture_statistics());
-    all += &format!("{:?}", session.estimate());
-    let mut all = all.into_bytes();
-    all.extend_from_slice(bytemuck::cast_slice(&film.pixels().collect::<Vec<_>>()));
-    all.extend_from_slice(bytemuck::cast_slice(&film.aovs().collect::<Vec<_>>()));
-    if let Some(cache) = session.cache() {
-        let mut saved = vec![0; cache.saved_len()];
-        cache.save(&mut saved).unwrap();
-        all.extend(saved);
-    }
-    all
-}
 
 /// Renders four iterations, whose ends are divided by `budget`; `resume` suspends and resumes the session before every
 /// piece. What the session shows, and the most pieces of an end.
@@ -78,7 +38,7 @@ fn render(scene: Scene<'_>, s: &Settings, resume: bool, budget: &mut dyn FnMut()
         session.suspend();
     }
     let session = Session::resume(scene, &plan, block.as_mut()).unwrap();
-    (everything(&session), most)
+    (shown(&session), most)
 }
 
 /// Killed by: state that lives in a local variable of a piece, a cursor that skips or repeats, a stage without an end, a
@@ -87,7 +47,7 @@ fn render(scene: Scene<'_>, s: &Settings, resume: bool, budget: &mut dyn FnMut()
 fn pieces_of_any_size_give_the_same_bits() {
     let bytes = blob(&cornell([37, 21]));
     let scene = Scene::from_bytes(&bytes).unwrap();
-    for s in cases(&bytes) {
+    for s in kinds_of_statistics(&bytes, 3) {
         let (whole, one) = render(scene, &s, false, &mut || u64::MAX);
         assert_eq!(one, 1);
         for (resume, seed) in [(false, 1), (true, 2)] {
@@ -107,7 +67,7 @@ fn pieces_of_any_size_give_the_same_bits() {
 fn shards_are_checked_at_every_piece() {
     let bytes = blob(&cornell([37, 21]));
     let scene = Scene::from_bytes(&bytes).unwrap();
-    let s = Settings { shards: 2, ..cases(&bytes)[1] };
+    let s = Settings { shards: 2, ..kinds_of_statistics(&bytes, 3)[1] };
     let plan = Plan::new(&s).unwrap();
     let mut block = memory(plan.session().size, 0);
     let mut own: Vec<_> = (0..s.shards).map(|i| memory(plan.shard_of(i).size, 0)).collect();
@@ -162,7 +122,7 @@ fn the_end_is_linear_in_shards() {
 fn the_start_touches_no_memory_of_pixels() {
     let bytes = blob(&cornell([8, 8]));
     let scene = Scene::from_bytes(&bytes).unwrap();
-    for s in cases(&bytes) {
+    for s in kinds_of_statistics(&bytes, 3) {
         let changed = |size: [u32; 2]| {
             let s = Settings { size, shards: 1, ..s };
             let plan = Plan::new(&s).unwrap();
@@ -229,7 +189,7 @@ fn pixels_of_an_unfinished_iteration_can_be_read() {
 /// a packet more on the stack than it holds (the thread is killed, and the test with it).
 #[test]
 fn steps_need_no_more_stack_than_stated() {
-    let bytes = blob(&croupier_tests::scenes::everything([24, 16]));
+    let bytes = blob(&everything([24, 16]));
     let scene = Scene::from_bytes(&bytes).unwrap();
     let learning = Learning { cache_bytes: 1 << 20, subdivide_count: 300.0, ..Learning::default() };
     let s = settings(&bytes, "ears");

@@ -1,46 +1,12 @@
 //! Sessions that are suspended in their block, resumed, and restarted.
 
-use croupier::unstable::learn::Learning;
 use croupier::unstable::scene::blob::content_hash;
 use croupier::unstable::{ResumeError, World};
 use croupier::{Budget, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
-use croupier_tests::runner::{finish, settings};
+use croupier_tests::runner::{finish, kinds_of_statistics, memory, shown};
 use croupier_tests::scenes::*;
 use croupier_tests::stats::SplitMix;
-
-/// Strategies and settings with all kinds of statistics, on a small picture.
-fn cases(bytes: &[u8]) -> Vec<Settings> {
-    let learning = Learning { cache_bytes: 1 << 20, subdivide_count: 300.0, ..Learning::default() };
-    let of = |strategy: &str, aovs: bool, adaptive: bool| Settings {
-        aovs: aovs.into(),
-        adaptive,
-        learning,
-        shards: 2,
-        ..settings(bytes, strategy)
-    };
-    vec![of("classic", false, false), of("ears", true, false), of("ears", true, true), of("bolin-meyer", false, true)]
-}
-
-fn memory(bytes: usize) -> AlignedBytes {
-    let mut block = AlignedBytes::zeroed(bytes);
-    block.as_mut().fill(0xff);
-    block
-}
-
-/// Film, auxiliary sums, counters and saved statistics.
-fn everything(session: &Session<'_, '_>) -> Vec<u8> {
-    let film = session.film();
-    let mut all = format!("{:?} {:?}", session.counters(), film.error_estimate()).into_bytes();
-    all.extend_from_slice(bytemuck::cast_slice(&film.pixels().collect::<Vec<_>>()));
-    all.extend_from_slice(bytemuck::cast_slice(&film.aovs().collect::<Vec<_>>()));
-    if let Some(cache) = session.cache() {
-        let mut saved = vec![0; cache.saved_len()];
-        cache.save(&mut saved).unwrap();
-        all.extend(saved);
-    }
-    all
-}
 
 const ITERATIONS: [u32; 4] = [4, 8, 3, 8];
 
@@ -58,7 +24,7 @@ fn shards<'m>(plan: &Plan, blocks: &'m mut [AlignedBytes]) -> Vec<Shard<'m>> {
 }
 
 fn blocks(plan: &Plan) -> Vec<AlignedBytes> {
-    (0..plan.settings().shards).map(|_| memory(plan.shard().size)).collect()
+    (0..plan.settings().shards).map(|_| memory(plan.shard().size, 0xff)).collect()
 }
 
 /// Killed by: a scalar that is not stored, memory that `resume` clears, a flag that is lost.
@@ -66,19 +32,19 @@ fn blocks(plan: &Plan) -> Vec<AlignedBytes> {
 fn a_session_goes_on_where_it_was_suspended() {
     let bytes = blob(&cornell([20, 12]));
     let scene = Scene::from_bytes(&bytes).unwrap();
-    for s in cases(&bytes) {
+    for s in kinds_of_statistics(&bytes, 2) {
         let plan = Plan::new(&s).unwrap();
-        let (mut block, mut own) = (memory(plan.session().size), blocks(&plan));
+        let (mut block, mut own) = (memory(plan.session().size, 0xff), blocks(&plan));
         let mut session = Session::new(scene, &plan, block.as_mut()).unwrap();
         render(&mut session, &mut shards(&plan, &mut own));
-        let clean = everything(&session);
+        let clean = shown(&session);
 
         // the block changes places every time
-        let (mut block, mut own) = (memory(plan.session().size), blocks(&plan));
+        let (mut block, mut own) = (memory(plan.session().size, 0xff), blocks(&plan));
         let mut shards = shards(&plan, &mut own);
         Session::new(scene, &plan, block.as_mut()).unwrap().suspend();
         let mut moved = |work: &mut dyn FnMut(&mut Session<'_, '_>)| {
-            let mut other = memory(plan.session().size);
+            let mut other = memory(plan.session().size, 0xff);
             other.as_mut().copy_from_slice(block.as_ref());
             block = other;
             let mut session = Session::resume(scene, &plan, block.as_mut()).unwrap();
@@ -96,7 +62,7 @@ fn a_session_goes_on_where_it_was_suspended() {
             moved(&mut |session| session.end_iteration(&shards).unwrap());
         }
         let mut found = Vec::new();
-        moved(&mut |session| found = everything(session));
+        moved(&mut |session| found = shown(session));
         assert!(found == clean, "{}", s.strategy);
     }
 }
@@ -106,13 +72,13 @@ fn a_session_goes_on_where_it_was_suspended() {
 fn a_restarted_session_renders_what_a_new_one_does() {
     let bytes = blob(&cornell([20, 12]));
     let scene = Scene::from_bytes(&bytes).unwrap();
-    for s in cases(&bytes) {
+    for s in kinds_of_statistics(&bytes, 2) {
         let plan = Plan::new(&s).unwrap();
-        let (mut block, mut own) = (memory(plan.session().size), blocks(&plan));
+        let (mut block, mut own) = (memory(plan.session().size, 0xff), blocks(&plan));
         let mut shards = shards(&plan, &mut own);
         let mut session = Session::new(scene, &plan, block.as_mut()).unwrap();
         render(&mut session, &mut shards);
-        let clean = everything(&session);
+        let clean = shown(&session);
         let before = session.identity();
         // between iterations, and while one runs
         for part in [0, 1, 2] {
@@ -128,14 +94,14 @@ fn a_restarted_session_renders_what_a_new_one_does() {
             assert_eq!(session.end_iteration(&shards), Err(SessionError::Unfinished { shard: 0 }));
             session.restart(false);
             render(&mut session, &mut shards);
-            assert!(everything(&session) == clean, "{}, part {part}", s.strategy);
+            assert!(shown(&session) == clean, "{}, part {part}", s.strategy);
         }
         // with its statistics it renders something else, if it has any, with as many samples
         session.restart(true);
         let kept = session.cache().map(|c| c.leaves());
         assert!(kept.is_none_or(|leaves| leaves > 6));
         render(&mut session, &mut shards);
-        assert_eq!(everything(&session) == clean, s.strategy.name() == "classic", "{}", s.strategy);
+        assert_eq!(shown(&session) == clean, s.strategy.name() == "classic", "{}", s.strategy);
     }
 }
 
@@ -189,9 +155,9 @@ fn another_scene_begins_another_picture() {
 fn other_blocks_are_refused() {
     let bytes = blob(&cornell([20, 12]));
     let scene = Scene::from_bytes(&bytes).unwrap();
-    let s = cases(&bytes)[1];
+    let s = kinds_of_statistics(&bytes, 2)[1];
     let plan = Plan::new(&s).unwrap();
-    let mut block = memory(plan.session().size);
+    let mut block = memory(plan.session().size, 0xff);
     let resume =
         |plan: &Plan, block: &mut AlignedBytes| Session::resume(scene, plan, block.as_mut()).map(Session::suspend);
     let refused = |e| Err(SessionError::Resume(e));
@@ -221,9 +187,9 @@ fn made_up_records_do_no_harm() {
     let scene = Scene::from_bytes(&bytes).unwrap();
     let mut rng = SplitMix(5);
     let (mut taken, mut refused) = (0, 0);
-    for s in cases(&bytes) {
+    for s in kinds_of_statistics(&bytes, 2) {
         let plan = Plan::new(&s).unwrap();
-        let mut block = memory(plan.session().size);
+        let mut block = memory(plan.session().size, 0xff);
         Session::new(scene, &plan, block.as_mut()).unwrap().suspend();
         // magic, state, fingerprint, hash, scalars
         let words = (0..200).find(|&n| {
@@ -232,7 +198,7 @@ fn made_up_records_do_no_harm() {
         });
         let words = words.expect("the hash is that of the scalars");
         for round in 0..200 {
-            let mut block = memory(plan.session().size);
+            let mut block = memory(plan.session().size, 0xff);
             Session::new(scene, &plan, block.as_mut()).unwrap().suspend();
             let b = block.as_mut();
             for _ in 0..=round % 4 {

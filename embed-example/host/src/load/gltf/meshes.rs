@@ -157,10 +157,8 @@ fn load_primitive(
     let vertices: Vec<Vertex> = used.iter().map(vertex).collect();
     let smooth = normals.is_some();
     let mut out = Primitive { vertices, triangles, smooth, material: material.index, influences };
-    if let Some(colors) = colors.filter(|_| constant.is_none())
-        && let Some(volume) = paint(loader, scene, asset, &mut out, material, &colors, at)?
-    {
-        materials.volumes.push(volume);
+    if let Some(colors) = colors.filter(|_| constant.is_none()) {
+        materials.volumes.extend(paint(loader, scene, asset, &mut out, material, &colors, at)?);
     }
     Ok(Some(out))
 }
