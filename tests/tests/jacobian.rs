@@ -135,7 +135,7 @@ fn lights() {
         ("sphere", LightKind::Sphere, shape(LightKind::Sphere, &[0.9])),
         ("rectangle", LightKind::Rectangle, shape(LightKind::Rectangle, &[1.5, 0.0, 0.5, -0.5, 0.0, 1.5])),
         ("small rectangle", LightKind::Rectangle, shape(LightKind::Rectangle, &[0.05, 0.0, 0.0, 0.0, 0.0, 0.05])),
-        ("disk", LightKind::Disk, shape(LightKind::Disk, &[0.0, -0.6, -0.8, 0.5])),
+        ("disk", LightKind::Disk, shape(LightKind::Disk, &[0.0, -0.6, -0.8, 0.3])),
         ("near disk", LightKind::Disk, shape(LightKind::Disk, &[0.0, -0.6, -0.8, 3.0])),
     ] {
         let scene = scene.scene();

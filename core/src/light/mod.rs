@@ -24,6 +24,7 @@ mod area;
 mod directional;
 mod disk;
 mod environment;
+mod meet;
 mod mis;
 mod point;
 mod power;
@@ -35,9 +36,9 @@ mod sun;
 
 pub use area::{area_of, area_pdf, area_radiance, area_texture};
 pub use environment::{environment_pdf, environment_radiance};
+pub use meet::{ShapeRays8, meet_shapes, nearest_shape};
 pub use mis::power_heuristic;
 pub use power::{PowerSelector, SceneExtent, luminance};
-pub use shape::{ShapeRays8, meet_shapes, nearest_shape};
 
 use crate::scene::blob::{Light, LightKind, NONE};
 use crate::scene::{Effects, Scene};
