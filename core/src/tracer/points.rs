@@ -80,7 +80,7 @@ fn arrive<W: World>(world: &W, samples: &CameraSamples8) -> Arrival8 {
             error_weight: samples.error_weight,
         },
         active,
-        kind: [MaterialKind::Diffuse as u32; 8],
+        kind: [MaterialKind::LAMBERTIAN as u32; 8],
         straight: F32x8::ZERO,
         weight: points.scale,
         albedo: Vec3x8::ZERO,
