@@ -85,7 +85,7 @@ fn arrive<W: World>(world: &W, samples: &CameraSamples8) -> (Arrival8, Hit8, Sur
             error_weight: samples.error_weight,
         },
         active,
-        kind: [MaterialKind::Diffuse as u32; 8],
+        kind: [MaterialKind::LAMBERTIAN as u32; 8],
         straight: F32x8::ZERO,
         weight: points.scale,
         albedo: Vec3x8::ZERO,

@@ -137,6 +137,8 @@ pub enum Parameter {
 impl MaterialKind {
     /// The kind whose scattering model a host brings.
     pub const HOSTS: Self = Self::Own;
+    /// The kind of vertices that stand for irradiance: reflects all that arrives, if its reflectance is 1, evenly.
+    pub const LAMBERTIAN: Self = Self::Diffuse;
 }
 
 /// Bits of the kinds that have a [`PrincipledRecord`](super::PrincipledRecord).
