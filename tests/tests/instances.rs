@@ -111,7 +111,7 @@ fn exact_translations_give_the_hits_of_the_flat_scene() {
         let all = Mask8::all_lanes();
         let (h, f) = (placed.closest(&rays, all), flat.closest(&rays, all));
         assert_eq!(placed.occluded(&rays, all), h.hit);
-        for i in 0..8 {
+        for (i, ray) in scalar.iter().enumerate() {
             assert_eq!(h.hit.lane(i), f.hit.lane(i));
             if !h.hit.lane(i) {
                 assert_eq!((h.instance[0].lane(i), h.instance[1].lane(i)), (NONE, NONE));
@@ -128,9 +128,9 @@ fn exact_translations_give_the_hits_of_the_flat_scene() {
             if at != f.triangle.lane(i) as usize {
                 // two flat triangles at one t: by another order
                 let other = f.triangle.lane(i) as usize;
-                let t = [at, other].map(|k| match judge(&scalar[i], &flat_triangles[k], 1e-5) {
+                let t = [at, other].map(|k| match judge(ray, &flat_triangles[k], 1e-5) {
                     Verdict::Hit(t) | Verdict::Close(t) => t,
-                    Verdict::Miss => panic!("{:?} misses {k} of {at} and {other}", scalar[i]),
+                    Verdict::Miss => panic!("{ray:?} misses {k} of {at} and {other}"),
                 });
                 assert!((t[0] - t[1]).abs() <= 1e-6 * t[0], "hit of {at} at {}, not of {other} at {}", t[0], t[1]);
                 ties += 1;
