@@ -3,10 +3,10 @@
 use super::class::PHASE_KIND;
 use super::media_set::{MediaSet8, media_behind};
 use super::packets::RayState8;
-use super::relief::relief;
+use super::relief::{own_reflectance, relief};
 use super::vertex::PathVertex8;
 use crate::bsdf::{self, Bsdf, Inputs8, Lobes, Visitor};
-use crate::extension::{Extension, TextureSamples8};
+use crate::extension::Extension;
 use crate::geometry::{self, SurfaceHit8, SurfacePoint8};
 use crate::learn::cache::NO_BIN;
 use crate::scene::blob::{LAYERED_KINDS, MATERIAL_CUTOUT, MATERIAL_TWO_SIDED, MaterialKind, NONE};
@@ -163,19 +163,6 @@ impl Materials8 {
         }
         Self { kind, reflectance, ns, scatters, straight }
     }
-}
-
-/// Reflectances that the host's extension makes of those of materials and texture files, in the lanes of `active`.
-pub(super) fn own_reflectance<W: World>(world: &W, hit: &SurfaceHit8, active: Mask8, reflectance: Vec3x8) -> Vec3x8 {
-    let [wa, wb, wc] = hit.weights();
-    let uv = |k: usize| hit.of_vertex(world.scene(), k, |v| [v.uv[0], v.uv[1], 0.0]);
-    let at = uv(0) * wa + uv(1) * wb + uv(2) * wc;
-    let (material, point) = (U32x8::new(hit.material), hit.point().p);
-    let samples = TextureSamples8 { material, uv: [at.x, at.y], point, active };
-    let own = world.extension().reflectance(&samples, reflectance);
-    // a NaN becomes 0
-    let clamp = |x: F32x8| F32x8::ZERO.max(x).min(F32x8::ONE);
-    Vec3x8::select(active, Vec3x8::new(clamp(own.x), clamp(own.y), clamp(own.z)), reflectance)
 }
 
 /// Does the scene hold anything that light may pass straight on?
