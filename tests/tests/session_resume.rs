@@ -115,15 +115,15 @@ fn another_scene_begins_another_picture() {
     other.camera.origin[0] += 0.125;
     let other = blob(&other);
     let other = Scene::from_bytes(&other).unwrap();
-    for s in cases(&bytes) {
+    for s in kinds_of_statistics(&bytes, 3) {
         let plan = Plan::new(&s).unwrap();
-        let (mut block, mut own) = (memory(plan.session().size), blocks(&plan));
+        let (mut block, mut own) = (memory(plan.session().size, 0xff), blocks(&plan));
         let mut shards = shards(&plan, &mut own);
         let mut session = Session::new(scene, &plan, block.as_mut()).unwrap();
         render(&mut session, &mut shards);
         session.begin_iteration(8);
         session.suspend();
-        let mut copy = memory(plan.session().size);
+        let mut copy = memory(plan.session().size, 0xff);
         copy.as_mut().copy_from_slice(block.as_ref());
 
         let mut resumed = Session::resume(other, &plan, block.as_mut()).unwrap();

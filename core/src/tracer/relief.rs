@@ -6,14 +6,14 @@
 //! relief faces him. So no hit is black because of its normal. What the directions that are scattered need is in
 //! `bsdf/folded.rs`.
 
-use super::shading::own_reflectance;
+use super::shading::coordinates;
 use crate::accel::Intersector;
 use crate::bsdf::principled::{self, Textured8};
-use crate::extension::Extension;
+use crate::extension::{Extension, TextureSamples8};
 use crate::geometry::{OwnHits8, SurfaceHit8};
 use crate::scene::Effects;
 use crate::world::World;
-use croupier_simd::{F32x8, Frame8, Mask8, Vec3x8};
+use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
 
 /// Cosine to `wo` that normals are turned to.
 const FACING: f32 = 0.1;
@@ -101,4 +101,22 @@ fn facing(wo: Vec3x8, ng: Vec3x8, ns: Vec3x8) -> Vec3x8 {
     let turned = w * least + across * ((1.0 - least * least).safe_sqrt() / length);
     let turned = Vec3x8::select(length.gt(F32x8::splat(1e-4)), turned, ng);
     Vec3x8::select(away, turned, ns)
+}
+
+/// Reflectances that the host's extension makes of those of materials and texture files, in the lanes of `active`.
+pub(super) fn own_reflectance<W: World>(
+    world: &W,
+    hit: &SurfaceHit8,
+    own: Option<&OwnHits8>,
+    active: Mask8,
+    reflectance: Vec3x8,
+) -> Vec3x8 {
+    let uv = coordinates(world.scene(), hit, own);
+    let point = hit.point().p;
+    let point = own.map_or(point, |own| Vec3x8::select(own.lanes, own.surface.p, point));
+    let samples = TextureSamples8 { material: U32x8::new(hit.material), uv, point, active };
+    let own = world.extension().reflectance(&samples, reflectance);
+    // a NaN becomes 0
+    let clamp = |x: F32x8| F32x8::ZERO.max(x).min(F32x8::ONE);
+    Vec3x8::select(active, Vec3x8::new(clamp(own.x), clamp(own.y), clamp(own.z)), reflectance)
 }

@@ -3,12 +3,12 @@
 use super::class::PHASE_KIND;
 use super::media_set::{MediaSet8, media_behind};
 use super::packets::RayState8;
-use super::relief::relief;
+use super::relief::{own_reflectance, relief};
 use super::surfaces::places;
 use super::vertex::PathVertex8;
 use crate::accel::Intersector;
 use crate::bsdf::{self, Bsdf, Inputs8, Lobes, Visitor};
-use crate::extension::{Extension, TextureSamples8};
+use crate::extension::Extension;
 use crate::geometry::{self, OwnHits8, SurfaceHit8, SurfacePoint8};
 use crate::learn::cache::NO_BIN;
 use crate::scene::blob::{LAYERED_KINDS, MATERIAL_CUTOUT, MATERIAL_TWO_SIDED, MaterialKind, NONE};
@@ -191,29 +191,11 @@ pub(super) fn interpolated_normals<W: World>(scene: &Scene<'_>, hit: &SurfaceHit
 
 /// Texture coordinates of hits.
 #[inline(always)]
-fn coordinates(scene: &Scene<'_>, hit: &SurfaceHit8, own: Option<&OwnHits8>) -> [F32x8; 2] {
+pub(super) fn coordinates(scene: &Scene<'_>, hit: &SurfaceHit8, own: Option<&OwnHits8>) -> [F32x8; 2] {
     let [wa, wb, wc] = hit.weights();
     let uv = |k: usize| hit.of_vertex(scene, k, |v| [v.uv[0], v.uv[1], 0.0]);
     let at = uv(0) * wa + uv(1) * wb + uv(2) * wc;
     own.map_or([at.x, at.y], |own| own.coordinates([at.x, at.y]))
-}
-
-/// Reflectances that the host's extension makes of those of materials and texture files, in the lanes of `active`.
-pub(super) fn own_reflectance<W: World>(
-    world: &W,
-    hit: &SurfaceHit8,
-    own: Option<&OwnHits8>,
-    active: Mask8,
-    reflectance: Vec3x8,
-) -> Vec3x8 {
-    let uv = coordinates(world.scene(), hit, own);
-    let point = hit.point().p;
-    let point = own.map_or(point, |own| Vec3x8::select(own.lanes, own.surface.p, point));
-    let samples = TextureSamples8 { material: U32x8::new(hit.material), uv, point, active };
-    let own = world.extension().reflectance(&samples, reflectance);
-    // a NaN becomes 0
-    let clamp = |x: F32x8| F32x8::ZERO.max(x).min(F32x8::ONE);
-    Vec3x8::select(active, Vec3x8::new(clamp(own.x), clamp(own.y), clamp(own.z)), reflectance)
 }
 
 /// Does the scene hold anything that light may pass straight on?
