@@ -2,13 +2,14 @@
 //! the renderer is a function after which callgrind writes what it has counted, so that every single call is known.
 //!
 //! Two renders for each strategy. The end of an iteration, edits and reading are those of a picture of 1920 x 1080 with
-//! auxiliary values, whose paths end early because only the number of its pixels matters; steps are those of whole paths
-//! in a strip of that picture.
+//! auxiliary values, after paths of four segments; steps are those of whole paths in a strip of that picture.
 
 use clap::Parser;
+use croupier::unstable::scene::blob::{Camera, Light};
 use croupier::{Budget, Scene, Settings, StepResult, Strategy};
 use croupier_benches::callgrind::{self, Folder};
 use croupier_benches::exit::exit_code;
+use croupier_benches::placed::place_metal_sphere;
 use croupier_benches::provenance;
 use croupier_benches::results::{Results, Table};
 use croupier_host::builtin;
@@ -47,8 +48,10 @@ const COLUMNS: u32 = 1920;
 const SHARDS: u32 = 64;
 /// Rows of the picture whose steps are measured.
 const STRIP: u32 = 48;
-/// Budgets of calls, in rays or units of a ray.
-const BUDGETS: [u64; 2] = [2_000, 10_000];
+/// Budgets of pieces of the end of an iteration, in units of a ray; the second is that of the example.
+const FINISH: [u64; 2] = [2_000, 6_000];
+/// Budgets of steps, in rays; the first is that of the example.
+const STEP: [u64; 3] = [1_500, 2_000, 10_000];
 /// A millisecond at 3 G instructions a second.
 const LIMIT: u64 = 3_000_000;
 
@@ -83,10 +86,10 @@ fn bench_one_call(call: &mut dyn FnMut()) {
 
 /// Whole paths, in pieces of both sizes in turn.
 fn steps(renderer: &Renderer, calls: &mut Calls) -> Result<(), RendererError> {
-    for rays in BUDGETS {
+    for rays in FINISH {
         renderer.begin_iteration(1);
         for shard in 0..renderer.plan().settings().shards {
-            for rays in [1_500, BUDGETS[0], BUDGETS[1]].into_iter().cycle() {
+            for rays in STEP.into_iter().cycle() {
                 let kind = format!("step, {rays}");
                 if calls.make(&kind, || renderer.step(shard, Budget { rays }))? == StepResult::Done {
                     break;
@@ -110,8 +113,9 @@ fn finish(renderer: &Renderer, rays: u64, calls: &mut Calls) -> Result<(), Rende
 
 /// Two iterations, whose ends are in pieces of one size each, and what else a frame calls.
 fn ends(renderer: &Renderer, calls: &mut Calls) -> Result<(), RendererError> {
-    let (camera, light) = renderer.with_scene(|scene| (*scene.camera, scene.lights[0]));
-    for rays in BUDGETS {
+    let (camera, light, object) =
+        renderer.with_scene(|scene| (*scene.camera, scene.lights[0], scene.instances[0].to_world));
+    for rays in FINISH {
         calls.make("begin_iteration", || renderer.begin_iteration(1));
         for shard in 0..SHARDS {
             calls.make("first step of a shard, 1", || renderer.step(shard, Budget { rays: 1 }))?;
@@ -133,8 +137,22 @@ fn ends(renderer: &Renderer, calls: &mut Calls) -> Result<(), RendererError> {
         })
     });
     for (keep, name) in [(Keep::Statistics, "statistics"), (Keep::Nothing, "nothing")] {
-        calls.make(&format!("edit the camera, keep {name}"), || renderer.edit(keep, |s| s.camera(camera)))?;
-        calls.make(&format!("edit a light, keep {name}"), || renderer.edit(keep, |s| s.light(0, light)))?;
+        calls.make(&format!("edit the camera, keep {name}"), || {
+            let [x, y, z] = camera.origin;
+            renderer.edit(keep, |s| s.camera(Camera { origin: [x + 0.01, y, z], ..camera }))
+        })?;
+        calls.make(&format!("edit a light, keep {name}"), || {
+            let emission = light.emission.map(|x| x * 0.5);
+            renderer.edit(keep, |s| s.light(0, Light { emission, ..light }))
+        })?;
+        calls.make(&format!("move an object, keep {name}"), || {
+            let mut moved = object;
+            moved.iter_mut().for_each(|key| key[0][3] += 0.25);
+            renderer.edit(keep, |s| s.transform(0, moved))
+        })?;
+        renderer.edit(keep, |s| s.transform(0, object))?;
+        renderer.edit(keep, |s| s.light(0, light))?;
+        renderer.edit(keep, |s| s.camera(camera))?;
         calls.make("begin_iteration", || renderer.begin_iteration(1));
     }
     Ok(())
@@ -153,7 +171,7 @@ fn run_calls(args: &Args, blob: &Path, strategy: &str) -> Result<Calls, Box<dyn 
             steps(&Renderer::new(bytes, &s)?, &mut calls)?;
         }
         false => {
-            let s = Settings { size: [COLUMNS, args.rows], max_depth: 1, ..settings };
+            let s = Settings { size: [COLUMNS, args.rows], max_depth: 4, ..settings };
             ends(&Renderer::new(bytes, &s)?, &mut calls)?;
         }
     }
@@ -194,7 +212,9 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
     }
     let mut results = Results::of_this_run(NAME);
     let folder = Folder::new(NAME)?;
-    let blob = folder.bake("built-in", &builtin::cornell_box())?;
+    let mut scene = builtin::cornell_box();
+    place_metal_sphere(&mut scene);
+    let blob = folder.bake("built-in", &scene)?;
     for strategy in STRATEGIES.into_iter().filter(|s| args.only.as_deref().is_none_or(|only| only == *s)) {
         let (blob, rows) = (blob.to_string_lossy(), args.rows.to_string());
         let child = ["--blob", &blob, "--strategy", strategy, "--rows", &rows];
@@ -210,9 +230,10 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         results.tables.push(table);
     }
     if args.write {
-        results
-            .header
-            .push(("picture".into(), format!("built-in scene, {COLUMNS} x {} pixels, {SHARDS} shards", args.rows)));
+        results.header.push((
+            "picture".into(),
+            format!("built-in box with an instance, {COLUMNS} x {} pixels, {SHARDS} shards", args.rows),
+        ));
         results.header.push(("1 ms".into(), format!("{LIMIT} instructions")));
         results.header.push(("valgrind".into(), provenance::version_of("valgrind")));
         println!("wrote {}", results.write(NAME)?.display());

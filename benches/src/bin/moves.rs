@@ -13,12 +13,13 @@ use croupier::unstable::film::PixelStats;
 use croupier::unstable::scene::blob::Camera;
 use croupier::{Budget, EditError, Scene, SceneEdit, Settings, StepResult, Strategy};
 use croupier_benches::exit::exit_code;
+use croupier_benches::placed::place_metal_sphere;
 use croupier_benches::results::{Results, Table};
 use croupier_benches::stats::{Median, digits};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin;
-use croupier_host::description::{Instance, Prototype, SceneDescription};
+use croupier_host::description::SceneDescription;
 use croupier_host::renderer::{Keep, Renderer, RendererError};
 use std::error::Error;
 use std::process::ExitCode;
@@ -99,13 +100,7 @@ const STILL_EDITS: Edits =
 /// The built-in box, its metal sphere as an instance.
 fn movable_box() -> SceneDescription {
     let mut scene = builtin::cornell_box();
-    let at = scene.objects.iter().position(|o| o.name == "metal sphere");
-    if let Some([sphere, next]) = at.and_then(|i| scene.objects.get(i..i + 2)) {
-        let triangles = sphere.first_triangle..next.first_triangle;
-        scene.prototypes.push(Prototype { name: "sphere".into(), triangles, instances: Vec::new() });
-        let stay = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
-        scene.instances.push(Instance::new("metal sphere", 0, stay));
-    }
+    place_metal_sphere(&mut scene);
     scene
 }
 

@@ -5,8 +5,9 @@
 use super::instance::Instance;
 use croupier::unstable::Effects;
 use croupier::unstable::profile::Custom;
+use croupier_benches::placed::place_metal_sphere;
 use croupier_host::builtin;
-use croupier_host::description::{Instance as Placement, *};
+use croupier_host::description::*;
 
 /// A scene that effects are added to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,7 +110,7 @@ impl Base {
                 textured(&mut scene);
                 sphere(&mut scene, Model::Principled(layered()));
             }
-            Self::Instanced => placed(&mut scene),
+            Self::Instanced => place_metal_sphere(&mut scene),
         }
         scene
     }
@@ -149,19 +150,6 @@ pub(crate) struct Row {
 
 /// Material of the left sphere in the built-in box.
 const SPHERE: usize = 5;
-
-/// Places the left sphere in the world by an instance.
-fn placed(scene: &mut SceneDescription) {
-    let is_sphere = |t: &Triangle| t.material as usize == SPHERE;
-    let first = scene.triangles.iter().position(is_sphere).unwrap_or(0) as u32;
-    let count = scene.triangles.iter().filter(|t| is_sphere(t)).count() as u32;
-    scene.prototypes.push(Prototype { name: "sphere".into(), triangles: first..first + count, instances: Vec::new() });
-    scene.instances.push(Placement::new(
-        "sphere",
-        0,
-        [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
-    ));
-}
 
 /// Gives the material of the left sphere another model.
 fn sphere(scene: &mut SceneDescription, model: Model) {
@@ -257,7 +245,7 @@ rows! {
         s.textures.push(Texture { encoding: Encoding::Linear, ..bumps });
         sphere(s, Model::Principled(Principled { normal_texture: Some(TextureRef::new(1)), ..layered() }));
     };
-    INSTANCES: Diffuse, placed;
+    INSTANCES: Diffuse, place_metal_sphere;
     MOTION: Instanced, |s| {
         let place = &mut s.instances[0];
         let mut end = place.to_world;
