@@ -1,9 +1,9 @@
 //! The media that paths are inside of: a bit each, so that media may be nested, overlap and touch. The lowest index is
 //! the medium that a path meets (see [`crate::scene::blob::Medium`]).
 
-use super::surfaces::surfaces_of;
+use super::surfaces::own_surfaces;
 use crate::accel::Intersector;
-use crate::geometry::{self, Ray8};
+use crate::geometry::{self, Ray8, SurfaceHit8};
 use crate::scene::Scene;
 use crate::scene::blob::{MAX_MEDIA, NONE};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -98,8 +98,10 @@ pub(crate) fn media_at<I: Intersector>(scene: &Scene<'_>, intersector: &I, p: [f
         if active.none() {
             break;
         }
-        let (hit, point, _) = surfaces_of(scene, intersector, true, &ray, &mut hit);
-        let medium = media_behind(scene, &hit.material);
+        let mut surface = SurfaceHit8::gather(scene, &hit);
+        let mut point = surface.place(scene, ray.time);
+        own_surfaces(intersector, &ray, &mut hit, &mut surface, &mut point);
+        let medium = media_behind(scene, &surface.material);
         let leaving = d.dot(point.ng).gt(F32x8::ZERO);
         for i in active.lanes() {
             let bit = bit(medium[i]) & !known[i];

@@ -5,10 +5,10 @@ use super::book::Bookkeeping;
 use super::crossing::{across, media_towards};
 use super::packets::{Samples8, ShadowRays8};
 use super::shading::{may_pass, straight_share};
-use super::surfaces::surfaces;
+use super::surfaces::{own_surfaces, places};
 use crate::bsdf;
 use crate::cost::COST_SHADOW;
-use crate::geometry::{self, Hit8, NO_INSTANCE, Ray8};
+use crate::geometry::{self, Hit8, NO_INSTANCE, Ray8, SurfaceHit8};
 use crate::media::{self, Segment8};
 use crate::scene::blob::{MATERIAL_CUTOUT, Material, NONE};
 use crate::scene::{Effects, Scene};
@@ -79,7 +79,9 @@ fn walk<W: World>(world: &W, book: &mut Bookkeeping<'_>, samples: &Samples8, s: 
             hit = world.closest(&ray, search);
             hit.hit &= search;
         }
-        let (surface, point, own) = surfaces(world, &ray, &mut hit);
+        let mut surface = SurfaceHit8::gather(scene, &hit);
+        let mut point = if places::<W>(scene) { surface.place(scene, ray.time) } else { surface.point() };
+        let own = own_surfaces(world.intersector(), &ray, &mut hit, &mut surface, &mut point);
         if hit.hit.any() {
             let share = straight_share(world, &surface, own.as_ref(), -ray.d.normalize(), point.ng, media);
             transmittance = Vec3x8::select(hit.hit, transmittance * share, transmittance);

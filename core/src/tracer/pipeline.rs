@@ -35,9 +35,10 @@ use super::scatter::scatter;
 use super::settle::settle;
 use super::shading::{albedo, may_pass, moves, shade};
 use super::state::State;
-use super::surfaces::surfaces;
+use super::surfaces::{own_surfaces, places};
 use super::trace::trace;
 use crate::extension::Extension;
+use crate::geometry::SurfaceHit8;
 use crate::scene::Effects;
 use crate::world::World;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -115,7 +116,9 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
         return true;
     }
 
-    let (mut hit, point, own) = surfaces(world, &rays.ray, &mut traced);
+    let mut hit = SurfaceHit8::gather(world.scene(), &traced);
+    let mut point = if places::<W>(world.scene()) { hit.place(world.scene(), rays.ray.time) } else { hit.point() };
+    let own = own_surfaces(world.intersector(), &rays.ray, &mut traced, &mut hit, &mut point);
     if W::EFFECTS.intersects(Effects::STRAIGHT) {
         hit.t += rays.travelled;
     }

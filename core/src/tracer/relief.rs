@@ -6,7 +6,7 @@
 //! relief faces him. So no hit is black because of its normal. What the directions that are scattered need is in
 //! `bsdf/folded.rs`.
 
-use super::shading::coordinates;
+use super::surfaces::coordinates;
 use crate::accel::Intersector;
 use crate::bsdf::principled::{self, Textured8};
 use crate::extension::{Extension, TextureSamples8};

@@ -4,7 +4,7 @@ use super::class::PHASE_KIND;
 use super::media_set::{MediaSet8, media_behind};
 use super::packets::RayState8;
 use super::relief::{own_reflectance, relief};
-use super::surfaces::places;
+use super::surfaces::{coordinates, places};
 use super::vertex::PathVertex8;
 use crate::accel::Intersector;
 use crate::bsdf::{self, Bsdf, Inputs8, Lobes, Visitor};
@@ -187,15 +187,6 @@ pub(super) fn interpolated_normals<W: World>(scene: &Scene<'_>, hit: &SurfaceHit
     // opposite normals may cancel: then the triangle's own serves (NUMERICS FRM-3)
     let ok = hit.smooth & len.gt(F32x8::splat(1e-6));
     Vec3x8::select(ok, sum / len, ng)
-}
-
-/// Texture coordinates of hits.
-#[inline(always)]
-pub(super) fn coordinates(scene: &Scene<'_>, hit: &SurfaceHit8, own: Option<&OwnHits8>) -> [F32x8; 2] {
-    let [wa, wb, wc] = hit.weights();
-    let uv = |k: usize| hit.of_vertex(scene, k, |v| [v.uv[0], v.uv[1], 0.0]);
-    let at = uv(0) * wa + uv(1) * wb + uv(2) * wc;
-    own.map_or([at.x, at.y], |own| own.coordinates([at.x, at.y]))
 }
 
 /// Does the scene hold anything that light may pass straight on?

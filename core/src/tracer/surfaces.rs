@@ -4,7 +4,7 @@ use crate::accel::Intersector;
 use crate::geometry::{Hit8, NO_INSTANCE, OwnHits8, Ray8, SurfaceHit8, SurfacePoint8};
 use crate::scene::{Effects, Scene};
 use crate::world::World;
-use croupier_simd::U32x8;
+use croupier_simd::{F32x8, U32x8};
 
 /// Does the scene place triangles in instances?
 #[inline(always)]
@@ -12,36 +12,35 @@ pub(crate) fn places<W: World>(scene: &Scene<'_>) -> bool {
     W::EFFECTS.contains(Effects::INSTANCES) && scene.effects.contains(Effects::INSTANCES)
 }
 
-/// The surfaces that `rays` hit, their points, and what is known of those of the host's own, if there are any.
+/// Texture coordinates of hits.
 #[inline(always)]
-pub(crate) fn surfaces<W: World>(
-    world: &W,
-    rays: &Ray8,
-    hit: &mut Hit8,
-) -> (SurfaceHit8, SurfacePoint8, Option<OwnHits8>) {
-    surfaces_of(world.scene(), world.intersector(), places::<W>(world.scene()), rays, hit)
+pub(super) fn coordinates(scene: &Scene<'_>, hit: &SurfaceHit8, own: Option<&OwnHits8>) -> [F32x8; 2] {
+    let [wa, wb, wc] = hit.weights();
+    let uv = |k: usize| hit.of_vertex(scene, k, |v| [v.uv[0], v.uv[1], 0.0]);
+    let at = uv(0) * wa + uv(1) * wb + uv(2) * wc;
+    own.map_or([at.x, at.y], |own| own.coordinates([at.x, at.y]))
 }
 
-/// [`surfaces`] of a scene that has instances if `places`.
+/// What is known of the surfaces of the host's own that `rays` hit, if there are any; `hit` and `point` get their places
+/// and materials. Parts are handed in, not returned: kernels without such surfaces copy nothing.
 #[inline(always)]
-pub(super) fn surfaces_of<I: Intersector>(
-    scene: &Scene<'_>,
+pub(crate) fn own_surfaces<I: Intersector>(
     intersector: &I,
-    places: bool,
     rays: &Ray8,
     traced: &mut Hit8,
-) -> (SurfaceHit8, SurfacePoint8, Option<OwnHits8>) {
+    hit: &mut SurfaceHit8,
+    point: &mut SurfacePoint8,
+) -> Option<OwnHits8> {
     if !I::SURFACES {
-        let mut hit = SurfaceHit8::gather(scene, traced);
-        let point = if places { hit.place(scene, rays.time) } else { hit.point() };
-        return (hit, point, None);
+        return None;
     }
     let own = traced.own();
-    let found = if own.any() { Some(intersector.surface(rays, traced, own)) } else { None };
+    if own.none() {
+        return None;
+    }
+    let surface = intersector.surface(rays, traced, own);
     // instances of own surfaces are the host's
     traced.instance = [0, 1].map(|k| U32x8::select(own, NO_INSTANCE[k], traced.instance[k]));
-    let mut hit = SurfaceHit8::gather(scene, traced);
-    let mut point = if places { hit.place(scene, rays.time) } else { hit.point() };
-    let found = found.map(|surface| OwnHits8::new(own, surface, &mut hit, &mut point));
-    (hit, point, found)
+    hit.instance = traced.instance;
+    Some(OwnHits8::new(own, surface, hit, point))
 }

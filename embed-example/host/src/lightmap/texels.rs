@@ -348,7 +348,7 @@ mod tests {
         let triangles = [[[0.1, 0.15], [0.9, 0.2], [0.35, 0.8]], [[0.9, 0.2], [0.95, 0.9], [0.35, 0.8]]];
         let texels = Texels::new(&surface(&triangles), [7, 5]);
         assert_eq!((texels.charts, texels.overlaps.len()), (1, 0));
-        let n = 64;
+        let n = 256;
         for texel in 0..35 {
             let (x, y) = ((texel % 7) as u32, (texel / 7) as u32);
             let parts: Vec<Polygon> =
