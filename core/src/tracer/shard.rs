@@ -17,13 +17,10 @@ use core::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
     /// Rays of all kinds, and as many steps through media as cost the same ([`Counters::work`]); exceeded by less than one
-    /// packet (16 rays, unless they pass surfaces or media). A packet without any ray counts as 4: eight camera samples for
-    /// which an [`Extension`](crate::unstable::extension::Extension) has no rays.
+    /// packet (16 rays, unless they pass surfaces or media). Camera samples for which an
+    /// [`Extension`](crate::unstable::extension::Extension) has no ray count as if they had one.
     pub rays: u64,
 }
-
-/// What a packet without any ray counts in a budget.
-const EMPTY_TURN: u64 = 4;
 
 /// What to do after a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -199,14 +196,11 @@ impl<'m> Shard<'m> {
             self.state.book.clear_some();
             cleared += 1;
         }
-        let (mut spent, mut before) = (cleared, self.state.book.counters.work());
-        while spent < budget.rays {
+        let start = self.state.book.counters.work();
+        while self.state.book.counters.work() - start + cleared < budget.rays {
             if !turn(world, &self.job, self.index, &mut self.state) {
                 return StepResult::Done;
             }
-            let now = self.state.book.counters.work();
-            spent += if now == before { EMPTY_TURN } else { now - before };
-            before = now;
         }
         StepResult::More
     }

@@ -124,7 +124,8 @@ each_effect!(
     INSTANCES,
     MOTION,
     NORMAL_MAPS,
-    PROJECTIONS
+    PROJECTIONS,
+    SHAPE_LIGHTS
 );
 
 /// Killed by: an effect that a session does not look for, a message without its name.
