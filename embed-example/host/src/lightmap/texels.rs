@@ -387,7 +387,7 @@ mod tests {
             }
         }
         // row 0 is at the top
-        assert!(texels.is_covered(6) && !texels.is_covered(0) && !texels.is_covered(34));
+        assert!(texels.is_covered(6) && texels.is_covered(28) && !texels.is_covered(0));
     }
 
     /// Killed by: edges that neighbours share taken for overlaps, charts that overlap within a texel overlooked,
