@@ -12,7 +12,6 @@ const EMULATED: &str = "CROUPIER_TEST_EMULATED";
 /// This test runs itself under an emulator of a processor of 2008. Killed by: a check that comes behind the first vector
 /// instruction, or not at all; a build for every processor that uses newer instructions.
 #[test]
-#[expect(clippy::disallowed_methods, reason = "the emulated process must not run the test harness's own vector code")]
 fn old_processors_are_refused() {
     static BYTES: [u32; 4096] = [0; 4096];
     if std::env::var_os(EMULATED).is_some() {
