@@ -163,7 +163,8 @@ fn bases(folder: &Folder, text: &Text) -> Result<Vec<Counts>, Box<dyn Error>> {
 fn effects(folder: &Folder, text: &Text, bases: &[Counts]) -> Result<Table, Box<dyn Error>> {
     let columns = "effect, base, absent, present, used, present over absent, text absent, text present, text more";
     let mut table = Table::new(EFFECTS, columns);
-    for (effect, name) in Effects::NAMES {
+    // what a host's own scattering model costs is the host's
+    for (effect, name) in Effects::NAMES.iter().filter(|(e, _)| *e != Effects::OWN) {
         let row = ROWS.iter().find(|r| r.effect == *effect).ok_or_else(|| format!("no row for {name}"))?;
         let base = bases.iter().find(|b| b.base == row.base).ok_or("no such base")?;
         let present = count(folder, &base.blob, &row.instance, "classic", SMALL)?;
