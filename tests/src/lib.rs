@@ -5,6 +5,7 @@ pub mod blob;
 pub mod bsdf;
 pub mod cache;
 pub mod documents;
+pub mod embedding;
 pub mod furnace;
 pub mod geometry;
 pub mod hit;
