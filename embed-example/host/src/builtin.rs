@@ -17,22 +17,9 @@ use std::collections::HashMap;
 /// assert!(scene.triangles.len() > 10_000);
 /// ```
 pub fn cornell_box() -> SceneDescription {
-    let mut scene = SceneDescription {
-        // So many pixels that the program's default number of samples takes seconds on two cores.
-        camera: Camera {
-            origin: [0.0, 1.0, 6.8],
-            target: [0.0, 1.0, 0.0],
-            vfov_deg: 20.2,
-            size: [400, 400],
-            ..Camera::default()
-        },
-        ..SceneDescription::default()
-    };
-    let diffuse = |rgb| Model::Diffuse { reflectance: Reflectance::Constant(rgb) };
-    let white = scene.add_material("white", diffuse([0.725, 0.71, 0.68]));
-    let red = scene.add_material("red", diffuse([0.63, 0.065, 0.05]));
-    let green = scene.add_material("green", diffuse([0.14, 0.45, 0.091]));
-    let lamp = scene.add_material("lamp", diffuse([0.0; 3]));
+    let mut scene = SceneDescription::default();
+    // So many pixels that the program's default number of samples takes seconds on two cores.
+    add_room(&mut scene, [400, 400]);
     let glass = scene.add_material("glass", Model::Dielectric { int_ior: 1.5, ext_ior: 1.0 });
     // Silver-white: aluminium's eta and k at 630, 530 and 465 nm.
     let metal = scene.add_material(
@@ -43,6 +30,34 @@ pub fn cornell_box() -> SceneDescription {
             reflectance: Reflectance::Constant([1.0; 3]),
         },
     );
+    add_sphere(&mut scene, "metal sphere", metal, [-0.42, 0.4, -0.35], 0.4);
+    add_sphere(&mut scene, "glass sphere", glass, [0.45, 0.4, 0.3], 0.4);
+    scene
+}
+
+/// The Cornell box with its two white blocks: everything diffuse, 32 triangles, 64 x 64 pixels. The scene that every
+/// example of embedding renders (`embed-example/box.crp`).
+///
+/// ```
+/// assert_eq!(croupier_host::builtin::cornell_blocks().triangles.len(), 32);
+/// ```
+pub fn cornell_blocks() -> SceneDescription {
+    let mut scene = SceneDescription { max_depth: 8, ..SceneDescription::default() };
+    let white = add_room(&mut scene, [64, 64]);
+    add_block(&mut scene, "short block", white, [0.33, 0.37], 0.6, [0.955, -0.296]);
+    add_block(&mut scene, "tall block", white, [-0.33, -0.3], 1.2, [0.952, 0.306]);
+    scene
+}
+
+/// Walls, lamp and camera of both boxes; the white material.
+fn add_room(scene: &mut SceneDescription, size: [u32; 2]) -> u32 {
+    scene.camera =
+        Camera { origin: [0.0, 1.0, 6.8], target: [0.0, 1.0, 0.0], vfov_deg: 20.2, size, ..Camera::default() };
+    let diffuse = |rgb| Model::Diffuse { reflectance: Reflectance::Constant(rgb) };
+    let white = scene.add_material("white", diffuse([0.725, 0.71, 0.68]));
+    let red = scene.add_material("red", diffuse([0.63, 0.065, 0.05]));
+    let green = scene.add_material("green", diffuse([0.14, 0.45, 0.091]));
+    let lamp = scene.add_material("lamp", diffuse([0.0; 3]));
     // Corners counter-clockwise seen from inside.
     let walls: [(&str, u32, [[f32; 3]; 4]); 6] = [
         ("floor", white, [[-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0], [-1.0, 0.0, -1.0]]),
@@ -58,10 +73,26 @@ pub fn cornell_box() -> SceneDescription {
         let vertex = |k: usize| Vertex { position: corners[k], uv: uv[k], ..Vertex::default() };
         scene.add_mesh(name, material, &[0, 1, 2, 3].map(vertex), &[[0, 1, 2], [0, 2, 3]], false);
     }
-    add_sphere(&mut scene, "metal sphere", metal, [-0.42, 0.4, -0.35], 0.4);
-    add_sphere(&mut scene, "glass sphere", glass, [0.45, 0.4, 0.3], 0.4);
     scene.emitters.push(Emitter::Area { material: lamp, radiance: [17.0, 12.0, 4.0] });
-    scene
+    white
+}
+
+/// A block without a bottom, 0.6 wide and deep, that stands on the floor at `centre` (x, z), turned about the vertical by
+/// an angle of cosine and sine `turn`.
+fn add_block(scene: &mut SceneDescription, name: &str, material: u32, centre: [f32; 2], height: f32, turn: [f32; 2]) {
+    let at = |[x, z]: [f32; 2], y| {
+        let ([c, s], [x, z]) = (turn, [0.3 * x, 0.3 * z]);
+        [centre[0] + c * x + s * z, y, centre[1] - s * x + c * z]
+    };
+    let ring = [[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
+    let mut add = |corners: [[f32; 3]; 4]| {
+        let vertex = |position| Vertex { position, ..Vertex::default() };
+        scene.add_mesh(name, material, &corners.map(vertex), &[[0, 1, 2], [0, 2, 3]], false);
+    };
+    add(ring.map(|p| at(p, height)));
+    for (p, q) in ring.into_iter().zip([1, 2, 3, 0].map(|i: usize| ring[i])) {
+        add([at(p, 0.0), at(q, 0.0), at(q, height), at(p, height)]);
+    }
 }
 
 /// Subdivisions of the spheres: 20 480 triangles each, 0.06 % of the radius off the true sphere.
