@@ -21,7 +21,7 @@
 /*
  First number of surfaces that are not triangles of the scene.
  */
-#define CROUPIER_OWN_SURFACE (1 << 31)
+#define CROUPIER_OWN_SURFACE 2147483648
 
 /*
  "No such index".
@@ -456,98 +456,9 @@ typedef struct croupier_camera {
 } croupier_camera;
 
 /*
- Text about a failure, for people: what was wrong with which object, with numbers.
- */
-typedef struct croupier_message {
-  /*
-   UTF-8, ended by a zero byte, cut off where it is too long. Empty after a call that succeeded.
-   */
-  char text[256];
-} croupier_message;
-
-/*
- A light of a scene. Colours are linear Rec. 709.
- */
-typedef struct croupier_light {
-  /*
-   sizeof(croupier_light), set by the program.
-   */
-  uint32_t struct_size;
-  /*
-   croupier_light_kind; cannot change.
-   */
-  uint32_t kind;
-  /*
-   Area: index of the triangle; cannot change. Sphere, rectangle, disk: 1 if it emits to both sides, plus 2 if camera
-   rays do not see it.
-   */
-  uint32_t triangle;
-  /*
-   Area: area of the triangle, world units squared; cannot change.
-   */
-  float area;
-  /*
-   Area: 1 + index of the world's instance that the triangle is in, or 0; cannot change.
-   */
-  uint32_t instance;
-  /*
-   Point, spot: position. Sphere, rectangle, disk: middle. Directional, sun: unit direction towards the light.
-   */
-  float vector[3];
-  /*
-   Area, sphere, rectangle, disk: radiance. Point: intensity. Spot: intensity on the axis. Directional, sun: irradiance on
-   a facing surface. Up to 1e18.
-   */
-  float emission[3];
-  /*
-   Spot: unit axis, 1 - cos of the outer and of the inner half angle, 0. Sun: 1 - cos of its angular radius, then 0.
-   Sphere: radius, then 0. Rectangle: two halves of edges. Disk: unit normal, radius, 0, 0. Others: 0.
-   */
-  float params[6];
-} croupier_light;
-
-/*
- The environment of a scene.
- */
-typedef struct croupier_environment {
-  /*
-   sizeof(croupier_environment), set by the program.
-   */
-  uint32_t struct_size;
-  /*
-   0 for constant radiance, 1 for a map by latitude and longitude; cannot change.
-   */
-  uint32_t kind;
-  /*
-   Index of its light; cannot change.
-   */
-  uint32_t light;
-  /*
-   Columns of the map; cannot change.
-   */
-  uint32_t width;
-  /*
-   Rows of the map; cannot change.
-   */
-  uint32_t height;
-  /*
-   Rows of the rotation from the world to the map.
-   */
-  float to_local[3][3];
-  /*
-   Constant: radiance. Map: scale by channel.
-   */
-  float radiance[3];
-} croupier_environment;
-
-/*
  A material of a scene. Members that its kind does not use are 0, indices CROUPIER_NONE.
  */
 typedef struct croupier_material {
-  /*
-   sizeof(croupier_material), set by the program.
-   */
-  uint32_t struct_size;
   /*
    croupier_material_kind.
    */
@@ -591,6 +502,398 @@ typedef struct croupier_material {
    */
   uint32_t medium;
 } croupier_material;
+
+/*
+ A texture of a scene.
+ */
+typedef struct croupier_texture {
+  /*
+   First texel among those of all textures.
+   */
+  uint32_t first;
+  /*
+   Columns, at least 1.
+   */
+  uint32_t width;
+  /*
+   Rows, at least 1.
+   */
+  uint32_t height;
+  /*
+   Of textures of principled materials: 1 if red, green and blue are numbers and not sRGB, plus 2 (clamped) or 4 (mirrored)
+   along u, plus 8 or 16 along v. Others have 0.
+   */
+  uint32_t flags;
+} croupier_texture;
+
+/*
+ A medium, which fills the inside of the surfaces whose material refers to it. Coefficients are per unit length.
+ */
+typedef struct croupier_medium {
+  /*
+   0: homogeneous. 1, a density grid, is baked only.
+   */
+  uint32_t kind;
+  /*
+   Absorption coefficient.
+   */
+  float sigma_a[3];
+  /*
+   Scattering coefficient.
+   */
+  float sigma_s[3];
+  /*
+   Emitted radiance: the source per unit length is sigma_a * emission.
+   */
+  float emission[3];
+  /*
+   Mean cosine of the phase function, -0.99 to 0.99, positive forwards.
+   */
+  float g;
+  /*
+   Grids: smallest corner; else 0.
+   */
+  float bounds_min[3];
+  /*
+   Grids: largest corner; else 0.
+   */
+  float bounds_max[3];
+  /*
+   Grids: cells along x, y, z; else 0.
+   */
+  uint32_t cells[3];
+  /*
+   Grids: first density; else 0.
+   */
+  uint32_t first_density;
+  /*
+   Grids: first majorant; else 0.
+   */
+  uint32_t first_majorant;
+  /*
+   0.
+   */
+  uint32_t reserved[2];
+} croupier_medium;
+
+/*
+ A light of a scene. Colours are linear Rec. 709.
+ */
+typedef struct croupier_light {
+  /*
+   croupier_light_kind; cannot change.
+   */
+  uint32_t kind;
+  /*
+   Area: index of the triangle; cannot change. Sphere, rectangle, disk: 1 if it emits to both sides, plus 2 if camera
+   rays do not see it.
+   */
+  uint32_t triangle;
+  /*
+   Area: area of the triangle, world units squared; cannot change.
+   */
+  float area;
+  /*
+   Area: 1 + index of the world's instance that the triangle is in, or 0; cannot change.
+   */
+  uint32_t instance;
+  /*
+   Point, spot: position. Sphere, rectangle, disk: middle. Directional, sun: unit direction towards the light.
+   */
+  float vector[3];
+  /*
+   Area, sphere, rectangle, disk: radiance. Point: intensity. Spot: intensity on the axis. Directional, sun: irradiance on
+   a facing surface. Up to 1e18.
+   */
+  float emission[3];
+  /*
+   Spot: unit axis, 1 - cos of the outer and of the inner half angle, 0. Sun: 1 - cos of its angular radius, then 0.
+   Sphere: radius, then 0. Rectangle: two halves of edges. Disk: unit normal, radius, 0, 0. Others: 0.
+   */
+  float params[6];
+} croupier_light;
+
+/*
+ Arrays that make up a scene. Those that are not needed are null, with a count of 0. Lengths are in the scene's unit,
+ emission is linear Rec. 709. The arrays are read while a call that takes this struct runs, and not afterwards.
+ */
+typedef struct croupier_arrays {
+  /*
+   sizeof(croupier_arrays), set by the program.
+   */
+  uint32_t struct_size;
+  /*
+   Path segments from the camera, a default for the settings; 0 stands for 40.
+   */
+  uint32_t max_depth;
+  /*
+   Camera, see croupier_camera_from_view.
+   */
+  const struct croupier_camera *camera;
+  /*
+   Positions of vertices, world space, each coordinate up to 1e9 as a magnitude.
+   */
+  const float (*positions)[3];
+  /*
+   Normals of vertices, of any length, or null: all triangles are flat. Triangles with a vertex whose normal is 0 are flat.
+   */
+  const float (*normals)[3];
+  /*
+   Texture coordinates of vertices, v upwards, or null.
+   */
+  const float (*uvs)[2];
+  /*
+   Number of vertices.
+   */
+  size_t vertices;
+  /*
+   Vertices of triangles, counter-clockwise seen from the front. Triangles without an area are left out.
+   */
+  const uint32_t (*triangles)[3];
+  /*
+   Materials of triangles, or null: all have material 0.
+   */
+  const uint32_t *triangle_materials;
+  /*
+   Number of triangles.
+   */
+  size_t triangle_count;
+  /*
+   Materials, see croupier_material_init. fdr of plastics may be 0, and the table of rough ones CROUPIER_NONE: they are
+   computed then.
+   */
+  const struct croupier_material *materials;
+  /*
+   Radiance that the triangles of each material emit from their front, or null: none emit.
+   */
+  const float (*emission)[3];
+  /*
+   Number of materials.
+   */
+  size_t material_count;
+  /*
+   Tables that materials refer to.
+   */
+  const float *tables;
+  /*
+   Number of their entries.
+   */
+  size_t table_count;
+  /*
+   Names of materials, UTF-8, each ended by a newline.
+   */
+  const uint8_t *names;
+  /*
+   Bytes of names.
+   */
+  size_t names_size;
+  /*
+   Textures.
+   */
+  const struct croupier_texture *textures;
+  /*
+   Number of textures.
+   */
+  size_t texture_count;
+  /*
+   Texels of textures: bytes red, green, blue, alpha from the lowest on; row 0 is the top.
+   */
+  const uint32_t *texels;
+  /*
+   Number of texels.
+   */
+  size_t texel_count;
+  /*
+   Homogeneous media, those of higher priority first.
+   */
+  const struct croupier_medium *media;
+  /*
+   Number of media.
+   */
+  size_t medium_count;
+  /*
+   Lights that are no triangles, see croupier_light_from_source. In the scene they follow those of the triangles: first those
+   without a shape, then the environment, then those with one.
+   */
+  const struct croupier_light *lights;
+  /*
+   Number of these lights.
+   */
+  size_t light_count;
+  /*
+   croupier_surround.
+   */
+  uint32_t surround;
+  /*
+   Map: columns, 1 to 65536.
+   */
+  uint32_t map_width;
+  /*
+   Map: rows, 2 to 65536.
+   */
+  uint32_t map_height;
+  /*
+   Constant: radiance. Map: factor on all texels.
+   */
+  float radiance[3];
+  /*
+   Map: rows of the rotation from the map to the world.
+   */
+  float map_to_world[3][3];
+  /*
+   0.
+   */
+  uint32_t reserved;
+  /*
+   Map: radiance of its texels, the row towards +Y of the map first.
+   */
+  const float (*map)[3];
+} croupier_arrays;
+
+/*
+ Text about a failure, for people: what was wrong with which object, with numbers.
+ */
+typedef struct croupier_message {
+  /*
+   UTF-8, ended by a zero byte, cut off where it is too long. Empty after a call that succeeded.
+   */
+  char text[256];
+} croupier_message;
+
+/*
+ A camera by where it is and what it looks at, world space.
+ */
+typedef struct croupier_view {
+  /*
+   sizeof(croupier_view), set by the program.
+   */
+  uint32_t struct_size;
+  /*
+   croupier_camera_kind.
+   */
+  uint32_t kind;
+  /*
+   Position.
+   */
+  double origin[3];
+  /*
+   A point on the viewing axis.
+   */
+  double target[3];
+  /*
+   Upwards, not parallel to the axis.
+   */
+  double up[3];
+  /*
+   Perspective: full vertical field of view, degrees, above 0.001 and below 179.9. Orthographic: height of the picture, world
+   units. Panoramic: not read.
+   */
+  double extent;
+  /*
+   Columns, 1 to 65536.
+   */
+  uint32_t width;
+  /*
+   Rows, 1 to 65536.
+   */
+  uint32_t height;
+  /*
+   Radius of the lens, 0 for a pinhole.
+   */
+  float lens_radius;
+  /*
+   Distance of the plane in focus along the axis; not read without a lens.
+   */
+  float focus_distance;
+} croupier_view;
+
+/*
+ A light that is no triangle, in the units that people use. Members that its kind does not have are not read.
+ */
+typedef struct croupier_light_source {
+  /*
+   sizeof(croupier_light_source), set by the program.
+   */
+  uint32_t struct_size;
+  /*
+   croupier_light_kind, from CROUPIER_LIGHT_POINT on.
+   */
+  uint32_t kind;
+  /*
+   Point, spot: position. Sphere, rectangle, disk: middle.
+   */
+  float position[3];
+  /*
+   Directional, sun, spot: direction in which the light travels. Disk: normal of its front. Of any length but 0.
+   */
+  float direction[3];
+  /*
+   Point, spot: intensity. Directional, sun: irradiance of a facing surface. Sphere, rectangle, disk: radiance.
+   */
+  float emission[3];
+  /*
+   Rectangle: edges, at right angles; the front is where their cross product points.
+   */
+  float edges[2][3];
+  /*
+   Sphere, disk: radius.
+   */
+  float radius;
+  /*
+   Spot: half angle within which the intensity is full, degrees.
+   */
+  float inner_deg;
+  /*
+   Spot: half angle at which the intensity reaches 0, degrees.
+   */
+  float outer_deg;
+  /*
+   Sun: angular diameter, degrees.
+   */
+  float angle_deg;
+  /*
+   Sphere, rectangle, disk: not 0 if it emits from its back as well.
+   */
+  uint32_t two_sided;
+  /*
+   Sphere, rectangle, disk: not 0 if camera rays do not see it.
+   */
+  uint32_t hidden;
+} croupier_light_source;
+
+/*
+ The environment of a scene.
+ */
+typedef struct croupier_environment {
+  /*
+   sizeof(croupier_environment), set by the program.
+   */
+  uint32_t struct_size;
+  /*
+   0 for constant radiance, 1 for a map by latitude and longitude; cannot change.
+   */
+  uint32_t kind;
+  /*
+   Index of its light; cannot change.
+   */
+  uint32_t light;
+  /*
+   Columns of the map; cannot change.
+   */
+  uint32_t width;
+  /*
+   Rows of the map; cannot change.
+   */
+  uint32_t height;
+  /*
+   Rows of the rotation from the world to the map.
+   */
+  float to_local[3][3];
+  /*
+   Constant: radiance. Map: scale by channel.
+   */
+  float radiance[3];
+} croupier_environment;
 
 /*
  A texture with an affine map of its coordinates.
@@ -1350,6 +1653,53 @@ typedef struct croupier_parts {
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
+
+/*
+ Bytes that croupier_scene_compose needs: of the blob (what always suffices; most take a third of it), and of intermediate
+ results. CROUPIER_COMPOSE, with the record and the number that are wrong in the message, if the arrays make no scene.
+ */
+croupier_status croupier_scene_compose_size(const struct croupier_arrays *arrays,
+                                            size_t *blob_size,
+                                            size_t *scratch_size,
+                                            struct croupier_message *message);
+
+/*
+ Builds a scene of arrays: its tree of triangles, its tables, everything that baking does. blob and scratch start at multiples
+ of CROUPIER_ALIGN and overlap neither each other nor an array. *length becomes the blob's own length: blob and length are
+ what croupier_scene_init takes. scratch is the program's again. Takes a time that grows with the triangles times their
+ logarithm. CROUPIER_COMPOSE as of croupier_scene_compose_size.
+ */
+croupier_status croupier_scene_compose(const struct croupier_arrays *arrays,
+                                       void *blob,
+                                       size_t blob_size,
+                                       void *scratch,
+                                       size_t scratch_size,
+                                       size_t *length,
+                                       struct croupier_message *message);
+
+/*
+ Fills in a material: its kind (croupier_material_kind), and what no material of the kind has. CROUPIER_RANGE if there is no
+ such kind.
+ */
+croupier_status croupier_material_init(struct croupier_material *material,
+                                       uint32_t kind,
+                                       struct croupier_message *message);
+
+/*
+ The camera of a view, for croupier_arrays and croupier_scene_set_camera. CROUPIER_RANGE, with the number in the message, if
+ there is none.
+ */
+croupier_status croupier_camera_from_view(const struct croupier_view *view,
+                                          struct croupier_camera *camera,
+                                          struct croupier_message *message);
+
+/*
+ The record of a light, for croupier_arrays and croupier_scene_set_light. A black one is kept: it may light up later.
+ CROUPIER_RANGE, with the number in the message, if there is none.
+ */
+croupier_status croupier_light_from_source(const struct croupier_light_source *source,
+                                           struct croupier_light *light,
+                                           struct croupier_message *message);
 
 /*
  Replaces the camera. CROUPIER_EDIT, with the number that is wrong in the message, if it breaks a rule of scenes; the scene

@@ -7,6 +7,7 @@ use crate::records::{Mirror, croupier_camera, croupier_environment, croupier_lig
 use crate::records::{croupier_material, croupier_principled};
 use crate::scene::{croupier_scene, scene_at};
 use crate::status::croupier_status::{self, *};
+use bytemuck::Pod;
 use core::ffi::c_void;
 use croupier::unstable::accel::Primitive;
 use croupier::{EditError, SceneEdit};
@@ -35,6 +36,15 @@ unsafe fn edit<T>(
     change(&mut round)
 }
 
+/// A record of the caller's as the core has it.
+///
+/// # Safety
+/// The caller's promise.
+unsafe fn record<R: Pod, T: Pod>(record: *const R, about: &'static str) -> Result<T, Fault> {
+    let [record] = promised!(array(record, 1, about))? else { return Err(Fault::new(CROUPIER_NULL, about)) };
+    Ok(bytemuck::cast(*record))
+}
+
 /// Replaces the camera. CROUPIER_EDIT, with the number that is wrong in the message, if it breaks a rule of scenes; the scene
 /// is as before then. As after every edit, sessions of the scene need croupier_session_change_scene before they step again.
 #[unsafe(no_mangle)]
@@ -59,7 +69,7 @@ pub unsafe extern "C" fn croupier_scene_set_light(
     message: *mut croupier_message,
 ) -> croupier_status {
     answer!(message, Failure<EditError>, {
-        let light = promised!(read_struct(light))?.to_core();
+        let light = promised!(record(light, "light"))?;
         promised!(edit(scene, |round| Ok(round.light(index, light)?)))
     })
 }
@@ -111,7 +121,7 @@ pub unsafe extern "C" fn croupier_scene_set_material(
     message: *mut croupier_message,
 ) -> croupier_status {
     answer!(message, Failure<EditError>, {
-        let material = promised!(read_struct(material))?.to_core();
+        let material = promised!(record(material, "material"))?;
         let tables = promised!(array(tables, count, "tables"))?;
         promised!(edit(scene, |round| Ok(round.material(index, material, tables)?)))
     })
@@ -127,7 +137,7 @@ pub unsafe extern "C" fn croupier_scene_set_principled(
     message: *mut croupier_message,
 ) -> croupier_status {
     answer!(message, Failure<EditError>, {
-        let material = promised!(read_struct(material))?.to_core();
+        let material = promised!(record(material, "material"))?;
         let record = promised!(read_struct(principled))?.to_core();
         promised!(edit(scene, |round| Ok(round.principled(index, material, record)?)))
     })

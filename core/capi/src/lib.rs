@@ -24,13 +24,14 @@
 //! | `records` | the structs of the header |
 //! | `parts` | callbacks: intersectors, ray sources |
 //! | `kernels` | the kernels that callbacks choose |
-//! | `version`, `settings`, `plan`, `scene`, `edit`, `session`, `picture`, `learned`, `shard` | the functions |
+//! | `version`, `settings`, `plan`, `compose`, `scene`, `edit`, `session`, `picture`, `learned`, `shard` | the functions |
 #![no_std]
 #![deny(clippy::expect_used, clippy::panic, clippy::unreachable, clippy::unwrap_used)]
 #![deny(clippy::indexing_slicing, clippy::arithmetic_side_effects)]
 #![expect(non_camel_case_types, reason = "types have the names that C sees")]
 #![expect(clippy::missing_safety_doc, reason = "one promise for all functions: see the documentation of the crate")]
 
+mod compose;
 mod edit;
 mod fault;
 mod guarded;
@@ -48,6 +49,7 @@ mod shard;
 mod status;
 mod version;
 
+pub use compose::*;
 pub use edit::*;
 pub use fault::croupier_message;
 pub use learned::*;

@@ -48,10 +48,22 @@ macro_rules! mirrors {
 
 mirrors! {
     croupier_camera = Camera, 72, "camera";
-    croupier_light = Light, 68, "light";
-    croupier_material = Material, 68, "material";
     croupier_principled = PrincipledRecord, 544, "principled";
     croupier_environment = Environment, 68, "environment";
+}
+
+/// Records that are in arrays have no size of their own: they have the layout of the blob's version.
+macro_rules! records {
+    ($($record:ident = $core:ident;)*) => {
+        $(const _: () = assert!(size_of::<$record>() == size_of::<blob::$core>());)*
+    };
+}
+
+records! {
+    croupier_light = Light;
+    croupier_material = Material;
+    croupier_texture = Texture;
+    croupier_medium = Medium;
 }
 
 /// Projections of a camera.
@@ -125,8 +137,6 @@ pub enum croupier_light_kind {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct croupier_light {
-    /// sizeof(croupier_light), set by the program.
-    pub struct_size: u32,
     /// croupier_light_kind; cannot change.
     pub kind: u32,
     /// Area: index of the triangle; cannot change. Sphere, rectangle, disk: 1 if it emits to both sides, plus 2 if camera
@@ -178,8 +188,6 @@ pub enum croupier_material_kind {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct croupier_material {
-    /// sizeof(croupier_material), set by the program.
-    pub struct_size: u32,
     /// croupier_material_kind.
     pub kind: u32,
     /// 1 if both sides behave like the front, plus 2 if the texture's alpha is the share of light that meets the surface,
@@ -202,6 +210,49 @@ pub struct croupier_material {
     pub k: [f32; 3],
     /// Index of the medium behind the front side, or CROUPIER_NONE.
     pub medium: u32,
+}
+
+/// A texture of a scene.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct croupier_texture {
+    /// First texel among those of all textures.
+    pub first: u32,
+    /// Columns, at least 1.
+    pub width: u32,
+    /// Rows, at least 1.
+    pub height: u32,
+    /// Of textures of principled materials: 1 if red, green and blue are numbers and not sRGB, plus 2 (clamped) or 4 (mirrored)
+    /// along u, plus 8 or 16 along v. Others have 0.
+    pub flags: u32,
+}
+
+/// A medium, which fills the inside of the surfaces whose material refers to it. Coefficients are per unit length.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct croupier_medium {
+    /// 0: homogeneous. 1, a density grid, is baked only.
+    pub kind: u32,
+    /// Absorption coefficient.
+    pub sigma_a: [f32; 3],
+    /// Scattering coefficient.
+    pub sigma_s: [f32; 3],
+    /// Emitted radiance: the source per unit length is sigma_a * emission.
+    pub emission: [f32; 3],
+    /// Mean cosine of the phase function, -0.99 to 0.99, positive forwards.
+    pub g: f32,
+    /// Grids: smallest corner; else 0.
+    pub bounds_min: [f32; 3],
+    /// Grids: largest corner; else 0.
+    pub bounds_max: [f32; 3],
+    /// Grids: cells along x, y, z; else 0.
+    pub cells: [u32; 3],
+    /// Grids: first density; else 0.
+    pub first_density: u32,
+    /// Grids: first majorant; else 0.
+    pub first_majorant: u32,
+    /// 0.
+    pub reserved: [u32; 2],
 }
 
 /// A texture with an affine map of its coordinates.

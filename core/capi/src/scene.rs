@@ -167,7 +167,13 @@ pub unsafe extern "C" fn croupier_scene_light(
     light: *mut croupier_light,
     message: *mut croupier_message,
 ) -> croupier_status {
-    answer!(message, Fault, { promised!(show(scene, light, index, |s| s.lights.get(index as usize).copied())) })
+    answer!(message, Fault, {
+        let data = promised!(scene_at(scene))?.read()?;
+        let found = data.scene.scene().lights.get(index as usize).copied();
+        let found = found.ok_or(Fault::new(CROUPIER_RANGE, "light").at(index.into()))?;
+        promised!(output(light, "light"))?.set(bytemuck::cast(found));
+        Ok(())
+    })
 }
 
 /// Material index as it is. CROUPIER_RANGE if there is none.
@@ -178,7 +184,13 @@ pub unsafe extern "C" fn croupier_scene_material(
     material: *mut croupier_material,
     message: *mut croupier_message,
 ) -> croupier_status {
-    answer!(message, Fault, { promised!(show(scene, material, index, |s| s.materials.get(index as usize).copied())) })
+    answer!(message, Fault, {
+        let data = promised!(scene_at(scene))?.read()?;
+        let found = data.scene.scene().materials.get(index as usize).copied();
+        let found = found.ok_or(Fault::new(CROUPIER_RANGE, "material").at(index.into()))?;
+        promised!(output(material, "material"))?.set(bytemuck::cast(found));
+        Ok(())
+    })
 }
 
 /// What principled material index has besides croupier_scene_material. CROUPIER_RANGE if there is none, or it is of another
