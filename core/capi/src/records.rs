@@ -32,7 +32,10 @@ macro_rules! mirrors {
     ($($mirror:ident = $core:ident, $bytes:literal, $name:literal;)*) => {$(
         // SAFETY: `repr(C)` and Pod, begins with its size.
         unsafe impl Versioned for $mirror {
-            const FIRST: u32 = $bytes;
+            const FIRST: u32 = {
+                assert!($bytes <= size_of::<Self>());
+                $bytes
+            };
             const NAME: &'static str = $name;
 
             fn empty() -> Self {
@@ -48,7 +51,7 @@ macro_rules! mirrors {
 
 mirrors! {
     croupier_camera = Camera, 72, "camera";
-    croupier_principled = PrincipledRecord, 544, "principled";
+    croupier_principled = PrincipledRecord, 536, "principled";
     croupier_environment = Environment, 68, "environment";
 }
 

@@ -105,6 +105,11 @@ impl OwnScene {
         ok!(croupier_scene_init(object.pointer(), object.len(), blob.pointer(), blob.len(), &raw mut handle));
         Self { object, blob, handle }
     }
+
+    /// Address of the blob.
+    pub fn blob_at(&self) -> *mut c_void {
+        self.blob.0.as_ptr().cast_mut().cast()
+    }
 }
 
 pub fn set(settings: &mut croupier_settings, name: &str, value: &str) {
