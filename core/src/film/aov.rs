@@ -242,6 +242,16 @@ impl<'m> AovSums<'m> {
         Self { layout, values }
     }
 
+    /// All values.
+    pub(crate) fn bytes(&self) -> &[u8] {
+        bytemuck::cast_slice(self.values)
+    }
+
+    /// All values, to be changed.
+    pub(crate) fn bytes_mut(&mut self) -> &mut [u8] {
+        bytemuck::cast_slice_mut(self.values)
+    }
+
     /// Values of a pixel; none if there are none.
     #[inline]
     pub(crate) fn row(&self, pixel: usize) -> &[f32] {
@@ -321,6 +331,16 @@ impl<'m> AovPlanes<'m> {
     /// Value of a pixel, 0 where there is none.
     fn value(&self, aov: Aov, channel: usize, pixel: usize) -> f64 {
         self.plane(aov, channel).and_then(|p| p.get(pixel)).map_or(0.0, |x| f64::from(*x))
+    }
+
+    /// Number of planes.
+    pub(crate) fn planes(&self) -> usize {
+        self.layout.planes
+    }
+
+    /// Does the plane hold indices?
+    pub(crate) fn is_index(&self, plane: usize) -> bool {
+        self.layout.is_id(plane)
     }
 
     pub(crate) fn is_empty(&self) -> bool {
