@@ -1018,6 +1018,17 @@ typedef struct croupier_transform {
 } croupier_transform;
 
 /*
+ What a render needs: settings that were checked, and sizes. Its members are the library's; the struct may be copied.
+ Threads may read it at the same time. Sessions and shards have what they need of it and do not refer to it.
+ */
+typedef struct croupier_plan {
+  /*
+   Not for programs.
+   */
+  uint64_t opaque[128];
+} croupier_plan;
+
+/*
  A pixel of the picture so far. Linear Rec. 709.
  */
 typedef struct croupier_pixel {
@@ -1311,17 +1322,6 @@ typedef struct croupier_hits8 {
    */
   uint32_t instance[2][8];
 } croupier_hits8;
-
-/*
- What a render needs: settings that were checked, and sizes. Its members are the library's; the struct may be copied.
- Threads may read it at the same time. Sessions and shards have what they need of it and do not refer to it.
- */
-typedef struct croupier_plan {
-  /*
-   Not for programs.
-   */
-  uint64_t opaque[128];
-} croupier_plan;
 
 /*
  Settings of a render. Its members are the library's; the struct may be copied. Threads may read it at the same time.
@@ -1799,6 +1799,47 @@ croupier_status croupier_scene_rebuild(struct croupier_scene *scene,
  */
 croupier_status croupier_scene_seal(struct croupier_scene *scene,
                                     struct croupier_message *message);
+
+/*
+ Most bytes that croupier_shard_save writes of shard index, in any iteration. CROUPIER_RANGE if the plan has fewer shards.
+ */
+croupier_status croupier_plan_saved_shard_size(const struct croupier_plan *plan,
+                                               uint32_t index,
+                                               size_t *bytes,
+                                               struct croupier_message *message);
+
+/*
+ Writes what the end of an iteration reads of a finished shard, for croupier_shard_load of another process; *written becomes
+ the number of bytes. Equal sums give equal bytes. CROUPIER_UNFINISHED if the shard has not finished an iteration,
+ CROUPIER_SIZE if there is too little room; nothing is written then.
+ */
+croupier_status croupier_shard_save(const struct croupier_shard *shard,
+                                    void *bytes,
+                                    size_t size,
+                                    size_t *written,
+                                    struct croupier_message *message);
+
+/*
+ Takes the place of the shard that croupier_shard_save has written: joins the iteration of the session with its sums,
+ finished. Sessions of several processes that begin the same iterations and end each with all shards have the same picture
+ and the same statistics to the bit. CROUPIER_PLAN or CROUPIER_SAVED, with the reason in the message, if the bytes are of
+ another scene, plan, shard, iteration or version, or damaged; the shard is as before then.
+ */
+croupier_status croupier_shard_load(struct croupier_shard *shard,
+                                    const struct croupier_session *session,
+                                    const void *bytes,
+                                    size_t size,
+                                    struct croupier_message *message);
+
+/*
+ Goes on as if so many iterations, of so many camera samples per pixel in all, had been before: for one picture in parts
+ that are rendered apart and added afterwards. Parts with other numbers of iterations and disjoint ranges of samples are
+ independent. CROUPIER_ITERATION if one has begun since the picture did.
+ */
+croupier_status croupier_session_skip(struct croupier_session *session,
+                                      uint64_t iterations,
+                                      uint32_t samples,
+                                      struct croupier_message *message);
 
 /*
  Bytes that croupier_session_save_statistics writes. CROUPIER_ABSENT if the strategy learns nothing of the scene.

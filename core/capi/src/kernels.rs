@@ -10,7 +10,8 @@ use croupier::unstable::light::PowerSelector;
 use croupier::unstable::profile::Full;
 use croupier::unstable::scene::blob::NONE;
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
-use croupier::{Budget, Plan, Scene, Session, SessionBuilder, SessionError, SessionState, Shard, StepResult};
+use croupier::{Budget, Plan, SavedShardError, Scene, Session, SessionBuilder, SessionError, SessionState};
+use croupier::{Shard, StepResult};
 
 /// What a kernel does.
 pub(crate) struct Kernel {
@@ -20,11 +21,14 @@ pub(crate) struct Kernel {
     pub step: fn(Scene<'_>, &croupier_parts, &State, &mut Shard<'static>, Budget) -> Result<StepResult, SessionError>,
     /// Goes over to another state of the scene.
     pub change: fn(Scene<'_>, &croupier_parts, &mut State, bool) -> Result<(), SessionError>,
+    /// Takes saved bytes into a shard.
+    pub load: fn(Scene<'_>, &croupier_parts, &State, &mut Shard<'static>, &[u8]) -> Loaded,
     /// Has the shard stepped in the iteration of the session?
     pub has_joined: fn(Scene<'_>, &croupier_parts, &State, &Shard<'static>) -> bool,
 }
 
 pub(crate) type State = SessionState<'static>;
+pub(crate) type Loaded = Result<Result<(), SavedShardError>, SessionError>;
 pub(crate) type Started = Result<State, SessionError>;
 
 impl Kernel {
@@ -70,6 +74,10 @@ const fn of<K: Parts>() -> Kernel {
             Ok(shard.step(&view, budget))
         },
         change: |scene, host, state, keep| state.change_scene(&builder::<K>(scene, host), keep),
+        load: |scene, host, state, shard, bytes| {
+            let view = builder::<K>(scene, host).view(state)?;
+            Ok(shard.load(&view, bytes))
+        },
         has_joined: |scene, host, state, shard| {
             builder::<K>(scene, host).view(state).is_ok_and(|view| shard.has_joined(&view))
         },

@@ -24,7 +24,7 @@
 //! | `records` | the structs of the header |
 //! | `parts` | callbacks: intersectors, ray sources |
 //! | `kernels` | the kernels that callbacks choose |
-//! | `version`, `settings`, `plan`, `compose`, `scene`, `edit`, `session`, `picture`, `learned`, `shard` | the functions |
+//! | `version`, `settings`, `plan`, `compose`, `scene`, `edit`, `session`, `picture`, `learned`, `shard`, `exchange` | the functions |
 #![no_std]
 #![deny(clippy::expect_used, clippy::panic, clippy::unreachable, clippy::unwrap_used)]
 #![deny(clippy::indexing_slicing, clippy::arithmetic_side_effects)]
@@ -33,6 +33,7 @@
 
 mod compose;
 mod edit;
+mod exchange;
 mod fault;
 mod guarded;
 mod kernels;
@@ -51,6 +52,7 @@ mod version;
 
 pub use compose::*;
 pub use edit::*;
+pub use exchange::*;
 pub use fault::croupier_message;
 pub use learned::*;
 pub use parts::*;

@@ -53,7 +53,10 @@ fn null_and_misaligned_pointers() {
     let render = Render::new(own.handle, &planned, None);
     fails!(CROUPIER_NULL, croupier_session_rgb(render.session, ptr::null_mut(), 3 * render.pixels));
     fails!(CROUPIER_NULL, croupier_session_finish_iteration(render.session, ptr::null(), 1, 1, &raw mut more));
-    fails!(CROUPIER_NULL, croupier_session_finish_iteration(render.session, [ptr::null_mut()].as_ptr(), 1, 1, &raw mut more));
+    fails!(
+        CROUPIER_NULL,
+        croupier_session_finish_iteration(render.session, [ptr::null_mut()].as_ptr(), 1, 1, &raw mut more)
+    );
     fails!(CROUPIER_NULL, croupier_scene_set_camera(own.handle, ptr::null()));
     fails!(CROUPIER_NULL, croupier_scene_set_light(own.handle, 0, ptr::null()));
     fails!(CROUPIER_NULL, croupier_session_init_with(at, room, &planned, own.handle, ptr::null(), ptr::null_mut()));
@@ -100,7 +103,8 @@ fn wrong_sizes() {
 fn structs_of_other_versions() {
     let own = OwnScene::new(&common::baked());
     let planned = plan(&settings(own.handle, 1));
-    let mut sizes = [croupier_sizes { struct_size: 0, width: 9, height: 9, shards: 9, session: 9, shard: 9, stack: 9 }; 2];
+    let mut sizes =
+        [croupier_sizes { struct_size: 0, width: 9, height: 9, shards: 9, session: 9, shard: 9, stack: 9 }; 2];
     for size in [0, 1, 36, 39, 41, (1 << 16) + 4, u32::MAX] {
         sizes[0].struct_size = size;
         fails!(CROUPIER_STRUCT_SIZE, croupier_plan_sizes(&planned, &raw mut sizes[0]));
@@ -152,7 +156,13 @@ fn stale_and_foreign_handles() {
     let mut other = common::baked();
     let light = croupier::Scene::from_bytes(&other).expect("a scene").lights.len();
     assert!(light > 0);
-    ok!(croupier_scene_init(own.object.pointer(), own.object.len(), own.blob.pointer(), own.blob.len(), &raw mut own.handle));
+    ok!(croupier_scene_init(
+        own.object.pointer(),
+        own.object.len(),
+        own.blob.pointer(),
+        own.blob.len(),
+        &raw mut own.handle
+    ));
     ok!(croupier_shard_step(shard, session, 100, &raw mut more));
     let mut camera = croupier_camera { struct_size: 72, ..bytemuck::Zeroable::zeroed() };
     ok!(croupier_scene_camera(own.handle, &raw mut camera));
@@ -184,7 +194,14 @@ fn calls_at_the_wrong_time() {
     let finish = |shards: &[*mut croupier_shard], more: &mut u32| {
         // SAFETY: of live objects.
         unsafe {
-            croupier_session_finish_iteration(two.session, shards.as_ptr(), shards.len(), 1 << 40, more, ptr::null_mut())
+            croupier_session_finish_iteration(
+                two.session,
+                shards.as_ptr(),
+                shards.len(),
+                1 << 40,
+                more,
+                ptr::null_mut(),
+            )
         }
     };
     fails!(CROUPIER_ITERATION, croupier_shard_step(two.shards[0], two.session, 10, &raw mut more));
@@ -214,7 +231,10 @@ fn calls_at_the_wrong_time() {
     let mut handle = ptr::dangling_mut();
     let mut block = Block::new(1 << 20);
     let planned = plan(&seeded);
-    fails!(CROUPIER_NOT_SUSPENDED, croupier_session_resume(block.pointer(), 1 << 20, &planned, own.handle, &raw mut handle));
+    fails!(
+        CROUPIER_NOT_SUSPENDED,
+        croupier_session_resume(block.pointer(), 1 << 20, &planned, own.handle, &raw mut handle)
+    );
     assert!(handle.is_null());
     let mut handle = ptr::dangling_mut();
     fails!(CROUPIER_NOT_SUSPENDED, croupier_shard_resume(block.pointer(), 1 << 20, &planned, 0, &raw mut handle));

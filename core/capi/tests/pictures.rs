@@ -210,6 +210,48 @@ fn suspended_blocks_go_on_elsewhere() {
     assert_eq!(render.hash(), expected("A"));
 }
 
+/// Two processes that render half of the shards each have the picture of one. Killed by: a shard that is taken for another one,
+/// sums that are left out.
+#[test]
+fn processes_exchange_shards() {
+    let scene = OwnScene::new(&common::baked());
+    let plan = plan(&settings(scene.handle, 8));
+    let both = [(); 2].map(|()| Render::new(scene.handle, &plan, None));
+    let mut longest = 0;
+    ok!(croupier_plan_saved_shard_size(&plan, 0, &raw mut longest));
+    fails!(CROUPIER_RANGE, croupier_plan_saved_shard_size(&plan, 8, &raw mut longest));
+    let (mut bytes, mut written) = (vec![0u8; longest], 0);
+    for samples in [2, 2, 4] {
+        both.iter().for_each(|r| r.begin(samples));
+        for i in 0..8 {
+            let [from, to] = if i % 2 == 0 { [0, 1] } else { [1, 0] };
+            let (shard, other) = (both[from].shards[i], both[to].shards[i]);
+            let (p, n) = (bytes.as_mut_ptr().cast(), bytes.len());
+            fails!(CROUPIER_UNFINISHED, croupier_shard_save(shard, p, n, &raw mut written));
+            let mut more = 1;
+            while more != 0 {
+                ok!(croupier_shard_step(shard, both[from].session, 1000, &raw mut more));
+            }
+            fails!(CROUPIER_SIZE, croupier_shard_save(shard, p, 10, &raw mut written));
+            ok!(croupier_shard_save(shard, p, n, &raw mut written));
+            assert!(written > 0 && written <= n);
+            fails!(CROUPIER_SIZE, croupier_shard_load(other, both[to].session, p, written - 1));
+            bytes[written / 2] ^= 1;
+            fails!(CROUPIER_SAVED, croupier_shard_load(other, both[to].session, p, written));
+            bytes[written / 2] ^= 1;
+            let next = both[to].shards[(i + 1) % 8];
+            fails!(CROUPIER_SAVED, croupier_shard_load(next, both[to].session, p, written));
+            ok!(croupier_shard_load(other, both[to].session, p, written));
+        }
+        both.iter().for_each(|r| r.finish(u64::MAX));
+    }
+    assert_eq!(both.each_ref().map(Render::hash), [expected("B"); 2]);
+    fails!(CROUPIER_ITERATION, croupier_session_skip(both[0].session, 3, 8));
+    let apart = Render::new(scene.handle, &plan, None);
+    ok!(croupier_session_skip(apart.session, 3, 8));
+    assert_ne!(apart.render(1000, u64::MAX), expected("B"));
+}
+
 /// Statistics and estimate go out and come in. Killed by: bytes of another session that are not checked, a load that does
 /// nothing.
 #[test]

@@ -90,7 +90,9 @@ fn composed_scenes_render() {
 fn arrays_that_make_no_scene_are_refused() {
     let mut own = Arrays::of(&common::baked());
     let (mut n, mut m) = (0, 0);
-    let mut refused = |arrays: &croupier_arrays| fails!(CROUPIER_COMPOSE, croupier_scene_compose_size(arrays, &raw mut n, &raw mut m));
+    let mut refused = |arrays: &croupier_arrays| {
+        fails!(CROUPIER_COMPOSE, croupier_scene_compose_size(arrays, &raw mut n, &raw mut m))
+    };
     own.triangles[3][1] = 1 << 30;
     let text = refused(&own.arrays());
     assert!(text.contains('3'), "{text}");
@@ -124,7 +126,9 @@ fn views_and_light_sources_become_records() {
     ok!(croupier_scene_camera(baked.handle, &raw mut cameras[1]));
     let close = |a: [f32; 3], b: [f32; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
     let [a, b] = cameras;
-    assert!(close(a.origin, b.origin) && close(a.right, b.right) && close(a.down, b.down) && close(a.forward, b.forward));
+    assert!(
+        close(a.origin, b.origin) && close(a.right, b.right) && close(a.down, b.down) && close(a.forward, b.forward)
+    );
     view.up = [0.0, 0.0, 1.0];
     fails!(CROUPIER_RANGE, croupier_camera_from_view(&view, &raw mut cameras[0]));
     let mut source = croupier_light_source { struct_size: 92, ..bytemuck::Zeroable::zeroed() };
@@ -232,7 +236,10 @@ fn instances_move_and_hide() {
     map.iter_mut().for_each(|key| key[1][3] += 0.3);
     let moves = [croupier_transform { to_world: map }, croupier_transform { to_world: [[[f32::NAN; 4]; 3]; 2] }];
     let mut done = 9;
-    let text = fails!(CROUPIER_EDIT, croupier_scene_set_transforms(own.handle, [0, 0].as_ptr(), moves.as_ptr(), 2, &raw mut done));
+    let text = fails!(
+        CROUPIER_EDIT,
+        croupier_scene_set_transforms(own.handle, [0, 0].as_ptr(), moves.as_ptr(), 2, &raw mut done)
+    );
     assert!(done == 1 && text.contains("instance 0"), "{done}: {text}");
     assert_ne!(again(), first);
     let mut bytes = 0;
@@ -240,6 +247,12 @@ fn instances_move_and_hide() {
     let mut scratch = Block::new(bytes);
     fails!(CROUPIER_SIZE, croupier_scene_rebuild(own.handle, scratch.pointer(), bytes - 1));
     ok!(croupier_scene_rebuild(own.handle, scratch.pointer(), bytes));
-    ok!(croupier_scene_set_transforms(own.handle, [0].as_ptr(), &croupier_transform { to_world: instance.to_world }, 1, ptr::null_mut()));
+    ok!(croupier_scene_set_transforms(
+        own.handle,
+        [0].as_ptr(),
+        &croupier_transform { to_world: instance.to_world },
+        1,
+        ptr::null_mut()
+    ));
     assert_eq!(again(), first);
 }
