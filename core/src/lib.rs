@@ -32,6 +32,7 @@
 //! | `learn` | statistics by place and direction | materials, lights, how paths are traced |
 //! | `settings` | the caller's choices, their ranges | how they are followed |
 //! | `edit` | changes of a scene between frames | sessions, how paths are traced |
+//! | `compose` | whole scenes from arrays | sessions, how paths are traced |
 //! | `extension` | what hosts compute in place of the core | where it is used |
 //! | `world` | what paths read | who owns it |
 //! | `tracer` | packets, the refill ring, stages, books | files, threads, clocks |
@@ -76,6 +77,7 @@ mod accel;
 mod bits;
 mod bsdf;
 mod camera;
+mod compose;
 mod cost;
 mod counters;
 mod denoise;
@@ -147,6 +149,10 @@ pub mod unstable {
     /// Rays through pixels.
     pub mod camera {
         pub use crate::camera::*;
+    }
+    /// Scenes from arrays.
+    pub mod compose {
+        pub use crate::compose::*;
     }
     /// Counted cost of rays.
     pub mod cost {

@@ -1,6 +1,7 @@
 //! Scalar f64 oracles and statistics shared by the integration tests.
 
 pub mod allocator;
+pub mod arrays;
 pub mod blob;
 pub mod bsdf;
 pub mod cache;

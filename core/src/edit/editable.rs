@@ -68,7 +68,7 @@ impl<B: AsRef<[u8]>> EditableScene<B> {
         let sections = Sections::assume_sound(self.table, self.bytes.as_ref());
         let records = Scene::records(&sections);
         let changed = |records| Records { effects: self.effects, hash: self.identity, ..records };
-        Scene::assume_valid(records.map_or(NOTHING, changed))
+        Scene::assume_valid(records.map_or(Records::NOTHING, changed))
     }
 
     /// The bytes as they are now; see [`Self::into_bytes`].
@@ -139,58 +139,6 @@ fn sky(scene: &Records<'_>) -> [f64; 3] {
     }
     sum
 }
-
-/// Radius of a sphere around the scene as the baker takes it.
-fn radius(scene: &Records<'_>) -> f64 {
-    let extent = |a: usize| {
-        let side = |p: &[f32; 3]| p.get(a).copied().map_or(0.0, f64::from);
-        side(&scene.info.bounds_max) - side(&scene.info.bounds_min)
-    };
-    let [x, y, z] = [extent(0), extent(1), extent(2)];
-    let square = (x * x + y * y + z * z) / 4.0;
-    if square > 0.0 { crate::film::SqrtNewton::sqrt_newton(square) } else { 1.0 }
-}
-
-/// What a container shows that has lost its bytes.
-const NOTHING: Records<'static> = {
-    const INFO: &SceneInfo =
-        &SceneInfo { bounds_min: [0.0; 3], bounds_max: [0.0; 3], max_depth: 1, dropped_triangles: 0 };
-    const CAMERA: &Camera = &Camera {
-        origin: [0.0; 3],
-        forward: [0.0, 0.0, -1.0],
-        right: [1.0, 0.0, 0.0],
-        down: [0.0, -1.0, 0.0],
-        lens_radius: 0.0,
-        focus_distance: 1.0,
-        size: [1, 1],
-        kind: CameraKind::Perspective as u32,
-    };
-    Records {
-        info: INFO,
-        nodes: &[],
-        leaves: &[],
-        triangles: &[],
-        vertices: &[],
-        materials: &[],
-        textures: &[],
-        texels: &[],
-        tables: &[],
-        lights: &[],
-        light_alias: &[],
-        environment: None,
-        env_texels: &[],
-        env_alias: &[],
-        camera: CAMERA,
-        media: &[],
-        densities: &[],
-        majorants: &[],
-        objects: &[],
-        instances: &[],
-        names: &[],
-        effects: Effects(0),
-        hash: 0,
-    }
-};
 
 /// A round of edits of an [`EditableScene`].
 #[derive(Debug)]
@@ -329,7 +277,7 @@ impl SceneEdit<'_> {
             channels.map(|((scale, integral), weight)| weight * f64::from(*scale) * integral).sum()
         };
         let environment = scene.environment.map_or(0.0, of_channel);
-        let extent = SceneExtent { radius: radius(&scene), environment };
+        let extent = SceneExtent { radius: light_table::radius(scene.info), environment };
         let range = |kind| self.table.whole(kind);
         let of = [SectionKind::LightAlias, SectionKind::Lights].map(range);
         let instances = range(SectionKind::Instances).unwrap_or(0..0);

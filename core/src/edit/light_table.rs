@@ -6,7 +6,8 @@
 //! picking does (NUMERICS SMP-3): every positive weight gets one of the 2^32 random numbers, the rest is distributed by
 //! rounding the running sum.
 
-use crate::scene::blob::Alias;
+use crate::film::SqrtNewton;
+use crate::scene::blob::{Alias, SceneInfo};
 
 /// Number of 32-bit random numbers.
 const RANGE: u64 = 1 << 32;
@@ -92,7 +93,7 @@ fn entry(i: u32, n: u32, keep: u64, alias: u32) -> Alias {
 
 /// Fills `table` for items with these weights, which are finite and not negative; whatever weight it has, an item of
 /// weight 0 is never picked. Without a positive weight nothing is ever picked: all probabilities are 0.
-pub(super) fn build(table: &mut [Alias], weight: impl Fn(u32) -> f64) {
+pub(crate) fn build(table: &mut [Alias], weight: impl Fn(u32) -> f64) {
     let n = u32::try_from(table.len()).unwrap_or(u32::MAX);
     for (item, alias) in (0..n).zip(table.iter_mut()) {
         *alias = Alias { threshold: u32::MAX, alias: item, probability: 0.0 };
@@ -131,6 +132,18 @@ pub(super) fn build(table: &mut [Alias], weight: impl Fn(u32) -> f64) {
             place.probability = (width as f64 / RANGE as f64) as f32;
         }
     }
+}
+
+/// Radius of a sphere around a scene, by which lights at infinity have power: half the diagonal of its bounds, 1 if it has no
+/// extent.
+pub(crate) fn radius(info: &SceneInfo) -> f64 {
+    let extent = |a: usize| {
+        let side = |p: &[f32; 3]| p.get(a).copied().map_or(0.0, f64::from);
+        side(&info.bounds_max) - side(&info.bounds_min)
+    };
+    let [x, y, z] = [extent(0), extent(1), extent(2)];
+    let square = (x * x + y * y + z * z) / 4.0;
+    if square > 0.0 { square.sqrt_newton() } else { 1.0 }
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@
 mod editable;
 mod error;
 mod instances;
-mod light_table;
+pub(crate) mod light_table;
 mod materials;
 
 pub use editable::{EditableScene, SceneEdit};

@@ -75,7 +75,8 @@ pub enum Field {
 }
 
 impl Field {
-    const fn name(self) -> &'static str {
+    /// Name of the field.
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Position => "position",
             Self::Direction => "direction (or its squared length)",

@@ -54,3 +54,46 @@ pub struct Records<'s> {
     /// [`content_hash`] of the blob.
     pub hash: u64,
 }
+
+impl Records<'_> {
+    /// An empty scene: what a container shows that has lost its bytes.
+    pub(crate) const NOTHING: Records<'static> = {
+        const INFO: &SceneInfo =
+            &SceneInfo { bounds_min: [0.0; 3], bounds_max: [0.0; 3], max_depth: 1, dropped_triangles: 0 };
+        const CAMERA: &Camera = &Camera {
+            origin: [0.0; 3],
+            forward: [0.0, 0.0, -1.0],
+            right: [1.0, 0.0, 0.0],
+            down: [0.0, -1.0, 0.0],
+            lens_radius: 0.0,
+            focus_distance: 1.0,
+            size: [1, 1],
+            kind: CameraKind::Perspective as u32,
+        };
+        Records {
+            info: INFO,
+            nodes: &[],
+            leaves: &[],
+            triangles: &[],
+            vertices: &[],
+            materials: &[],
+            textures: &[],
+            texels: &[],
+            tables: &[],
+            lights: &[],
+            light_alias: &[],
+            environment: None,
+            env_texels: &[],
+            env_alias: &[],
+            camera: CAMERA,
+            media: &[],
+            densities: &[],
+            majorants: &[],
+            objects: &[],
+            instances: &[],
+            names: &[],
+            effects: Effects(0),
+            hash: 0,
+        }
+    };
+}

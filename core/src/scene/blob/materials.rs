@@ -245,6 +245,25 @@ pub struct Material {
     pub medium: u32,
 }
 
+impl Material {
+    /// A material of this kind without texture, tables and medium; its numbers are 0, and those that the kind uses
+    /// ([`MaterialFacts::parameters`]) are still to be set.
+    pub const fn new(kind: MaterialKind) -> Self {
+        Self {
+            kind: kind as u32,
+            flags: 0,
+            texture: super::NONE,
+            table: super::NONE,
+            reflectance: [0.0; 3],
+            alpha: 0.0,
+            eta: [0.0; 3],
+            fdr: 0.0,
+            k: [0.0; 3],
+            medium: super::NONE,
+        }
+    }
+}
+
 /// Both sides behave like the front.
 pub const MATERIAL_TWO_SIDED: u32 = 1;
 /// The texture's alpha is the share of light that meets the surface; the rest passes straight through.

@@ -8,12 +8,14 @@ use crate::scene::{Effects, Records};
 
 /// Positions and texture coordinates are finite and not huge; normals are finite.
 pub(super) fn vertices(scene: &Records<'_>) -> Result<(), SceneError> {
-    for (at, v) in records(SectionKind::Vertices, scene.vertices) {
-        at.position(&v.p)?;
-        at.finite(Field::Direction, &v.n)?;
-        at.all_within(Field::TextureCoordinate, &v.uv, -MAX_COORDINATE, MAX_COORDINATE)?;
-    }
-    Ok(())
+    records(SectionKind::Vertices, scene.vertices).try_for_each(|(at, v)| vertex(at, v))
+}
+
+/// One vertex.
+pub(super) fn vertex(at: Record, v: &Vertex) -> Result<(), SceneError> {
+    at.position(&v.p)?;
+    at.finite(Field::Direction, &v.n)?;
+    at.all_within(Field::TextureCoordinate, &v.uv, -MAX_COORDINATE, MAX_COORDINATE)
 }
 
 /// Triangles refer to vertices, materials and lights that exist; smooth ones to unit normals. Returns the effects of

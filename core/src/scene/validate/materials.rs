@@ -29,6 +29,12 @@ pub(super) fn materials(scene: &Records<'_>) -> Result<(), SceneError> {
 
 /// One material.
 pub(super) fn material(scene: &Records<'_>, at: Record, m: &Material) -> Result<(), SceneError> {
+    let kind = parameters(scene, at, m)?;
+    tables(scene, at, m, kind)
+}
+
+/// One material but for its tables; its kind.
+pub(super) fn parameters(scene: &Records<'_>, at: Record, m: &Material) -> Result<MaterialKind, SceneError> {
     let kind = MaterialKind::from_u32(m.kind);
     let kind = kind.ok_or(SceneError::Kind { of: at.of, index: at.index(), found: m.kind })?;
     at.zero(m.flags & !MATERIAL_FLAGS == 0)?;
@@ -42,7 +48,7 @@ pub(super) fn material(scene: &Records<'_>, at: Record, m: &Material) -> Result<
     at.follow_if_any(SectionKind::Media, m.medium, scene.media)?;
     parameter(at, m, Parameter::Reflectance)?;
     kind.facts().parameters.iter().try_for_each(|p| parameter(at, m, *p))?;
-    tables(scene, at, m, kind)
+    Ok(kind)
 }
 
 /// The tables of a material, one behind the other from `table` on; a material without any refers to none.

@@ -65,6 +65,28 @@ pub(crate) mod single {
         environment::placement(e, brightest)
     }
 
+    /// A vertex of triangles that are flat or have unit normals.
+    pub(crate) fn vertex(index: u32, v: &Vertex) -> Result<(), SceneError> {
+        geometry::vertex(Record { of: SectionKind::Vertices, index: index as usize }, v)
+    }
+
+    /// A material that has no tables yet; its kind.
+    pub(crate) fn parameters(scene: &Records<'_>, index: u32, m: &Material) -> Result<MaterialKind, SceneError> {
+        materials::parameters(scene, Record { of: SectionKind::Materials, index: index as usize }, m)
+    }
+
+    /// Everything that materials refer to but their tables, and the names.
+    pub(crate) fn around_materials(scene: &Records<'_>) -> Result<(), SceneError> {
+        names(scene)?;
+        materials::textures(scene)?;
+        media::media(scene)
+    }
+
+    /// A radiance.
+    pub(crate) fn emission(of: SectionKind, index: u32, rgb: &[f32; 3]) -> Result<(), SceneError> {
+        Record { of, index: index as usize }.all_within(Field::Emission, rgb, 0.0, MAX_EMISSION)
+    }
+
     pub(crate) fn brightest(scene: &Records<'_>) -> [f32; 3] {
         environment::brightest(scene)
     }
