@@ -18,18 +18,18 @@ const REST = 160;
 /** Milliseconds in which a preview is to be done. */
 const PREVIEW = 45;
 /** Most pixels, CSS pixels otherwise. */
-const MOST_PIXELS = 330_000;
+const MOST_PIXELS = 300_000;
 
 const STRATEGIES = {
-  ears: ['#e7b65a', 'Learns where paths should end and where they should split, from the variance and cost of the picture (Rath et al. 2022).'],
-  adrrs: ['#6fb7e8', 'Weight windows around the learned expected contribution of a path (Vorba and Křivánek 2016).'],
-  classic: ['#8fcf9a', 'Paths survive in proportion to their throughput; no splitting, nothing learned.'],
-  none: ['#c99be0', 'Every path goes on to its largest depth.'],
+  ears: ['#e7b65a', 'Learns where paths should end and where split, for the least product of variance and cost.'],
+  adrrs: ['#6fb7e8', 'Learns what paths will bring, and ends or splits those that are too faint or too strong.'],
+  classic: ['#8fcf9a', 'Paths survive by throughput from the fifth bounce on. Nothing is learned, nothing splits.'],
+  none: ['#c99be0', 'Every path goes on to the scene’s largest depth.'],
 };
 const LEARNS = (rrs) => rrs === 'ears' || rrs === 'adrrs';
 
 const state = {
-  scene: null, blob: null, about: '', orbit: null,
+  scene: null, blob: null, about: '', gain: 1, orbit: null,
   rrs: 'ears', plane: 'picture', depth: 1, workers: 0, target: 0.01,
   size: [0, 0], moved: 0, moving: false, shownAt: 0, paints: 0,
 };
@@ -147,7 +147,7 @@ function paintPreview() {
   const { width, height } = preview.picture;
   const factors = state.plane === 'factors';
   const shown = preview.picture.show(factors ? plane() : PLANE.denoised) ?? preview.picture.show(PLANE.picture);
-  put($('preview'), painter.paint([shown], width, height, { factors }));
+  put($('preview'), painter.paint([shown], width, height, { factors, gain: state.gain }));
 }
 
 function frameFine(started) {
@@ -177,7 +177,7 @@ function frameCrowd(started) {
 function paint(pictures) {
   const shown = pictures.filter(Boolean);
   if (!shown.length) return;
-  put($('fine'), painter.paint(shown, ...state.size, { factors: state.plane === 'factors' }));
+  put($('fine'), painter.paint(shown, ...state.size, { factors: state.plane === 'factors', gain: state.gain }));
   $('fine').classList.add('there');
   state.shownAt = performance.now();
   document.documentElement.dataset.paints = ++state.paints;
@@ -261,15 +261,16 @@ function describe() {
   $('factors').hidden = state.plane !== 'factors';
   $('planes').querySelector('[data-plane=denoised]').disabled = !LEARNS(state.rrs);
   $('place').textContent = state.workers === 0
-    ? 'Traced on this page’s own thread, a few thousand rays in every frame.'
-    : `Each worker renders the same view with another seed in memory of its own; the page averages by samples. ${
-      state.workers > 1 ? 'What one learns the others do not know.' : 'The page stays free.'}`;
+    ? 'Between frames, on the page’s own thread.'
+    : state.workers === 1
+      ? 'In a worker, so that the page stays free.'
+      : 'Workers render the same view with seeds of their own and learn alone; the page averages their pictures.';
 }
 
 // --- what is asked for ------------------------------------------------------------------------------------------------
 
-function setScene(scene, blob, about) {
-  Object.assign(state, { scene, blob, about });
+function setScene(scene, blob, about, gain = 1) {
+  Object.assign(state, { scene, blob, about, gain });
   // the scene's own view
   preview.open(blob, { size: '16x16', rrs: 'classic' });
   state.orbit = new Orbit(preview.scene.view());
@@ -281,9 +282,9 @@ function setScene(scene, blob, about) {
 async function choose(scene) {
   if (scene === 'obj') return $('file').click();
   if (scene === 'box') {
-    setScene('box', await fetched('scenes/box.crp'), 'Cornell box, all diffuse, 32 triangles; baked on another machine.');
+    setScene('box', await fetched('scenes/box.crp'), 'Cornell box, baked on another machine.', 1.8);
   } else {
-    setScene('knot', knot(composer), 'Copper, gold and glazes under sun and sky; scene and tree made on this page just now.');
+    setScene('knot', knot(composer), 'Copper, gold and glazes; composed just now.');
   }
 }
 

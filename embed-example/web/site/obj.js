@@ -1,7 +1,7 @@
 // Positions and faces of an OBJ file: what a demonstration needs, and no more. Normals are smoothed where faces meet at
-// less than 40 degrees; materials, texture coordinates and the file's own normals are not read.
+// less than 30 degrees; materials, texture coordinates and the file's own normals are not read.
 
-const SMOOTH = Math.cos(40 * Math.PI / 180);
+const SMOOTH = Math.cos(30 * Math.PI / 180);
 
 /** @returns { positions, normals, triangles } flat arrays, one vertex for each corner */
 export function parseObj(text) {

@@ -4,27 +4,42 @@ import { Mesh, compose, copper, diffuse, glazed, gold } from './compose.js';
 import { parseObj } from './obj.js';
 
 const TAU = 2 * Math.PI;
+const GROUND = diffuse([0.075, 0.077, 0.085]);
 
-/** A sky that is warm and bright at the horizon in front of the camera's back, and dim below. */
+/** A dusky studio: dim all around, a large soft light from the upper left, a smaller one from behind at the right. */
 function sky() {
-  const [width, height] = [32, 33];
+  const [width, height] = [64, 33];
+  const lights = [
+    { from: unit([-0.75, 0.75, 0.35]), sharp: 9, rgb: [5.2, 4.7, 4.0] },
+    { from: unit([0.8, 0.32, -0.75]), sharp: 16, rgb: [1.5, 2.1, 2.9] },
+  ];
   const texels = [];
   for (let row = 0; row < height; row++) {
-    const y = Math.cos(Math.PI * row / (height - 1));
+    const [sin, y] = [Math.sin(Math.PI * row / (height - 1)), Math.cos(Math.PI * row / (height - 1))];
     for (let column = 0; column < width; column++) {
-      const towards = 0.5 + 0.5 * Math.cos(TAU * ((column + 0.5) / width) - 2.4);
-      const t = Math.sqrt(Math.max(y, 0));
-      const bright = y < -0.01 ? 0.1 : 0.75 - 0.35 * t + 0.5 * towards * (1 - t);
-      texels.push(bright * (1.06 - 0.5 * t), bright * (1.02 - 0.3 * t), bright * (1 + 0.12 * t));
+      // column u * width - 0.5, u = atan2(x, -z) / 2 pi
+      const angle = TAU * (column + 0.5) / width;
+      const d = [sin * Math.sin(angle), y, -sin * Math.cos(angle)];
+      const haze = y < -0.01 ? 0.04 : 0.075 - 0.055 * Math.sqrt(Math.max(y, 0));
+      for (let c = 0; c < 3; c++) {
+        const of = (l) => l.rgb[c] * Math.exp(l.sharp * (d[0] * l.from[0] + y * l.from[1] + d[2] * l.from[2] - 1));
+        texels.push(haze * [0.9, 1, 1.2][c] + lights.reduce((sum, l) => sum + of(l), 0));
+      }
     }
   }
   return { width, height, texels };
 }
 
-const sun = { direction: [-0.62, -0.66, -0.42], irradiance: [4.6, 4.2, 3.6], angle: 3 };
+const sun = { direction: [0.66, -0.7, -0.34], irradiance: [2.6, 2.35, 2.0], angle: 5 };
+
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+
+function unit(a) {
+  return a.map((x) => x / Math.hypot(...a));
+}
 
 /** View and light of the knot. */
-export const VIEW = { origin: [1.9, 1.75, 5.2], target: [0, 0.86, 0.1], fieldOfView: 28, sun, sky: sky() };
+export const VIEW = { origin: [1.9, 1.75, 5.2], target: [0, 0.87, 0.1], fieldOfView: 30, sun, sky: sky() };
 
 /** A level disk: nothing of it is seen as an edge. */
 function ground(mesh, material, y, radius) {
@@ -49,9 +64,7 @@ function surface(mesh, material, point, columns, rows) {
       const [p, du, dv] = [point(u, v), point(u + e, v), point(u, v + e)];
       const [a, b] = [du.map((x, k) => x - p[k]), dv.map((x, k) => x - p[k])];
       positions.push(...p);
-      const n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-      const length = Math.hypot(...n);
-      normals.push(...n.map((x) => x / length));
+      normals.push(...unit(cross(a, b)));
       const at = (x, y) => (x % columns) * rows + y % rows;
       triangles.push(at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j), at(i + 1, j + 1), at(i, j + 1));
     }
@@ -81,14 +94,12 @@ function ball(mesh, material, [x, y, z], radius) {
 /** A torus knot (2, 3) of copper that stands on two of its lobes, and balls. */
 export function knot(composer) {
   const mesh = new Mesh();
-  ground(mesh, diffuse([0.4, 0.385, 0.36]), 0, 60);
+  ground(mesh, GROUND, 0, 60);
   const scale = 0.34;
   const curve = (t) => {
     const [r, a] = [2 + Math.cos(3 * t), 2 * t + TAU / 4];
     return [r * Math.cos(a), r * Math.sin(a), Math.sin(3 * t)];
   };
-  const unit = (a) => a.map((x) => x / Math.hypot(...a));
-  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
   const tube = (u, v) => {
     const [p, next] = [curve(TAU * u), curve(TAU * u + 1e-3)];
     const tangent = unit(next.map((x, k) => x - p[k]));
@@ -118,7 +129,7 @@ export function fromObj(composer, text) {
   // as large as the knot, standing in the middle
   const scale = 2.6 / size;
   mesh.positions = mesh.positions.map((x, i) => (x - (i % 3 === 1 ? low[1] : middle[i % 3])) * scale);
-  ground(mesh, diffuse([0.4, 0.385, 0.36]), 0, 60);
+  ground(mesh, GROUND, 0, 60);
   const top = (high[1] - low[1]) * scale;
   const blob = compose(composer, mesh, { ...VIEW, origin: [2.3, top / 2 + 1.5, 5.4], target: [0, top / 2, 0] });
   return { blob, faces };
