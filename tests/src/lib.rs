@@ -36,3 +36,8 @@ pub mod walk;
 #[cfg(doctest)]
 #[doc = include_str!("../../README.md")]
 struct Readme;
+
+/// The Rust code for those who come from Embree, compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/FROM_EMBREE.md")]
+struct FromEmbree;
