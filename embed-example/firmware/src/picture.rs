@@ -6,8 +6,8 @@ use croupier::unstable::learn::{Learning, PixelEstimator};
 use croupier::unstable::profile::Custom;
 use croupier::unstable::rrs::Ears;
 use croupier::{
-    Budget, Film, Plan, Scene, SceneError, Session, SessionError, Settings, SettingsError, Shard, ShardError, StepResult,
-    Strategy,
+    Budget, Film, MemoryError, Plan, Scene, SceneError, Session, SessionError, Settings, SettingsError, Shard,
+    ShardError, StepResult, Strategy,
 };
 
 /// Kernels for the box: what it calls for, and no more. Scenes with other effects are refused.
@@ -23,9 +23,9 @@ pub const ITERATIONS: [u32; 3] = [2, 2, 4];
 pub const BETWEEN_TICKS: u64 = 48;
 
 /// Bytes of the session's block, [`Plan::session`]: a constant, because the memory is static. A test compares the two.
-pub const SESSION_BYTES: usize = 240 << 10;
+pub const SESSION_BYTES: usize = 206_144;
 /// Bytes of the shard's block, [`Plan::shard_of`]; as above.
-pub const SHARD_BYTES: usize = 240 << 10;
+pub const SHARD_BYTES: usize = 206_656;
 
 /// The scene's bytes.
 pub fn box_bytes() -> &'static [u8] {
@@ -69,6 +69,15 @@ impl Failure {
             Self::Settings(_) => "settings",
             Self::Session(_) => "session",
             Self::Shard(_) => "shard",
+        }
+    }
+
+    /// Bytes of the block that was too small; 0 if it is something else.
+    pub fn needed(&self) -> usize {
+        match self {
+            Self::Session(SessionError::Memory(MemoryError::TooSmall { needed, .. }))
+            | Self::Shard(ShardError::Memory(MemoryError::TooSmall { needed, .. })) => *needed,
+            _ => 0,
         }
     }
 }

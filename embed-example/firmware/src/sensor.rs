@@ -7,21 +7,28 @@ pub struct Sensor {
     pub ticks: u64,
     /// Most rays between two of them.
     pub most_rays: u64,
-    /// Most time between two of them, in the unit of the clock.
-    pub most_time: u32,
+    /// Most time between two of them in the unit of the clock: while rays are traced, and at the end of an iteration.
+    pub most_time: [u64; 2],
+    /// Time between the first and the last.
+    pub time: u64,
     rays: u64,
-    time: Option<u32>,
+    last: Option<u32>,
 }
 
 impl Sensor {
     /// Serves the sensor at the time `time` of a clock of 24 bits, after `rays` rays in all.
     pub fn serve(&mut self, rays: u64, time: u32) {
+        let rays_between = rays.wrapping_sub(self.rays);
         self.ticks += 1;
-        self.most_rays = self.most_rays.max(rays.wrapping_sub(self.rays));
-        if let Some(before) = self.time {
-            self.most_time = self.most_time.max(time.wrapping_sub(before) & 0x00ff_ffff);
+        self.most_rays = self.most_rays.max(rays_between);
+        if let Some(last) = self.last {
+            let between = u64::from(time.wrapping_sub(last) & 0x00ff_ffff);
+            let [tracing, ending] = &mut self.most_time;
+            let most = if rays_between > 0 { tracing } else { ending };
+            *most = between.max(*most);
+            self.time += between;
         }
-        (self.rays, self.time) = (rays, Some(time));
+        (self.rays, self.last) = (rays, Some(time));
     }
 
     /// How it was served, by name: the same numbers on every machine.
