@@ -222,8 +222,8 @@ fn composed_scenes_look_like_baked_ones() {
             let noise = host.error_of_channel(c).hypot(core.error_of_channel(c));
             let z = (host.channel(c) - core.channel(c)) / noise;
             println!("{name}: {:.5} and {:.5}, z {z:.2}", host.channel(c), core.channel(c));
-            // 12 comparisons: a false alarm in 1e5 runs
-            assert!(z.abs() < 5.0, "{name}: channel {c}: {} and {}", host.channel(c), core.channel(c));
+            // paths have the same random numbers, so that most of the noise is the same
+            assert!(z.abs() < 1.0, "{name}: channel {c}: {} and {}", host.channel(c), core.channel(c));
             assert!(noise < 0.05 * host.channel(c), "{name}: too noisy to tell");
         }
     }

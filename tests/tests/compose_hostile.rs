@@ -204,7 +204,8 @@ fn composing_needs_little_stack() {
         arrays.materials[3] = Material { flags: MATERIAL_COMPENSATED, ..material(MaterialKind::RoughDielectric) };
         // the tree is as deep as it gets: many triangles with one centre
         arrays.triangles = vec![[0, 1, 2]; 5000];
-        (arrays.triangle_materials.clear(), arrays.emission.clear());
+        arrays.triangle_materials.clear();
+        arrays.emission.clear();
         composed(&arrays.parts()).len()
     };
     let thread = std::thread::Builder::new().stack_size(STACK_BYTES).spawn(compose).unwrap();
@@ -264,7 +265,8 @@ fn triangles_without_area_are_left_out() {
     arrays.triangle_materials = vec![1, 0, 1, 1, 1];
     // three points on a line
     arrays.positions.extend([[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]);
-    (arrays.normals.clear(), arrays.uvs.clear());
+    arrays.normals.clear();
+    arrays.uvs.clear();
     arrays.triangles.push([4, 5, 6]);
     arrays.triangle_materials.push(1);
     let bytes = composed(&arrays.parts());
