@@ -18,7 +18,7 @@ pub struct Arrays {
     pub triangles: Vec<[u32; 3]>,
     /// Of triangles.
     pub triangle_materials: Vec<u32>,
-    /// Without the tables of rough plastics.
+    /// Without tables; none is principled.
     pub materials: Vec<Material>,
     /// Of materials.
     pub emission: Vec<[f32; 3]>,
@@ -50,10 +50,7 @@ impl Arrays {
             emission[scene.triangles[l.triangle as usize].material as usize] = l.emission;
         }
         let others = |l: &&Light| l.kind != LightKind::Area as u32 && l.kind != LightKind::Environment as u32;
-        let plain = |m: &Material| {
-            let coat = m.fdr > 0.0;
-            Material { fdr: 0.0, table: if coat { NONE } else { m.table }, ..*m }
-        };
+        let plain = |m: &Material| Material { fdr: 0.0, table: NONE, ..*m };
         let smooth = scene.triangles.iter().any(|t| t.flags & TRIANGLE_SMOOTH != 0);
         let mut normals: Vec<_> = scene.vertices.iter().map(|v| v.n).collect();
         for t in scene.triangles.iter().filter(|t| t.flags & TRIANGLE_SMOOTH == 0) {

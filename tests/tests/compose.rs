@@ -8,7 +8,8 @@ use croupier::{EditableScene, Scene};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin;
 use croupier_host::description::{
-    Camera as HostCamera, Emitter, LightShape, Projection, SceneDescription, ShapeLight, ThinLens,
+    Camera as HostCamera, Emitter, LightShape, Material as HostMaterial, Model, Projection, SceneDescription,
+    ShapeLight, ThinLens,
 };
 use croupier_tests::arrays::{Arrays, composed};
 use croupier_tests::geometry::{Ray, Rng, Tri, packet, soup};
@@ -19,11 +20,14 @@ use croupier_tests::scenes::{blob, cornell, everything};
 fn scenes() -> Vec<(&'static str, SceneDescription)> {
     let mut showcase = builtin::showcase();
     showcase.camera.size = [40, 27];
-    // tables of compensation are the host's
-    showcase.materials.iter_mut().for_each(|m| m.compensated = false);
     let mut room = builtin::cornell_box();
     room.camera.size = [32, 32];
+    let mut compensated = everything([40, 30]);
+    compensated.materials.iter_mut().for_each(|m| m.compensated = true);
+    let frosted = Model::RoughDielectric { int_ior: 1.5, ext_ior: 1.0, alpha: 0.25 };
+    compensated.materials[2] = HostMaterial { compensated: true, ..HostMaterial::new("frosted", frosted) };
     vec![
+        ("compensated", compensated),
         ("Cornell box", room),
         ("small Cornell box", cornell([24, 24])),
         ("everything", everything([40, 30])),
@@ -32,8 +36,7 @@ fn scenes() -> Vec<(&'static str, SceneDescription)> {
 }
 
 /// Everything but the tree and the choice among lights is what the host writes, to the last bit. Killed by: a formula
-/// of
-/// areas, normals or tables of plastics that differs from the host's, a light too many, an order that differs.
+/// of areas, normals or tables of plastics that differs from the host's, a light too many, an order that differs.
 #[test]
 fn composed_records_are_those_of_the_baker() {
     for (name, description) in scenes() {
@@ -153,8 +156,7 @@ fn of_triangles(triangles: &[Tri]) -> AlignedBytes {
 }
 
 /// Composed trees are valid, find what the host's find, and cost about as much to walk. Killed by: triangles lost,
-/// boxes too
-/// small, leaves that were not moved up to the nodes, splits at medians.
+/// boxes too small, leaves that were not moved up to the nodes, splits at medians.
 #[test]
 fn composed_trees_find_the_same_and_cost_no_more() {
     let mut r = Rng(5);
@@ -208,8 +210,7 @@ fn composed_trees_find_the_same_and_cost_no_more() {
 }
 
 /// Pictures are the same but for noise. Killed by: a light that is not chosen or chosen with another probability than
-/// the table
-/// states, a wrong scale of the environment, lights that triangles do not refer to.
+/// the table states, a wrong scale of the environment, lights that triangles do not refer to.
 #[test]
 fn composed_scenes_look_like_baked_ones() {
     for (name, description) in scenes() {
@@ -221,16 +222,15 @@ fn composed_scenes_look_like_baked_ones() {
             let noise = host.error_of_channel(c).hypot(core.error_of_channel(c));
             let z = (host.channel(c) - core.channel(c)) / noise;
             println!("{name}: {:.5} and {:.5}, z {z:.2}", host.channel(c), core.channel(c));
-            // 12 comparisons: a false alarm in 1e5 runs
-            assert!(z.abs() < 5.0, "{name}: channel {c}: {} and {}", host.channel(c), core.channel(c));
+            // paths have the same random numbers, so that most of the noise is the same
+            assert!(z.abs() < 1.0, "{name}: channel {c}: {} and {}", host.channel(c), core.channel(c));
             assert!(noise < 0.05 * host.channel(c), "{name}: too noisy to tell");
         }
     }
 }
 
 /// Records of lights and cameras are the host's to the last bit. Killed by: an angle that is halved twice, a direction
-/// that is
-/// not turned round, an axis in another order.
+/// that is not turned round, an axis in another order.
 #[test]
 fn lights_and_cameras_are_those_of_the_host() {
     let (position, direction) = ([0.3, -1.5, 2.25], [1.0, -3.0, 0.7]);

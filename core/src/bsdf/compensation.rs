@@ -18,9 +18,9 @@
 //! factor is never below 1, and as eta approaches 1 the interface vanishes as it should.
 //!
 //! Tables have [`COMPENSATION_ENTRIES`] numbers, equally spaced in `x(mu) = mu / 2 (1 + (1 + alpha) / (mu + alpha))`,
-//! which resolves grazing angles below alpha as well as the angles around a critical one. The host computes them
-//! (`embed-example/host/src/compensation.rs`); interpolated linearly they are within 5e-4 of a white furnace for
-//! conductors, and within 5e-3 for dielectrics (tests `tests/tests/bsdf_compensation.rs`).
+//! which resolves grazing angles below alpha as well as the angles around a critical one. `compose/compensation.rs`
+//! computes them; interpolated linearly they are within 5e-4 of a white furnace for conductors, and within 5e-3 for
+//! dielectrics (tests `tests/tests/bsdf_compensation.rs`).
 
 use super::Materials8;
 use super::ggx::Ggx8;

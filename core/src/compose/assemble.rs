@@ -2,15 +2,15 @@
 //!
 //! 1. Every part is checked, so that what is written passes [`Scene::from_bytes`](crate::Scene::from_bytes).
 //! 2. Sections of known length are written, triangles before the lights that refer to them.
-//! 3. The tree is built behind them: nodes, then leaves. How many there are is known only then; the leaves move up to
-//! the
-//!    nodes.
+//! 3. The tree is built behind them: nodes, then leaves. How many there are is known only then, and the leaves move up
+//!    to the nodes.
 
+use super::compensation::EnergyMatrix;
 use super::draft::{Draft, Length, records};
 use super::error::{ComposeError, PerRecord};
 use super::geometry::{area, has_area, vertex_normal};
 use super::lat_long::LatLong;
-use super::materials;
+use super::materials::{self, DerivedTables};
 use super::math::Portable;
 use super::parts::{ComposeLayout, SceneParts, Surround};
 use crate::accel::{Built, Primitive, build_triangles};
@@ -32,20 +32,29 @@ struct Counts {
     triangles: usize,
     /// Those of them that emit.
     emitters: usize,
-    /// Entries of all tables of materials.
-    tables: usize,
+    /// Tables of materials that are derived.
+    tables: DerivedTables,
     environment: Option<Environment>,
 }
 
 impl Counts {
+    /// Entries of all tables of materials.
+    fn tables(&self, parts: &SceneParts<'_>) -> usize {
+        parts.tables.len() + self.tables.entries
+    }
+
+    /// Matrices that tables need in the making.
+    fn matrices(&self) -> usize {
+        usize::from(self.tables.matrix)
+    }
+
     fn lights(&self, parts: &SceneParts<'_>) -> usize {
         self.emitters + parts.lights.len() + usize::from(self.environment.is_some())
     }
 }
 
 /// Nodes that a tree over `n` triangles takes at most. A node with fewer than eight children has leaves only, at least
-/// two of
-/// them, and, but for the root, more than eight triangles; so with `f` full nodes and `p` others, p <= n / 9 and
+/// two of them, and, but for the root, more than eight triangles; so with `f` full nodes and `p` others, p <= n / 9 and
 /// 8 f + 2 p <= f + p - 1 + n.
 fn most_nodes(triangles: usize) -> usize {
     if triangles == 0 { 0 } else { triangles.saturating_mul(5) / 21 + 1 }
@@ -110,7 +119,7 @@ impl SceneParts<'_> {
     fn layout_of(&self, counts: &Counts) -> Result<ComposeLayout, ComposeError> {
         let blob = self.fixed(counts).with::<Node>(most_nodes(counts.triangles)).with::<Leaf>(counts.triangles);
         let blob = Measure(blob.0).layout();
-        let scratch = Measure::new().add::<Primitive>(counts.triangles).layout();
+        let scratch = Measure::new().add::<Primitive>(counts.triangles).add::<EnergyMatrix>(counts.matrices()).layout();
         let too_large = |given| MemoryError::TooSmall { needed: usize::MAX, given };
         Ok(ComposeLayout {
             blob: blob.ok_or(ComposeError::Blob(too_large(0)))?,
@@ -121,9 +130,9 @@ impl SceneParts<'_> {
     /// Composes the blob of the scene at the start of `blob`, and returns it. Both blocks must be aligned to
     /// [`BLOCK_ALIGN`](crate::BLOCK_ALIGN); [`Self::layout`] says how large they must be. Nothing is read from them.
     ///
-    /// The same parts give the same bytes. Takes some microseconds a triangle, and 10^6 evaluations of Fresnel's
-    /// equations
-    /// for each rough plastic without a table.
+    /// The same parts give the same bytes. Takes some microseconds a triangle, and some 10^6 to 10^7 evaluations of
+    /// Fresnel's equations for each kind of rough surface whose table is derived; smooth plastics without `fdr` a tenth
+    /// of that. [`STACK_BYTES`](crate::unstable::STACK_BYTES) of stack suffice.
     ///
     /// # Errors
     /// The first part that cannot be part of a scene, a block that is too small or misaligned. The blocks may have
@@ -139,7 +148,8 @@ impl SceneParts<'_> {
         };
         let mut carver = Carver::new(scratch, layout.scratch).map_err(ComposeError::Scratch)?;
         let primitives = carver.take_unset(counts.triangles).map_err(ComposeError::Scratch)?;
-        self.write(blob, primitives, &counts).map_err(too_small)
+        let matrix = carver.take_unset(counts.matrices()).map_err(ComposeError::Scratch)?;
+        self.write(blob, primitives, matrix, &counts).map_err(too_small)
     }
 
     /// Bytes of the sections of known length.
@@ -153,7 +163,7 @@ impl SceneParts<'_> {
             .with::<Material>(self.materials.len())
             .with::<Texture>(self.textures.len())
             .with::<u32>(self.texels.len())
-            .with::<f32>(counts.tables)
+            .with::<f32>(counts.tables(self))
             .with::<u8>(self.names.len())
             .with::<Light>(lights)
             .with::<Alias>(lights)
@@ -196,7 +206,7 @@ impl SceneParts<'_> {
                 return Err(ComposeError::Grid { index });
             }
         }
-        let derived = materials::check(self)?;
+        let tables = materials::check(self)?;
         for (index, rgb) in (0u32..).zip(self.emission) {
             check::emission(SectionKind::Materials, index, rgb)?;
         }
@@ -209,7 +219,7 @@ impl SceneParts<'_> {
             Some(surround) => environment(surround, emitters + self.lights.len() - shapes)?,
             None => None,
         };
-        let counts = Counts { triangles, emitters, tables: self.tables.len() + derived, environment };
+        let counts = Counts { triangles, emitters, tables, environment };
         match counts.lights(self) {
             found if found > MOST => Err(ComposeError::TooMany { of: SectionKind::Lights, found, most: MOST }),
             _ => Ok(counts),
@@ -276,6 +286,7 @@ impl SceneParts<'_> {
         &self,
         blob: &'m mut [u8],
         primitives: &mut [Primitive],
+        matrix: &mut [EnergyMatrix],
         counts: &Counts,
     ) -> Result<&'m mut [u8], MemoryError> {
         let mut draft = Draft::new(blob)?;
@@ -289,9 +300,9 @@ impl SceneParts<'_> {
         let materials = draft.section::<Material>(SectionKind::Materials, self.materials.len())?;
         draft.copy(SectionKind::Textures, self.textures)?;
         draft.copy(SectionKind::Texels, self.texels)?;
-        let tables = draft.section::<f32>(SectionKind::Tables, counts.tables)?;
+        let tables = draft.section::<f32>(SectionKind::Tables, counts.tables(self))?;
         let [of_materials, of_tables] = draft.split([&materials, &tables]);
-        materials::write(self, records(of_materials), records(of_tables));
+        materials::write(self, records(of_materials), records(of_tables), matrix);
         draft.copy(SectionKind::Names, self.names)?;
         let lights = draft.section::<Light>(SectionKind::Lights, counts.lights(self))?;
         let alias = draft.section::<Alias>(SectionKind::LightAlias, counts.lights(self))?;

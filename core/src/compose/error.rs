@@ -41,8 +41,7 @@ pub enum ComposeError {
         /// Medium.
         index: u32,
     },
-    /// A material whose tables composing does not compute: principled, or without a table of its own though
-    /// compensated.
+    /// A principled material without a record among the tables: composing does not compute them.
     Tables {
         /// Material.
         index: u32,

@@ -13,8 +13,7 @@ use bytemuck::Zeroable;
 pub const MIN_CONE_DEG: f32 = 1e-2;
 
 /// A light that is not a triangle, in the units of scene files. World space; directions have any length but 0; emission
-/// is
-/// linear Rec. 709, 0 to [`MAX_EMISSION`] a channel.
+/// is linear Rec. 709, 0 to [`MAX_EMISSION`] a channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LightSource {
     /// Shines alike in all directions.

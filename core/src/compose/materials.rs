@@ -1,10 +1,11 @@
 //! Materials of a blob, and the tables that follow from their parameters.
 
+use super::compensation::{EnergyMatrix, compensated_conductor, compensated_dielectric, compensated_plastic};
 use super::error::ComposeError;
 use super::math::Portable;
-use super::microfacet;
+use super::microfacet::{diffuse_fresnel_inside, rough_plastic};
 use super::parts::SceneParts;
-use crate::scene::blob::{MATERIAL_COMPENSATED, Material, MaterialKind, NONE, Parameter, TRANSMITTANCE_ENTRIES};
+use crate::scene::blob::{COMPENSATION_ENTRIES, MATERIAL_COMPENSATED, Material, MaterialKind, NONE, Parameter};
 use crate::scene::{Records, check};
 
 /// What of a material composing derives.
@@ -14,42 +15,59 @@ enum Derived {
     Nothing,
     /// The internal reflectance of a smooth coat.
     Smooth,
-    /// Transmittances and internal reflectance of a rough coat.
-    Rough,
+    /// Tables, and the internal reflectance of a rough coat.
+    Tables,
     /// Tables that composing does not compute.
     Unknown,
 }
 
+/// What derived tables hold.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct DerivedTables {
+    /// Entries in all.
+    pub(super) entries: usize,
+    /// Is an [`EnergyMatrix`] needed to compute them?
+    pub(super) matrix: bool,
+}
+
+fn parameters(m: &Material) -> &'static [Parameter] {
+    MaterialKind::from_u32(m.kind).map_or(&[], |kind| kind.facts().parameters)
+}
+
+fn is_compensated(m: &Material) -> bool {
+    m.flags & MATERIAL_COMPENSATED != 0
+}
+
+/// Parameters of a material that are tables, in their order.
+fn tables_of(m: &Material) -> impl Iterator<Item = Parameter> + use<> {
+    let compensated = is_compensated(m);
+    parameters(m).iter().copied().filter(move |p| p.entries() > 0 && (compensated || !p.compensates()))
+}
+
 fn derived(m: &Material) -> Derived {
-    let compensated = m.flags & MATERIAL_COMPENSATED != 0;
-    let parameters = MaterialKind::from_u32(m.kind).map_or(&[][..], |kind| kind.facts().parameters);
-    let has_table = |p: &&Parameter| match p {
-        Parameter::Principled => true,
-        p => p.entries() > 0 && (compensated || !p.compensates()),
-    };
-    let mut tables = parameters.iter().filter(has_table);
-    match (m.table, tables.next(), tables.next()) {
-        (NONE, Some(Parameter::TransmittanceTable), None) => Derived::Rough,
-        (NONE, Some(_), _) => Derived::Unknown,
-        (_, None, _) if parameters.contains(&Parameter::InternalReflectance) && m.fdr == 0.0 => Derived::Smooth,
+    let principled = parameters(m).contains(&Parameter::Principled);
+    match (m.table, tables_of(m).next()) {
+        (NONE, _) if principled => Derived::Unknown,
+        (NONE, Some(_)) => Derived::Tables,
+        (_, None) if parameters(m).contains(&Parameter::InternalReflectance) && m.fdr == 0.0 => Derived::Smooth,
         _ => Derived::Nothing,
     }
 }
 
-/// Relative refractive index.
+/// Relative refractive index; 0 of materials without one.
 fn eta(m: &Material) -> f32 {
     let [eta, ..] = m.eta;
-    eta
+    if parameters(m).contains(&Parameter::RelativeEta) { eta } else { 0.0 }
 }
 
-/// The first of `materials` with a rough coat like this one: they share a table.
+/// The first of `materials` that has the tables of this one: they share them.
 fn first_like(materials: &[Material], m: &Material) -> Option<usize> {
-    let coat = |m: &Material| [m.alpha.to_bits(), eta(m).to_bits()];
-    materials.iter().position(|other| coat(other) == coat(m) && derived(other) == Derived::Rough)
+    let surface = |m: &Material| [m.kind, m.alpha.to_bits(), eta(m).to_bits(), u32::from(is_compensated(m))];
+    materials.iter().position(|other| surface(other) == surface(m) && derived(other) == Derived::Tables)
 }
 
-/// Checks all materials and what they refer to; how many entries of tables are derived.
-pub(super) fn check(parts: &SceneParts<'_>) -> Result<usize, ComposeError> {
+/// Checks all materials and what they refer to; what tables are derived.
+pub(super) fn check(parts: &SceneParts<'_>) -> Result<DerivedTables, ComposeError> {
     let records = Records {
         materials: parts.materials,
         textures: parts.textures,
@@ -60,20 +78,23 @@ pub(super) fn check(parts: &SceneParts<'_>) -> Result<usize, ComposeError> {
         ..Records::NOTHING
     };
     check::around_materials(&records)?;
-    let mut entries = 0usize;
+    let mut all = DerivedTables::default();
     for (at, (index, m)) in (0u32..).zip(parts.materials).enumerate() {
         check::parameters(&records, index, m)?;
         match derived(m) {
             Derived::Unknown => return Err(ComposeError::Tables { index }),
             // the only one of its like up to here
-            Derived::Rough if first_like(parts.materials, m) == Some(at) => {
-                entries = entries.saturating_add(TRANSMITTANCE_ENTRIES);
+            Derived::Tables if first_like(parts.materials, m) == Some(at) => {
+                for table in tables_of(m) {
+                    all.entries = all.entries.saturating_add(table.entries());
+                    all.matrix |= table == Parameter::CompensationTable;
+                }
             }
-            Derived::Rough => {}
+            Derived::Tables => {}
             Derived::Smooth | Derived::Nothing => check::material(&records, index, m).map(|_| ())?,
         }
     }
-    Ok(entries)
+    Ok(all)
 }
 
 /// Internal reflectance stays below 1, so that the series of internal reflections converges.
@@ -82,31 +103,77 @@ fn inside(r: f32) -> f32 {
     r.clamp(lo, hi)
 }
 
+/// Tables in the making.
+struct Tables<'a> {
+    /// What is not filled yet.
+    rest: &'a mut [f32],
+    /// Number of its first entry.
+    first: u32,
+    matrix: &'a mut [EnergyMatrix],
+}
+
+impl Tables<'_> {
+    /// Adds a table, its numbers within the range of the parameter.
+    fn add(&mut self, parameter: Parameter, numbers: impl IntoIterator<Item = f32>) {
+        let [lo, hi] = parameter.range();
+        let rest = core::mem::take(&mut self.rest);
+        let Some((table, rest)) = rest.split_at_mut_checked(parameter.entries()) else { return };
+        table.iter_mut().zip(numbers).for_each(|(place, x)| *place = x.clamp(lo, hi));
+        (self.rest, self.first) = (rest, self.first.saturating_add(parameter.entries() as u32));
+    }
+
+    /// Adds the tables of a material and tells it.
+    fn derive(&mut self, m: &mut Material) {
+        let (alpha, eta) = (f64::from(m.alpha), f64::from(eta(m)));
+        let compensated = is_compensated(m);
+        let mut factors = [1.0; COMPENSATION_ENTRIES];
+        if let Some(matrix) = self.matrix.first_mut()
+            && tables_of(m).any(|p| p == Parameter::CompensationTable)
+        {
+            factors = compensated_conductor::<Portable>(alpha, matrix);
+        }
+        m.table = self.first;
+        for p in tables_of(m) {
+            match p {
+                Parameter::TransmittanceTable => {
+                    let coat = match compensated {
+                        true => compensated_plastic::<Portable>(alpha, eta, &factors),
+                        false => rough_plastic::<Portable>(alpha, eta),
+                    };
+                    m.fdr = inside(coat.r);
+                    self.add(p, coat.transmittance);
+                }
+                Parameter::CompensationTable => self.add(p, factors.map(|s| s as f32)),
+                Parameter::EnergyTable => {
+                    let sides = compensated_dielectric::<Portable>(alpha, eta);
+                    self.add(p, sides.as_flattened().iter().map(|e| *e as f32));
+                }
+                Parameter::Reflectance
+                | Parameter::Alpha
+                | Parameter::RelativeEta
+                | Parameter::ComplexEta
+                | Parameter::InternalReflectance
+                | Parameter::Principled => {}
+            }
+        }
+    }
+}
+
 /// Writes as many materials as there are, and the tables behind those that were given.
-pub(super) fn write(parts: &SceneParts<'_>, out: &mut [Material], tables: &mut [f32]) {
-    let Some((given, mut derived_tables)) = tables.split_at_mut_checked(parts.tables.len()) else { return };
+pub(super) fn write(parts: &SceneParts<'_>, out: &mut [Material], tables: &mut [f32], matrix: &mut [EnergyMatrix]) {
+    let Some((given, rest)) = tables.split_at_mut_checked(parts.tables.len()) else { return };
     given.copy_from_slice(parts.tables);
-    let mut first = parts.tables.len() as u32;
+    let mut tables = Tables { rest, first: parts.tables.len() as u32, matrix };
     for (at, m) in parts.materials.iter().enumerate() {
         let mut record = *m;
         match derived(m) {
-            Derived::Smooth => {
-                record.fdr = inside(microfacet::diffuse_fresnel_inside::<Portable>(f64::from(eta(m))));
-            }
-            Derived::Rough => match first_like(parts.materials, m).filter(|like| *like < at) {
+            Derived::Smooth => record.fdr = inside(diffuse_fresnel_inside::<Portable>(f64::from(eta(m)))),
+            Derived::Tables => match first_like(parts.materials, m).filter(|like| *like < at) {
                 Some(like) => {
                     let known = out.get(like).copied().unwrap_or(*m);
                     (record.table, record.fdr) = (known.table, known.fdr);
                 }
-                None => {
-                    let table = microfacet::rough_plastic::<Portable>(f64::from(m.alpha), f64::from(eta(m)));
-                    let [lo, hi] = Parameter::TransmittanceTable.range();
-                    let rest = core::mem::take(&mut derived_tables);
-                    let Some((place, rest)) = rest.split_at_mut_checked(TRANSMITTANCE_ENTRIES) else { return };
-                    place.iter_mut().zip(table.transmittance).for_each(|(x, t)| *x = t.clamp(lo, hi));
-                    (record.table, record.fdr) = (first, inside(table.r));
-                    (derived_tables, first) = (rest, first.saturating_add(TRANSMITTANCE_ENTRIES as u32));
-                }
+                None => tables.derive(&mut record),
             },
             Derived::Nothing | Derived::Unknown => {}
         }

@@ -19,8 +19,7 @@ pub trait Math {
 }
 
 /// The functions by the four operations alone, with the same bits on every target: within 1 ulp (square root) and
-/// within
-/// 4e-16 (sine and cosine).
+/// within 4e-16 (sine and cosine).
 #[derive(Clone, Copy, Debug)]
 pub struct Portable;
 

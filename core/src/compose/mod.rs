@@ -1,6 +1,5 @@
 //! Scenes from arrays, in the caller's memory: what baking does for hosts that bring triangles at run time and have
-//! neither
-//! files nor an allocator.
+//! neither files nor an allocator.
 //!
 //! | file | holds |
 //! |---|---|
@@ -10,11 +9,13 @@
 //! | `geometry` | areas and normals |
 //! | `materials` | what follows from the parameters of materials |
 //! | `microfacet` | tables of plastics |
+//! | `compensation` | tables of compensated rough materials |
 //! | `lat_long` | sampling tables of environment maps |
 //! | `light_source`, `view` | records of lights and cameras from the numbers that people use |
 //! | `math` | functions in f64 that `core` lacks |
 
 mod assemble;
+mod compensation;
 mod draft;
 mod error;
 mod geometry;
@@ -26,6 +27,9 @@ mod microfacet;
 mod parts;
 mod view;
 
+pub use compensation::{
+    EnergyMatrix, balanced, compensated_conductor, compensated_dielectric, compensated_plastic, interface_energy,
+};
 pub use error::{ComposeError, FieldError, PerRecord};
 pub use geometry::{area, has_area, vertex_normal};
 pub use lat_long::LatLong;

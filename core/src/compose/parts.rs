@@ -7,8 +7,7 @@ use crate::scene::blob::{Camera, Light, Material, Medium, Texture};
 /// 709.
 ///
 /// Records of materials, textures, media and lights are those of the blob ([`crate::unstable::scene::blob`]): what
-/// composing
-/// derives of them is left at 0 or [`NONE`](crate::unstable::scene::blob::NONE).
+/// composing derives of them is left at 0 or [`NONE`](crate::unstable::scene::blob::NONE).
 ///
 /// ```
 /// use croupier::unstable::compose::{LightSource, SceneParts, View};
@@ -58,20 +57,17 @@ pub struct SceneParts<'a> {
     /// Positions of vertices, world space, each coordinate up to 1e9 as a magnitude.
     pub positions: &'a [[f32; 3]],
     /// Normals of vertices, of any length; or nothing: all triangles are flat. Triangles with a vertex whose normal is
-    /// 0 are
-    /// flat.
+    /// 0 are flat.
     pub normals: &'a [[f32; 3]],
     /// Texture coordinates of vertices, v upwards; or nothing.
     pub uvs: &'a [[f32; 2]],
     /// Vertices of triangles, counter-clockwise seen from the front. Triangles without an area that `f32` can hold are
-    /// left
-    /// out and counted; others keep their order.
+    /// left out and counted; others keep their order.
     pub triangles: &'a [[u32; 3]],
     /// Materials of triangles; or nothing: all have material 0.
     pub triangle_materials: &'a [u32],
-    /// Materials. Left to composing: `fdr` of a smooth plastic if it is 0, `table` and `fdr` of a rough plastic whose
-    /// table is
-    /// [`NONE`](crate::unstable::scene::blob::NONE). Others with tables refer to [`Self::tables`].
+    /// Materials. Left to composing: `fdr` of a smooth plastic if it is 0; `table` and `fdr` of rough materials whose
+    /// table is [`NONE`](crate::unstable::scene::blob::NONE). Principled ones refer to [`Self::tables`], others may.
     pub materials: &'a [Material],
     /// Radiance that the triangles of each material emit from their front; or nothing: none emit.
     pub emission: &'a [[f32; 3]],
@@ -86,8 +82,7 @@ pub struct SceneParts<'a> {
     /// Homogeneous media, those of higher priority first. Their boundaries must be closed, which is not checked.
     pub media: &'a [Medium],
     /// Lights that are not triangles, see [`LightSource::record`](super::LightSource::record). In the blob they follow
-    /// those of
-    /// the triangles: first those without a shape, then the environment, then those with one.
+    /// those of the triangles: first those without a shape, then the environment, then those with one.
     pub lights: &'a [Light],
     /// Environment; a black one is left out.
     pub environment: Option<Surround<'a>>,
@@ -161,8 +156,7 @@ impl SceneParts<'_> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ComposeLayout {
     /// The block for the blob: what always suffices. Most trees take a third of it; the blob's own length is known once
-    /// it is
-    /// composed. A block that is smaller will do as long as the tree fits.
+    /// it is composed. A block that is smaller will do as long as the tree fits.
     pub blob: Layout,
     /// The block for intermediate results.
     pub scratch: Layout,

@@ -18,8 +18,7 @@ pub struct View {
     /// Upwards, not parallel to the axis.
     pub up: [f64; 3],
     /// Perspective: full vertical field of view, degrees, above 0.001 and below 179.9. Orthographic: height of the
-    /// image,
-    /// world units, 1e-12 to 1e9. Panoramic: not read.
+    /// image, world units, 1e-12 to 1e9. Panoramic: not read.
     pub extent: f64,
     /// Columns and rows, 1 to 65536. Pixels are square.
     pub size: [u32; 2],
@@ -51,8 +50,7 @@ impl View {
     ///
     /// # Errors
     /// The first number out of its range; [`Field::Direction`] for an axis without a length, [`Field::ImagePlane`] for
-    /// an
-    /// upward direction along it or an extent out of its range.
+    /// an upward direction along it or an extent out of its range.
     pub fn record(&self) -> Result<Camera, FieldError> {
         self.record_with::<Portable>()
     }

@@ -1,117 +1,32 @@
-//! Tables that compensated rough materials need at bake time, by quadrature in f64. What they are for is said in the
-//! core's `bsdf/compensation.rs`.
+//! Tables that compensated rough materials need at bake time: the core's, with the functions of the standard library.
+//! What they are for is said in the core's `bsdf/compensation.rs`.
 
-use crate::microfacet::{self, RoughPlasticTable};
-use croupier::unstable::scene::blob::{COMPENSATION_ENTRIES, TRANSMITTANCE_ENTRIES};
+use crate::math::Std;
+use crate::microfacet::RoughPlasticTable;
+use croupier::unstable::compose;
+use croupier::unstable::scene::blob::COMPENSATION_ENTRIES;
 
-/// Quadrature points per dimension for reflection.
-const POINTS: usize = 96;
-
-/// Quadrature points per dimension for dielectrics, whose integrand has a crease where total reflection begins.
-const DIELECTRIC_POINTS: usize = 160;
-
-/// Cosine over alpha that stands for 0, where visible normals have no limit that quadrature could use.
-const GRAZING: f64 = 1e-9;
-
-/// Position of the cosine `mu` in tables of compensation, 0 to 1.
-fn coordinate(alpha: f64, mu: f64) -> f64 {
-    0.5 * mu * (1.0 + (1.0 + alpha) / (mu + alpha))
-}
-
-/// Cosine at each entry.
-fn cosines(alpha: f64) -> [f64; COMPENSATION_ENTRIES] {
-    std::array::from_fn(|i| {
-        // x(mu) = x is mu^2 + b mu = 2 alpha x, in the form whose root does not cancel
-        let x = i as f64 / (COMPENSATION_ENTRIES - 1) as f64;
-        let (b, c) = (1.0 + 2.0 * alpha - 2.0 * x, 2.0 * alpha * x);
-        let root = (b * b + 4.0 * c).sqrt();
-        let mu = if b > 0.0 { 2.0 * c / (b + root) } else { 0.5 * (root - b) };
-        mu.clamp(GRAZING * alpha, 1.0)
-    })
-}
-
-/// `table` at the cosine `mu`, interpolated as the kernels do.
-fn lookup(table: &[f64; COMPENSATION_ENTRIES], alpha: f64, mu: f64) -> f64 {
-    let (i, t) = cell(alpha, mu);
-    table[i] + t * (table[i + 1] - table[i])
-}
-
-/// First entry and weight of the second at the cosine `mu`.
-fn cell(alpha: f64, mu: f64) -> (usize, f64) {
-    let x = coordinate(alpha, mu) * (COMPENSATION_ENTRIES - 1) as f64;
-    let i = (x as usize).min(COMPENSATION_ENTRIES - 2);
-    (i, x - i as f64)
-}
-
-/// The factors s of a conductor of GGX width `alpha`: `s(mu)` times the energy that a white one scatters, each direction
-/// weighted with its own s, is 1 at every entry. By the iteration s <- sqrt(s / (K s)) from s = 1, which halves the
-/// distance in every step because K, that energy as a matrix, is positive.
+/// The factors s of a conductor of GGX width `alpha`.
 pub fn conductor(alpha: f64) -> [f64; COMPENSATION_ENTRIES] {
-    const N: usize = COMPENSATION_ENTRIES;
-    let rule = microfacet::gauss_legendre(POINTS);
-    let mut energy = vec![[0.0; N]; N];
-    for (row, mu) in energy.iter_mut().zip(cosines(alpha)) {
-        microfacet::visible(&rule, alpha, mu, |facet, weight| {
-            if let Some((z, denominator)) = facet.reflected() {
-                let ((i, t), g1) = (cell(alpha, z), 2.0 * z / denominator);
-                row[i] += weight * g1 * (1.0 - t);
-                row[i + 1] += weight * g1 * t;
-            }
-        });
-    }
-    balanced(&energy)
+    compose::compensated_conductor::<Std>(alpha, &mut [[0.0; COMPENSATION_ENTRIES]; COMPENSATION_ENTRIES])
 }
 
 /// The factors s with `s x (energy s) = 1`, by the iteration of [`conductor`].
 pub(crate) fn balanced<const N: usize>(energy: &[[f64; N]]) -> [f64; N] {
-    let mut s = [1.0; N];
-    for _ in 0..60 {
-        let energies: [f64; N] = std::array::from_fn(|i| energy[i].iter().zip(&s).map(|(k, s)| k * s).sum());
-        s = std::array::from_fn(|i| (s[i] / energies[i]).sqrt());
-    }
-    s
+    compose::balanced::<Std, N>(energy)
 }
 
 /// Energy that a rough dielectric of width `alpha` scatters to both sides, seen from outside and from inside.
 pub fn dielectric(alpha: f64, eta: f64) -> [[f64; COMPENSATION_ENTRIES]; 2] {
-    let rule = microfacet::gauss_legendre(DIELECTRIC_POINTS);
-    [eta, 1.0 / eta].map(|eta| cosines(alpha).map(|mu| interface_energy(&rule, alpha, eta, mu)))
+    compose::compensated_dielectric::<Std>(alpha, eta)
 }
 
 /// Energy that the side of a rough dielectric from which the relative index is `eta` scatters at the cosine `mu`.
 pub(crate) fn interface_energy(rule: &[(f64, f64)], alpha: f64, eta: f64, mu: f64) -> f64 {
-    let mut sum = 0.0;
-    microfacet::visible(rule, alpha, mu, |facet, weight| {
-        let (f, cos_t) = microfacet::fresnel(facet.cos, eta);
-        let g1 = |leaves: Option<(f64, f64)>| leaves.map_or(0.0, |(z, denominator)| 2.0 * z / denominator);
-        sum += weight * (f * g1(facet.reflected()) + (1.0 - f) * g1(facet.refracted(eta, cos_t)));
-    });
-    sum
+    compose::interface_energy::<Std>(rule, alpha, eta, mu)
 }
 
-/// Table of a compensated coat of width `alpha` and relative index `eta`, with its factors `s` of [`conductor`]: T is
-/// what its reflection leaves, and R = 1 - (cosine-weighted mean of T) / eta^2, so that a white base loses nothing.
+/// Table of a compensated coat of width `alpha` and relative index `eta`, with its factors `s` of [`conductor`].
 pub fn rough_plastic(alpha: f64, eta: f64, s: &[f64; COMPENSATION_ENTRIES]) -> RoughPlasticTable {
-    let rule = microfacet::gauss_legendre(POINTS);
-    let last = (TRANSMITTANCE_ENTRIES - 1) as f64;
-    let transmittance: [f64; TRANSMITTANCE_ENTRIES] = std::array::from_fn(|i| {
-        let mu = (i as f64 / last).max(GRAZING * alpha);
-        let outgoing = lookup(s, alpha, mu);
-        let mut reflected = 0.0;
-        microfacet::visible(&rule, alpha, mu, |facet, weight| {
-            let f = microfacet::fresnel(facet.cos, eta).0;
-            if let Some((z, denominator)) = facet.reflected() {
-                let m = outgoing * lookup(s, alpha, z);
-                reflected += weight * 2.0 * z / denominator * f * m / (f + m * (1.0 - f));
-            }
-        });
-        (1.0 - reflected).max(0.0)
-    });
-    // twice the integral of mu T, of a piecewise linear T exactly
-    let mean: f64 = transmittance
-        .windows(2)
-        .enumerate()
-        .map(|(i, t)| (t[0] * (3 * i + 1) as f64 + t[1] * (3 * i + 2) as f64) / (3.0 * last * last))
-        .sum();
-    RoughPlasticTable { transmittance: transmittance.map(|t| t as f32), r: (1.0 - mean / (eta * eta)) as f32 }
+    compose::compensated_plastic::<Std>(alpha, eta, s)
 }

@@ -1,31 +1,20 @@
 //! Sampling tables and selection weights of lights: what baking adds to the scene's description of emission.
 
 use crate::alias;
+use crate::math::Std;
+use croupier::unstable::compose::LatLong;
 use croupier::unstable::light::{SceneExtent, luminance, power};
 use croupier::unstable::scene::blob::{Alias, Environment, EnvironmentKind, Light};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
-/// Integral of bilinear luminance over each cell of a lat-long map, in luminance x sr, row by row.
-///
-/// Cell (i, j) spans texel columns i, i + 1 (wrapping) and rows j, j + 1; there are `width` x `(height - 1)` of them.
-/// Row j lies at polar angle `j pi / (height - 1)`. Within a cell the map is linear in the polar angle, weighted with
-/// its sine; the integral is exact.
-fn cell_integrals(texels: &[[f32; 3]], width: usize, height: usize) -> Vec<f64> {
-    assert!(width >= 1 && height >= 2 && texels.len() == width * height, "an environment map needs two rows");
-    let step = PI / (height - 1) as f64;
-    let at = |i: usize, j: usize| luminance(texels[j * width + i % width]);
-    let mut cells = Vec::with_capacity(width * (height - 1));
-    for j in 0..height - 1 {
-        let (a, b) = (j as f64 * step, (j + 1) as f64 * step);
-        // The integrals of sin and of s sin over the row, s from 0 at its upper edge to 1 at its lower one.
-        let all = 2.0 * ((a + b) / 2.0).sin() * (step / 2.0).sin();
-        let lower = ((b.sin() - a.sin()) / step - b.cos()).clamp(0.0, all);
-        for i in 0..width {
-            let (top, bottom) = (at(i, j) + at(i + 1, j), at(i, j + 1) + at(i + 1, j + 1));
-            cells.push((top * (all - lower) + bottom * lower) / 2.0 * TAU / width as f64);
-        }
-    }
-    cells
+/// Integral of bilinear luminance over each cell of a lat-long map, in luminance x sr, row by row: `width` x
+/// `(height - 1)` of them, see [`LatLong::row`].
+fn cell_integrals(map: &LatLong<'_>) -> Vec<f64> {
+    (0..map.rows()).flat_map(|j| (0..map.columns()).map(map.row::<Std>(j))).collect()
+}
+
+fn map(texels: &[[f32; 3]], width: u32, height: u32) -> LatLong<'_> {
+    LatLong::new(texels, [width, height]).expect("an environment map needs two rows")
 }
 
 /// The alias tables of an environment map: one over its `height - 1` rows of cells, then one of `width` entries per
@@ -37,7 +26,7 @@ fn cell_integrals(texels: &[[f32; 3]], width: usize, height: usize) -> Vec<f64> 
 /// # Panics
 /// Unless `width >= 1`, `height >= 2` and `texels.len() == width * height`.
 pub fn map_tables(texels: &[[f32; 3]], width: u32, height: u32) -> Vec<Alias> {
-    let cells = cell_integrals(texels, width as usize, height as usize);
+    let cells = cell_integrals(&map(texels, width, height));
     let rows: Vec<f64> = cells.chunks(width as usize).map(|row| row.iter().sum()).collect();
     let mut tables = alias::build(&rows);
     if tables.is_empty() {
@@ -56,9 +45,8 @@ pub fn luminance_integral(environment: &Environment, texels: &[[f32; 3]]) -> f64
     match EnvironmentKind::from_u32(environment.kind) {
         Some(EnvironmentKind::Constant) => 2.0 * TAU * luminance(environment.radiance),
         Some(EnvironmentKind::Map) => {
-            let scaled: Vec<[f32; 3]> =
-                texels.iter().map(|t| std::array::from_fn(|c| t[c] * environment.radiance[c])).collect();
-            cell_integrals(&scaled, environment.width as usize, environment.height as usize).iter().sum()
+            let map = map(texels, environment.width, environment.height).scaled(environment.radiance);
+            cell_integrals(&map).iter().sum()
         }
         None => 0.0,
     }

@@ -39,6 +39,7 @@ pub mod image;
 pub mod lightmap;
 pub mod load;
 pub mod look;
+mod math;
 pub mod memory;
 pub mod microfacet;
 pub mod part;

@@ -2,69 +2,49 @@
 
 use super::BakeError;
 use crate::description::{Camera, Projection};
-use croupier::unstable::scene::blob;
-use croupier::unstable::scene::blob::{CameraKind, MAX_COORDINATE, MAX_SIDE};
-use glam::DVec3;
+use crate::math::Std;
+use croupier::unstable::compose::{FieldError, View};
+use croupier::unstable::scene::Field;
+use croupier::unstable::scene::blob::{self, CameraKind, MAX_COORDINATE};
 
-/// Right and down reach from the image centre to the edges: `tan(vfov / 2)` downwards at distance 1, or half the height
-/// of an orthographic image, times width / height to the right (pixels are square); unit vectors for a panorama.
+/// The record of a camera, by the rules of [`View`].
 pub(super) fn bake(c: &Camera) -> Result<blob::Camera, BakeError> {
-    let bad = |what, found, range| BakeError::Camera { what, found, range };
-    for (what, v) in [("origin", c.origin), ("target", c.target), ("up", c.up)] {
-        let limit = f64::from(MAX_COORDINATE);
-        if let Some(x) = v.iter().find(|x| x.is_nan() || x.abs() > limit) {
-            return Err(bad(what, *x, "from -1e9 to 1e9"));
-        }
-    }
-    for (what, n) in [("width", c.size[0]), ("height", c.size[1])] {
-        if n == 0 || n > MAX_SIDE {
-            return Err(bad(what, f64::from(n), "from 1 to 65536"));
-        }
-    }
-    let half_height = match c.projection {
-        Projection::Perspective if c.vfov_deg > 1e-3 && c.vfov_deg < 179.9 => (c.vfov_deg.to_radians() / 2.0).tan(),
-        Projection::Perspective => {
-            return Err(bad("vertical field of view in degrees", c.vfov_deg, "above 0.001 and below 179.9"));
-        }
-        Projection::Orthographic { height } if (1e-12..=MAX_COORDINATE).contains(&height) => f64::from(height) / 2.0,
-        Projection::Orthographic { height } => {
-            return Err(bad("orthographic height", height.into(), "from 1e-12 to 1e9"));
-        }
-        Projection::Panoramic => 1.0,
+    let (kind, extent) = match c.projection {
+        Projection::Perspective => (CameraKind::Perspective, c.vfov_deg),
+        Projection::Orthographic { height } => (CameraKind::Orthographic, f64::from(height)),
+        Projection::Panoramic => (CameraKind::Panoramic, 0.0),
     };
-    let [origin, target, up] = [c.origin, c.target, c.up].map(DVec3::from_array);
-    let axis = target - origin;
-    let forward = axis.try_normalize().ok_or(bad("distance from origin to target", axis.length(), "above 0"))?;
-    let side = forward.cross(up.normalize_or_zero());
-    let right = if side.length() > 1e-6 {
-        side.normalize()
-    } else {
-        return Err(bad("sine of angle between axis and up", side.length(), "above 1e-6"));
-    };
-    let (kind, aspect) = match c.projection {
-        Projection::Perspective => (CameraKind::Perspective, f64::from(c.size[0]) / f64::from(c.size[1])),
-        Projection::Orthographic { .. } => (CameraKind::Orthographic, f64::from(c.size[0]) / f64::from(c.size[1])),
-        Projection::Panoramic => (CameraKind::Panoramic, 1.0),
-    };
-    let half_width = half_height * aspect;
     let (lens_radius, focus_distance) = c.lens.map_or((0.0, 0.0), |l| (l.radius, l.focus_distance));
-    if !(0.0..=MAX_COORDINATE).contains(&lens_radius) {
-        return Err(bad("lens radius", lens_radius.into(), "from 0 to 1e9"));
-    }
-    if lens_radius > 0.0 && c.projection != Projection::Perspective {
-        return Err(bad("lens radius of a camera that is not perspective", lens_radius.into(), "0"));
-    }
-    if lens_radius > 0.0 && !(f32::MIN_POSITIVE..=MAX_COORDINATE).contains(&focus_distance) {
-        return Err(bad("focus distance", focus_distance.into(), "above 0, up to 1e9"));
-    }
-    Ok(blob::Camera {
-        kind: kind as u32,
-        origin: origin.as_vec3().to_array(),
-        forward: forward.as_vec3().to_array(),
-        right: (right * half_width).as_vec3().to_array(),
-        down: (forward.cross(right) * half_height).as_vec3().to_array(),
-        lens_radius,
-        focus_distance: if lens_radius > 0.0 { focus_distance } else { 0.0 },
-        size: c.size,
-    })
+    let Camera { origin, target, up, size, .. } = *c;
+    let view = View { kind, origin, target, up, extent, size, lens_radius, focus_distance };
+    view.record_with::<Std>().map_err(|e| error(&view, e))
+}
+
+/// What is wrong with a camera, in words.
+fn error(view: &View, FieldError { field, found }: FieldError) -> BakeError {
+    let coordinates = "from -1e9 to 1e9";
+    let outside = |v: &[f64; 3]| v.iter().copied().find(|x| x.is_nan() || x.abs() > f64::from(MAX_COORDINATE));
+    let vectors = [("origin", &view.origin), ("target", &view.target), ("up", &view.up)];
+    let (what, found, range) = match field {
+        Field::Position => {
+            let wrong = vectors.into_iter().find_map(|(what, v)| Some((what, outside(v)?, coordinates)));
+            wrong.unwrap_or(("position", found.into(), coordinates))
+        }
+        Field::Width => ("width", found.into(), "from 1 to 65536"),
+        Field::Height => ("height", found.into(), "from 1 to 65536"),
+        Field::Direction => ("distance from origin to target", found.into(), "above 0"),
+        Field::LensRadius if view.kind != CameraKind::Perspective && found > 0.0 => {
+            ("lens radius of a camera that is not perspective", found.into(), "0")
+        }
+        Field::LensRadius => ("lens radius", found.into(), "from 0 to 1e9"),
+        Field::FocusDistance => ("focus distance", found.into(), "above 0, up to 1e9"),
+        _ if found.to_bits() != (view.extent as f32).to_bits() => {
+            ("sine of angle between axis and up", found.into(), "above 1e-6")
+        }
+        _ if view.kind == CameraKind::Perspective => {
+            ("vertical field of view in degrees", view.extent, "above 0.001 and below 179.9")
+        }
+        _ => ("orthographic height", view.extent, "from 1e-12 to 1e9"),
+    };
+    BakeError::Camera { what, found, range }
 }

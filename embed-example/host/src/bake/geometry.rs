@@ -2,6 +2,8 @@
 
 use super::BakeError;
 use crate::description::{SceneDescription, Triangle, Vertex};
+use crate::math::Std;
+use croupier::unstable::compose::{self, vertex_normal};
 use croupier::unstable::scene::blob::MAX_COORDINATE;
 use croupier::unstable::scene::blob::{self, NONE, TRIANGLE_OBJECT_SHIFT, TRIANGLE_SMOOTH};
 use glam::Vec3;
@@ -23,20 +25,14 @@ pub(super) struct Geometry {
     pub flattened: u32,
 }
 
-/// Area of a triangle, the way lights state it: in `f64`, rounded once.
+/// Area of a triangle as lights state it.
 pub(super) fn area(corners: &[[f32; 3]; 3]) -> f32 {
-    let [a, b, c] = corners.map(|p| Vec3::from_array(p).as_dvec3());
-    (0.5 * (b - a).cross(c - a).length()) as f32
-}
-
-/// Unit normal; zero if it has no direction.
-fn unit(n: [f32; 3]) -> [f32; 3] {
-    Vec3::from_array(n).as_dvec3().normalize_or_zero().as_vec3().to_array()
+    compose::area::<Std>(corners)
 }
 
 /// Does a triangle have an area that `f32` can hold? One without is hit by no ray and has no normal: it is left out.
 fn has_area(corners: &[[f32; 3]; 3]) -> bool {
-    area(corners) >= f32::MIN_POSITIVE
+    compose::has_area::<Std>(corners)
 }
 
 /// Index in the description of each triangle that is taken over, in order; `runs` as for [`bake`].
@@ -59,7 +55,11 @@ pub(super) fn bake(
         }
     }
     let mut g = Geometry {
-        vertices: scene.vertices.iter().map(|v| blob::Vertex { p: v.position, n: unit(v.normal), uv: v.uv }).collect(),
+        vertices: scene
+            .vertices
+            .iter()
+            .map(|v| blob::Vertex { p: v.position, n: vertex_normal::<Std>(v.normal), uv: v.uv })
+            .collect(),
         triangles: Vec::with_capacity(scene.triangles.len()),
         corners: Vec::with_capacity(scene.triangles.len()),
         objects: Vec::with_capacity(runs.len()),

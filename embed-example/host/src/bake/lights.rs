@@ -4,19 +4,16 @@ use super::geometry::{Geometry, area, radius};
 use super::instances::Forest;
 use super::{BakeError, emission};
 use crate::description::{Emitter, Environment, LightShape, Model, SceneDescription, ShapeLight};
+use crate::math::Std;
 use crate::{alias, environment};
 use bytemuck::Zeroable;
+use croupier::unstable::compose::{FieldError, LightSource, MIN_CONE_DEG, Sides};
 use croupier::unstable::light::luminance;
+use croupier::unstable::scene::Field;
 use croupier::unstable::scene::blob::{self, Alias, EnvironmentKind, Light, LightKind};
-use croupier::unstable::scene::blob::{
-    MAX_COORDINATE, MAX_EMISSION, MAX_SHAPE_LIGHTS, MAX_SIDE, SHAPE_HIDDEN, SHAPE_SIZE_RANGE, SHAPE_TWO_SIDED,
-};
-use glam::{DVec3, Vec3};
+use croupier::unstable::scene::blob::{MAX_EMISSION, MAX_SHAPE_LIGHTS, MAX_SIDE};
+use glam::DVec3;
 use std::ops::Range;
-
-/// Smallest half angle of a spot and smallest diameter of a sun, degrees: the rounding of a direction moves the edge by
-/// 1e-3 of it.
-const MIN_CONE_DEG: f32 = 1e-2;
 
 /// Sections of the blob.
 #[derive(Default)]
@@ -89,16 +86,15 @@ pub(super) fn bake(
             out.lights.push(Light { kind, triangle: i, area: area(corners), emission, ..Zeroable::zeroed() });
         }
     }
-    for (i, e) in scene.emitters.iter().enumerate() {
-        out.lights.extend(delta_light(i, e)?);
+    for (i, e) in scene.emitters.iter().enumerate().filter(|(_, e)| !matches!(e, Emitter::Shape(_))) {
+        out.lights.extend(light(i, e)?);
     }
     if let Some(e) = &scene.environment {
         out.surround(e)?;
     }
     let hidden = out.place(scene, emission, geometry, forest)?;
-    for (i, e) in scene.emitters.iter().enumerate() {
-        let Emitter::Shape(light) = e else { continue };
-        out.lights.extend(shape_light(i, light)?);
+    for (i, e) in scene.emitters.iter().enumerate().filter(|(_, e)| matches!(e, Emitter::Shape(_))) {
+        out.lights.extend(light(i, e)?);
     }
     let shapes = out.lights.iter().filter(|l| LightKind::from_u32(l.kind).is_some_and(LightKind::has_shape)).count();
     if shapes > MAX_SHAPE_LIGHTS {
@@ -110,34 +106,6 @@ pub(super) fn bake(
     hidden.into_iter().flatten().for_each(|light| weights[light] = 0.0);
     out.alias = alias::build(&weights);
     Ok(out)
-}
-
-/// Unit vector of a direction of any length but 0.
-fn unit(emitter: &str, direction: [f32; 3]) -> Result<Vec3, BakeError> {
-    let wide = Vec3::from_array(direction).as_dvec3();
-    wide.try_normalize().map(|d| d.as_vec3()).ok_or_else(|| BakeError::Emitter {
-        emitter: emitter.into(),
-        what: "length of the direction",
-        found: wide.length() as f32,
-    })
-}
-
-/// Axis and 1 - cos of the outer and of the inner half angle, as `params` of a light has them.
-fn cone(emitter: &str, direction: [f32; 3], [outer, inner]: [f32; 2]) -> Result<[f32; 6], BakeError> {
-    let bad = |what, found| Err(BakeError::Emitter { emitter: emitter.into(), what, found });
-    let [x, y, z] = unit(emitter, direction)?.to_array();
-    if !(MIN_CONE_DEG..=180.0).contains(&outer) {
-        return bad("outer half angle in degrees", outer);
-    }
-    if !(0.0..=outer).contains(&inner) {
-        return bad("inner half angle in degrees", inner);
-    }
-    Ok([x, y, z, versine(outer), versine(inner), 0.0])
-}
-
-/// 1 - cos of an angle in degrees, as 2 sin^2 of half of it: without cancellation.
-fn versine(degrees: f32) -> f32 {
-    (2.0 * (f64::from(degrees).to_radians() / 2.0).sin().powi(2)) as f32
 }
 
 impl Lights {
@@ -214,90 +182,59 @@ fn sub(a: [f64; 3], b: [f64; 3]) -> DVec3 {
     DVec3::from_array(a) - DVec3::from_array(b)
 }
 
-/// Checks a position.
-fn located(emitter: &str, position: [f32; 3]) -> Result<[f32; 3], BakeError> {
-    match position.into_iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE) {
-        Some(found) => Err(BakeError::Emitter { emitter: emitter.into(), what: "position", found }),
-        None => Ok(position),
-    }
-}
-
-/// A light with a shape; black ones are left out.
-fn shape_light(index: usize, l: &ShapeLight) -> Result<Option<Light>, BakeError> {
-    let kind = match l.shape {
-        LightShape::Sphere { .. } => LightKind::Sphere,
-        LightShape::Rectangle { .. } => LightKind::Rectangle,
-        LightShape::Disk { .. } => LightKind::Disk,
-    };
-    let emitter = format!("emitter {index} ({})", kind.name());
-    check_emission(&emitter, "radiance", l.radiance)?;
-    let vector = located(&emitter, l.position)?;
-    let bad = |what, found| Err(BakeError::Emitter { emitter: emitter.clone(), what, found });
-    let [least, most] = SHAPE_SIZE_RANGE;
-    let params = match l.shape {
-        LightShape::Sphere { radius } | LightShape::Disk { radius, .. } if !(least..=most).contains(&radius) => {
-            return bad("radius", radius);
+/// The light of an emitter, unless triangles have it.
+fn source(e: &Emitter) -> Option<LightSource> {
+    Some(match *e {
+        Emitter::Area { .. } => return None,
+        Emitter::Point { position, intensity } => LightSource::Point { position, intensity },
+        Emitter::Directional { direction, irradiance } => LightSource::Directional { direction, irradiance },
+        Emitter::Sun { direction, irradiance, angle_deg } => LightSource::Sun { direction, irradiance, angle_deg },
+        Emitter::Spot { position, direction, intensity, inner_deg, outer_deg } => {
+            LightSource::Spot { position, direction, intensity, inner_deg, outer_deg }
         }
-        LightShape::Sphere { radius } => [radius, 0.0, 0.0, 0.0, 0.0, 0.0],
-        LightShape::Disk { direction, radius } => {
-            let [x, y, z] = unit(&emitter, direction)?.to_array();
-            [x, y, z, radius, 0.0, 0.0]
-        }
-        LightShape::Rectangle { edges } => {
-            let [u, v] = edges.map(|e| Vec3::from_array(e).as_dvec3() / 2.0);
-            for half in [u, v] {
-                let length = half.length();
-                if !(f64::from(least)..=f64::from(most)).contains(&length) {
-                    return bad("length of an edge", (2.0 * length) as f32);
+        Emitter::Shape(ShapeLight { shape, position, radiance, two_sided, visible }) => {
+            let sides = Sides { two_sided, visible };
+            match shape {
+                LightShape::Sphere { radius } => LightSource::Sphere { position, radius, radiance, sides },
+                LightShape::Rectangle { edges } => LightSource::Rectangle { position, edges, radiance, sides },
+                LightShape::Disk { direction, radius } => {
+                    LightSource::Disk { position, direction, radius, radiance, sides }
                 }
             }
-            let cos = u.normalize().dot(v.normalize());
-            if cos.abs() > 1e-3 {
-                return bad("cosine of the angle between the edges", cos as f32);
-            }
-            let ([a, b, c], [x, y, z]) = (u.as_vec3().to_array(), v.as_vec3().to_array());
-            [a, b, c, x, y, z]
         }
-    };
-    let flag = |on, bit| if on { bit } else { 0 };
-    let triangle = flag(l.two_sided, SHAPE_TWO_SIDED) | flag(!l.visible, SHAPE_HIDDEN);
-    let light = Light { kind: kind as u32, triangle, vector, emission: l.radiance, params, ..Zeroable::zeroed() };
-    Ok((l.radiance != [0.0; 3]).then_some(light))
+    })
 }
 
-/// A light that no ray meets; black ones are left out.
-fn delta_light(index: usize, e: &Emitter) -> Result<Option<Light>, BakeError> {
-    let (kind, vector, emission, params) = match *e {
-        Emitter::Area { .. } | Emitter::Shape(_) => return Ok(None),
-        Emitter::Point { position, intensity } => {
-            let emitter = format!("emitter {index} (point)");
-            check_emission(&emitter, "intensity", intensity)?;
-            (LightKind::Point, located(&emitter, position)?, intensity, [0.0; 6])
-        }
-        Emitter::Directional { direction, irradiance } => {
-            let emitter = format!("emitter {index} (directional)");
-            check_emission(&emitter, "irradiance", irradiance)?;
-            (LightKind::Directional, (-unit(&emitter, direction)?).to_array(), irradiance, [0.0; 6])
-        }
-        Emitter::Sun { direction, irradiance, angle_deg } => {
-            let emitter = format!("emitter {index} (sun)");
-            check_emission(&emitter, "irradiance", irradiance)?;
-            if !(MIN_CONE_DEG..=90.0).contains(&angle_deg) {
-                let what = "angular diameter in degrees";
-                return Err(BakeError::Emitter { emitter, what, found: angle_deg });
-            }
-            let params = [versine(angle_deg / 2.0), 0.0, 0.0, 0.0, 0.0, 0.0];
-            (LightKind::Sun, (-unit(&emitter, direction)?).to_array(), irradiance, params)
-        }
-        Emitter::Spot { position, direction, intensity, inner_deg, outer_deg } => {
-            let emitter = format!("emitter {index} (spot)");
-            check_emission(&emitter, "intensity", intensity)?;
-            let params = cone(&emitter, direction, [outer_deg, inner_deg])?;
-            (LightKind::Spot, located(&emitter, position)?, intensity, params)
-        }
+/// The record of an emitter that is no triangle; black ones are left out.
+fn light(index: usize, e: &Emitter) -> Result<Option<Light>, BakeError> {
+    let Some(source) = source(e) else { return Ok(None) };
+    let light = source.record_with::<Std>().map_err(|e| {
+        let (what, found) = words(&source, e);
+        BakeError::Emitter { emitter: format!("emitter {index} ({})", source.kind().name()), what, found }
+    })?;
+    Ok((light.emission != [0.0; 3]).then_some(light))
+}
+
+/// What is wrong with a light, in words, and the number as scene files have it.
+fn words(source: &LightSource, FieldError { field, found }: FieldError) -> (&'static str, f32) {
+    let emission = match source.kind() {
+        LightKind::Point | LightKind::Spot => "intensity",
+        LightKind::Directional | LightKind::Sun => "irradiance",
+        _ => "radiance",
     };
-    let light = Light { kind: kind as u32, vector, emission, params, ..Zeroable::zeroed() };
-    Ok((emission != [0.0; 3]).then_some(light))
+    match (field, source) {
+        (Field::Emission, _) => (emission, found),
+        (Field::Direction, _) => ("length of the direction", found),
+        (Field::Cone, LightSource::Spot { outer_deg, .. }) if !(MIN_CONE_DEG..=180.0).contains(outer_deg) => {
+            ("outer half angle in degrees", found)
+        }
+        (Field::Cone, LightSource::Spot { .. }) => ("inner half angle in degrees", found),
+        (Field::Cone, _) => ("angular diameter in degrees", found),
+        (Field::ShapeSize, LightSource::Rectangle { .. }) => ("length of an edge", 2.0 * found),
+        (Field::ShapeSize, _) => ("radius", found),
+        (Field::Edges, _) => ("cosine of the angle between the edges", found.sqrt()),
+        _ => ("position", found),
+    }
 }
 
 impl Lights {
