@@ -316,7 +316,7 @@ fn what_sessions_show() {
     fails!(CROUPIER_RANGE, croupier_session_plane(render.session, 2, 1, p, n));
     fails!(CROUPIER_RANGE, croupier_session_plane(render.session, 15, 0, p, n));
     fails!(CROUPIER_SIZE, croupier_session_plane(render.session, 2, 0, p, n + 1));
-    assert_eq!((0..16).map(croupier_aov_channels).sum::<u32>(), 37);
+    assert_eq!((0..16).map(|aov| croupier_aov_channels(aov)).sum::<u32>(), 37);
 
     let empty = croupier_pixel { mean: [0.0; 3], standard_error: [0.0; 3], samples: 0, rays: 0 };
     let mut pixels = vec![empty; n];
