@@ -2362,9 +2362,8 @@ const char *croupier_instruction_set(void);
 
 /*
  CROUPIER_OK if the processor, and the operating system, have all instructions that the library was compiled for;
- CROUPIER_INSTRUCTIONS, with the first that is missing in the message, if not. Other functions are not to be called
- then: those that start something ask by themselves and fail with that status. On other processors than x86-64 nothing is
- known, and the answer is CROUPIER_OK.
+ CROUPIER_INSTRUCTIONS, with the first that is missing in the message, if not: no other function is to be called then. On
+ other processors than x86-64 nothing is known, and the answer is CROUPIER_OK.
  */
 croupier_status croupier_check_processor(struct croupier_message *message);
 
