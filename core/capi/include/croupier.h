@@ -19,9 +19,10 @@
 #include <stdint.h>
 
 /*
- First number of surfaces that are not triangles of the scene.
+ Version of this interface: it grows when functions, members of structs or numbers are added, and a program for a smaller
+ one works on. What does not work on is another soname.
  */
-#define CROUPIER_OWN_SURFACE 2147483648
+#define CROUPIER_ABI_VERSION 1
 
 /*
  "No such index".
@@ -39,10 +40,9 @@
 #define CROUPIER_SCENE_BYTES 2048
 
 /*
- Version of this interface: it grows when functions, members of structs or numbers are added, and a program for a smaller
- one works on. What does not work on is another soname.
+ First number of surfaces that are not triangles of the scene.
  */
-#define CROUPIER_ABI_VERSION 1
+#define CROUPIER_OWN_SURFACE 2147483648
 
 /*
  What became of a call. Functions that return a status have done nothing unless it is CROUPIER_OK, or their
@@ -405,6 +405,74 @@ typedef struct croupier_session croupier_session;
 typedef struct croupier_shard croupier_shard;
 
 /*
+ Text about a failure, for people: what was wrong with which object, with numbers.
+ */
+typedef struct croupier_message {
+  /*
+   UTF-8, ended by a zero byte, cut off where it is too long. Empty after a call that succeeded.
+   */
+  char text[256];
+} croupier_message;
+
+/*
+ What a scene has.
+ */
+typedef struct croupier_scene_facts {
+  /*
+   sizeof(croupier_scene_facts), set by the program.
+   */
+  uint32_t struct_size;
+  /*
+   Default columns of pictures.
+   */
+  uint32_t width;
+  /*
+   Default rows.
+   */
+  uint32_t height;
+  /*
+   Default number of path segments.
+   */
+  uint32_t max_depth;
+  /*
+   Triangles.
+   */
+  uint32_t triangles;
+  /*
+   Materials.
+   */
+  uint32_t materials;
+  /*
+   Lights.
+   */
+  uint32_t lights;
+  /*
+   Media.
+   */
+  uint32_t media;
+  /*
+   Objects; 0 in a scene without instances, else the world and what instances place.
+   */
+  uint32_t objects;
+  /*
+   Instances.
+   */
+  uint32_t instances;
+  /*
+   Smallest coordinates, world space.
+   */
+  float bounds_min[3];
+  /*
+   Largest coordinates.
+   */
+  float bounds_max[3];
+  /*
+   Identity of the scene as it is: changes with every edit, and comes back when an edit is taken back.
+   */
+  uint64_t identity;
+} croupier_scene_facts;
+
+/*
  The camera of a scene. A pixel sample is a point (x, y) in [0, width) x [0, height), y down; with X = 2 x / width - 1
  and Y = 2 y / height - 1 the ray of a perspective camera looks along forward + right X + down Y, from origin or a point of
  the lens; that of an orthographic one begins at origin + right X + down Y and runs along forward; a panoramic one
@@ -456,6 +524,43 @@ typedef struct croupier_camera {
 } croupier_camera;
 
 /*
+ A light of a scene. Colours are linear Rec. 709.
+ */
+typedef struct croupier_light {
+  /*
+   croupier_light_kind; cannot change.
+   */
+  uint32_t kind;
+  /*
+   Area: index of the triangle; cannot change. Sphere, rectangle, disk: 1 if it emits to both sides, plus 2 if camera
+   rays do not see it.
+   */
+  uint32_t triangle;
+  /*
+   Area: area of the triangle, world units squared; cannot change.
+   */
+  float area;
+  /*
+   Area: 1 + index of the world's instance that the triangle is in, or 0; cannot change.
+   */
+  uint32_t instance;
+  /*
+   Point, spot: position. Sphere, rectangle, disk: middle. Directional, sun: unit direction towards the light.
+   */
+  float vector[3];
+  /*
+   Area, sphere, rectangle, disk: radiance. Point: intensity. Spot: intensity on the axis. Directional, sun: irradiance on
+   a facing surface. Up to 1e18.
+   */
+  float emission[3];
+  /*
+   Spot: unit axis, 1 - cos of the outer and of the inner half angle, 0. Sun: 1 - cos of its angular radius, then 0.
+   Sphere: radius, then 0. Rectangle: two halves of edges. Disk: unit normal, radius, 0, 0. Others: 0.
+   */
+  float params[6];
+} croupier_light;
+
+/*
  A material of a scene. Members that its kind does not use are 0, indices CROUPIER_NONE.
  */
 typedef struct croupier_material {
@@ -502,6 +607,188 @@ typedef struct croupier_material {
    */
   uint32_t medium;
 } croupier_material;
+
+/*
+ A texture with an affine map of its coordinates.
+ */
+typedef struct croupier_texture_use {
+  /*
+   Index of the texture, or CROUPIER_NONE.
+   */
+  uint32_t texture;
+  /*
+   Rows of the matrix that maps (u, v, 1) of the surface to coordinates of the texture.
+   */
+  float transform[2][3];
+} croupier_texture_use;
+
+/*
+ Albedo of a layer of one roughness.
+ */
+typedef struct croupier_layer {
+  /*
+   By the square roots of cosines, equally spaced from 0 to 1.
+   */
+  float albedo[32];
+  /*
+   At the nodes of a quadrature over cosines.
+   */
+  float nodes[4];
+} croupier_layer;
+
+/*
+ What a principled material has besides croupier_material. Numbers without a range are from 0 to 1. The last four members
+ are derived by baking from the roughnesses, the coat and the sheen: keep them with those.
+ */
+typedef struct croupier_principled {
+  /*
+   sizeof(croupier_principled), set by the program.
+   */
+  uint32_t struct_size;
+  /*
+   Share of metal.
+   */
+  float metalness;
+  /*
+   Square root of the GGX width.
+   */
+  float roughness;
+  /*
+   Share of what enters the dielectric that is transmitted.
+   */
+  float transmission;
+  /*
+   Strength of the coat.
+   */
+  float coat;
+  /*
+   Share of light that meets the surface, if the material has the flag 2.
+   */
+  float opacity;
+  /*
+   Reflectance of the dielectric at grazing angles.
+   */
+  float f90;
+  /*
+   Reflectance of the dielectric at normal incidence.
+   */
+  float f0[3];
+  /*
+   Colour of the sheen.
+   */
+  float sheen_color[3];
+  /*
+   GGX width of the coat, 1e-4 to 1.
+   */
+  float coat_alpha;
+  /*
+   Width of the distribution of the sheen's fibres, 0.01 to 1.
+   */
+  float sheen_alpha;
+  /*
+   Refractive index of solid transmission, 0.1 to 10 and at least 0.01 away from 1.
+   */
+  float eta;
+  /*
+   Factor on the tangential part of mapped normals, up to 1000.
+   */
+  float normal_scale;
+  /*
+   1 if what light passes is a sheet and not a solid, plus 2 if the alpha of the base texture multiplies the opacity.
+   */
+  uint32_t flags;
+  /*
+   First entry of the rows of reflection among the scene's tables.
+   */
+  uint32_t reflection;
+  /*
+   First entry of the rows of energy among the scene's tables, or CROUPIER_NONE.
+   */
+  uint32_t energy;
+  /*
+   Textures: base colour and opacity; metal (blue) and roughness (green); transmission (red); coat (red); normal; emission.
+   */
+  struct croupier_texture_use textures[6];
+  /*
+   Albedo of the coat at full strength.
+   */
+  struct croupier_layer coat_layer;
+  /*
+   Albedo of a white sheen.
+   */
+  struct croupier_layer sheen_layer;
+} croupier_principled;
+
+/*
+ The environment of a scene.
+ */
+typedef struct croupier_environment {
+  /*
+   sizeof(croupier_environment), set by the program.
+   */
+  uint32_t struct_size;
+  /*
+   0 for constant radiance, 1 for a map by latitude and longitude; cannot change.
+   */
+  uint32_t kind;
+  /*
+   Index of its light; cannot change.
+   */
+  uint32_t light;
+  /*
+   Columns of the map; cannot change.
+   */
+  uint32_t width;
+  /*
+   Rows of the map; cannot change.
+   */
+  uint32_t height;
+  /*
+   Rows of the rotation from the world to the map.
+   */
+  float to_local[3][3];
+  /*
+   Constant: radiance. Map: scale by channel.
+   */
+  float radiance[3];
+} croupier_environment;
+
+/*
+ An instance of an object.
+ */
+typedef struct croupier_instance {
+  /*
+   sizeof(croupier_instance), set by the program.
+   */
+  uint32_t struct_size;
+  /*
+   Index of the object that it places.
+   */
+  uint32_t object;
+  /*
+   0 if it is hidden.
+   */
+  uint32_t visible;
+  /*
+   Index of its first light among the world's.
+   */
+  uint32_t first_light;
+  /*
+   Rows of the affine maps to the space around it, when the shutter opens and when it closes.
+   */
+  float to_world[2][3][4];
+} croupier_instance;
+
+/*
+ Rows of the affine maps of an instance to the space around it, when the shutter opens and when it closes: the same
+ twice if it stands still.
+ */
+typedef struct croupier_transform {
+  /*
+   The two maps.
+   */
+  float to_world[2][3][4];
+} croupier_transform;
 
 /*
  A texture of a scene.
@@ -575,43 +862,6 @@ typedef struct croupier_medium {
    */
   uint32_t reserved[2];
 } croupier_medium;
-
-/*
- A light of a scene. Colours are linear Rec. 709.
- */
-typedef struct croupier_light {
-  /*
-   croupier_light_kind; cannot change.
-   */
-  uint32_t kind;
-  /*
-   Area: index of the triangle; cannot change. Sphere, rectangle, disk: 1 if it emits to both sides, plus 2 if camera
-   rays do not see it.
-   */
-  uint32_t triangle;
-  /*
-   Area: area of the triangle, world units squared; cannot change.
-   */
-  float area;
-  /*
-   Area: 1 + index of the world's instance that the triangle is in, or 0; cannot change.
-   */
-  uint32_t instance;
-  /*
-   Point, spot: position. Sphere, rectangle, disk: middle. Directional, sun: unit direction towards the light.
-   */
-  float vector[3];
-  /*
-   Area, sphere, rectangle, disk: radiance. Point: intensity. Spot: intensity on the axis. Directional, sun: irradiance on
-   a facing surface. Up to 1e18.
-   */
-  float emission[3];
-  /*
-   Spot: unit axis, 1 - cos of the outer and of the inner half angle, 0. Sun: 1 - cos of its angular radius, then 0.
-   Sphere: radius, then 0. Rectangle: two halves of edges. Disk: unit normal, radius, 0, 0. Others: 0.
-   */
-  float params[6];
-} croupier_light;
 
 /*
  Arrays that make up a scene. Those that are not needed are null, with a count of 0. Lengths are in the scene's unit,
@@ -751,16 +1001,6 @@ typedef struct croupier_arrays {
 } croupier_arrays;
 
 /*
- Text about a failure, for people: what was wrong with which object, with numbers.
- */
-typedef struct croupier_message {
-  /*
-   UTF-8, ended by a zero byte, cut off where it is too long. Empty after a call that succeeded.
-   */
-  char text[256];
-} croupier_message;
-
-/*
  A camera by where it is and what it looks at, world space.
  */
 typedef struct croupier_view {
@@ -862,160 +1102,14 @@ typedef struct croupier_light_source {
 } croupier_light_source;
 
 /*
- The environment of a scene.
+ Settings of a render. Its members are the library's; the struct may be copied. Threads may read it at the same time.
  */
-typedef struct croupier_environment {
+typedef struct croupier_settings {
   /*
-   sizeof(croupier_environment), set by the program.
+   Not for programs.
    */
-  uint32_t struct_size;
-  /*
-   0 for constant radiance, 1 for a map by latitude and longitude; cannot change.
-   */
-  uint32_t kind;
-  /*
-   Index of its light; cannot change.
-   */
-  uint32_t light;
-  /*
-   Columns of the map; cannot change.
-   */
-  uint32_t width;
-  /*
-   Rows of the map; cannot change.
-   */
-  uint32_t height;
-  /*
-   Rows of the rotation from the world to the map.
-   */
-  float to_local[3][3];
-  /*
-   Constant: radiance. Map: scale by channel.
-   */
-  float radiance[3];
-} croupier_environment;
-
-/*
- A texture with an affine map of its coordinates.
- */
-typedef struct croupier_texture_use {
-  /*
-   Index of the texture, or CROUPIER_NONE.
-   */
-  uint32_t texture;
-  /*
-   Rows of the matrix that maps (u, v, 1) of the surface to coordinates of the texture.
-   */
-  float transform[2][3];
-} croupier_texture_use;
-
-/*
- Albedo of a layer of one roughness.
- */
-typedef struct croupier_layer {
-  /*
-   By the square roots of cosines, equally spaced from 0 to 1.
-   */
-  float albedo[32];
-  /*
-   At the nodes of a quadrature over cosines.
-   */
-  float nodes[4];
-} croupier_layer;
-
-/*
- What a principled material has besides croupier_material. Numbers without a range are from 0 to 1. The last four members
- are derived by baking from the roughnesses, the coat and the sheen: keep them with those.
- */
-typedef struct croupier_principled {
-  /*
-   sizeof(croupier_principled), set by the program.
-   */
-  uint32_t struct_size;
-  /*
-   Share of metal.
-   */
-  float metalness;
-  /*
-   Square root of the GGX width.
-   */
-  float roughness;
-  /*
-   Share of what enters the dielectric that is transmitted.
-   */
-  float transmission;
-  /*
-   Strength of the coat.
-   */
-  float coat;
-  /*
-   Share of light that meets the surface, if the material has the flag 2.
-   */
-  float opacity;
-  /*
-   Reflectance of the dielectric at grazing angles.
-   */
-  float f90;
-  /*
-   Reflectance of the dielectric at normal incidence.
-   */
-  float f0[3];
-  /*
-   Colour of the sheen.
-   */
-  float sheen_color[3];
-  /*
-   GGX width of the coat, 1e-4 to 1.
-   */
-  float coat_alpha;
-  /*
-   Width of the distribution of the sheen's fibres, 0.01 to 1.
-   */
-  float sheen_alpha;
-  /*
-   Refractive index of solid transmission, 0.1 to 10 and at least 0.01 away from 1.
-   */
-  float eta;
-  /*
-   Factor on the tangential part of mapped normals, up to 1000.
-   */
-  float normal_scale;
-  /*
-   1 if what light passes is a sheet and not a solid, plus 2 if the alpha of the base texture multiplies the opacity.
-   */
-  uint32_t flags;
-  /*
-   First entry of the rows of reflection among the scene's tables.
-   */
-  uint32_t reflection;
-  /*
-   First entry of the rows of energy among the scene's tables, or CROUPIER_NONE.
-   */
-  uint32_t energy;
-  /*
-   Textures: base colour and opacity; metal (blue) and roughness (green); transmission (red); coat (red); normal; emission.
-   */
-  struct croupier_texture_use textures[6];
-  /*
-   Albedo of the coat at full strength.
-   */
-  struct croupier_layer coat_layer;
-  /*
-   Albedo of a white sheen.
-   */
-  struct croupier_layer sheen_layer;
-} croupier_principled;
-
-/*
- Rows of the affine maps of an instance to the space around it, when the shutter opens and when it closes: the same
- twice if it stands still.
- */
-typedef struct croupier_transform {
-  /*
-   The two maps.
-   */
-  float to_world[2][3][4];
-} croupier_transform;
+  uint64_t opaque[64];
+} croupier_settings;
 
 /*
  What a render needs: settings that were checked, and sizes. Its members are the library's; the struct may be copied.
@@ -1029,246 +1123,38 @@ typedef struct croupier_plan {
 } croupier_plan;
 
 /*
- A pixel of the picture so far. Linear Rec. 709.
+ Sizes of a plan's blocks of memory. Each block starts at a multiple of CROUPIER_ALIGN bytes and may hold anything before.
  */
-typedef struct croupier_pixel {
+typedef struct croupier_sizes {
   /*
-   Mean radiance.
-   */
-  float mean[3];
-  /*
-   Standard error of the mean.
-   */
-  float standard_error[3];
-  /*
-   Camera samples; 0 before the end of the first iteration.
-   */
-  uint32_t samples;
-  /*
-   Rays of all kinds, at most 2^32 - 1; 0 unless the settings ask for the AOV cost or are adaptive.
-   */
-  uint32_t rays;
-} croupier_pixel;
-
-/*
- Estimated error of the picture against its own expectation.
- */
-typedef struct croupier_error_estimate {
-  /*
-   sizeof(croupier_error_estimate), set by the program.
+   sizeof(croupier_sizes), set by the program.
    */
   uint32_t struct_size;
   /*
-   0.
+   Columns of the picture.
    */
-  uint32_t reserved;
+  uint32_t width;
   /*
-   Mean over pixels and channels of variance / (mean^2 + 0.01), without the worst 0.01 % of the pixels, times independence.
+   Rows of the picture.
    */
-  double rel_mse;
+  uint32_t height;
   /*
-   Lower end of its 95 % confidence interval.
+   Number of shards.
    */
-  double low;
+  uint32_t shards;
   /*
-   Upper end.
+   Bytes of a session's block.
    */
-  double high;
+  uint64_t session;
   /*
-   The same mean over all pixels.
+   Bytes of a block that any shard fits into; croupier_plan_shard_size is exact.
    */
-  double rel_mse_all;
+  uint64_t shard;
   /*
-   Variance of the pixels over that of independent samples; 1 while it is not known.
+   Bytes of stack that a call needs at most, without what callbacks need.
    */
-  double independence;
-} croupier_error_estimate;
-
-/*
- One round of camera samples.
- */
-typedef struct croupier_iteration {
-  /*
-   sizeof(croupier_iteration), set by the program.
-   */
-  uint32_t struct_size;
-  /*
-   Camera samples per pixel in it.
-   */
-  uint32_t samples;
-  /*
-   1 for the first; 0 before it.
-   */
-  uint64_t number;
-  /*
-   Camera samples per pixel before it.
-   */
-  uint32_t first_sample;
-  /*
-   0.
-   */
-  uint32_t reserved;
-  /*
-   Number of times that the picture began again.
-   */
-  uint64_t restarts;
-} croupier_iteration;
-
-/*
- Lanes used of lanes offered: eight per packet.
- */
-typedef struct croupier_utilisation {
-  /*
-   Packets run.
-   */
-  uint64_t packets;
-  /*
-   Active lanes in them.
-   */
-  uint64_t lanes;
-} croupier_utilisation;
-
-/*
- Counts of work, and of every event in which a bound was reached.
- */
-typedef struct croupier_counters {
-  /*
-   sizeof(croupier_counters), set by the program.
-   */
-  uint32_t struct_size;
-  /*
-   0.
-   */
-  uint32_t reserved;
-  /*
-   Closest-hit rays from the camera.
-   */
-  uint64_t camera_rays;
-  /*
-   Closest-hit rays from scattering.
-   */
-  uint64_t scatter_rays;
-  /*
-   Closest-hit rays that went on straight.
-   */
-  uint64_t straight_rays;
-  /*
-   Steps through media.
-   */
-  uint64_t medium_steps;
-  /*
-   Shadow rays, counted again behind every surface that they passed.
-   */
-  uint64_t shadow_rays;
-  /*
-   Camera samples finished.
-   */
-  uint64_t camera_samples;
-  /*
-   Samples of vertices.
-   */
-  uint64_t vertex_samples;
-  /*
-   Vertices at which roulette ended the path.
-   */
-  uint64_t paths_terminated;
-  /*
-   Samples that splitting added.
-   */
-  uint64_t splits;
-  /*
-   Splits that a nearly full ring limited.
-   */
-  uint64_t splits_limited_by_ring;
-  /*
-   Splits that the budget of their camera sample limited.
-   */
-  uint64_t splits_limited_by_budget;
-  /*
-   Shadow rays terminated by roulette.
-   */
-  uint64_t shadow_rays_terminated;
-  /*
-   Light samples left out by roulette.
-   */
-  uint64_t light_samples_skipped;
-  /*
-   Sum of the segments of all paths.
-   */
-  uint64_t path_segments;
-  /*
-   Samples offered to the statistics.
-   */
-  uint64_t samples_logged;
-  /*
-   Samples that were not learned from because their bin had enough.
-   */
-  uint64_t samples_refused;
-  /*
-   Shadow rays that were not learned from because their bin had enough.
-   */
-  uint64_t shadows_refused;
-  /*
-   Samples without a record because the ledger was full.
-   */
-  uint64_t ledger_full;
-  /*
-   Factors that were not finite and became 1.
-   */
-  uint64_t factors_not_finite;
-  /*
-   Paths that ended because of the longest length, before max-depth.
-   */
-  uint64_t max_length_reached;
-  /*
-   Light samples whose distance was clamped.
-   */
-  uint64_t distances_clamped;
-  /*
-   Rays with so many steps through a medium that roulette decided.
-   */
-  uint64_t media_roulettes;
-  /*
-   Shadow rays taken for blocked behind too many surfaces: light that is lost.
-   */
-  uint64_t passages_cut;
-  /*
-   Contributions that were not finite and were not added.
-   */
-  uint64_t non_finite;
-  /*
-   Index of the pixel of the first of them, plus 1; 0 without one.
-   */
-  uint64_t first_non_finite;
-  /*
-   Lanes of the scatter stage.
-   */
-  struct croupier_utilisation scatter;
-  /*
-   Lanes of the closest-hit stage.
-   */
-  struct croupier_utilisation trace;
-  /*
-   Lanes of the shadow-ray stage.
-   */
-  struct croupier_utilisation occlude;
-  /*
-   Lanes of the shading stage.
-   */
-  struct croupier_utilisation surface;
-  /*
-   Lanes of look-ups in statistics.
-   */
-  struct croupier_utilisation look_ups;
-  /*
-   Lanes of rays that passed surfaces.
-   */
-  struct croupier_utilisation passed;
-  /*
-   Largest number of vertices that waited at once.
-   */
-  uint64_t ring_peak;
-} croupier_counters;
+  uint64_t stack;
+} croupier_sizes;
 
 /*
  Eight rays: points origin + t direction with tmin < t < tmax. The first index is the axis (x, y, z), the second the
@@ -1322,134 +1208,6 @@ typedef struct croupier_hits8 {
    */
   uint32_t instance[2][8];
 } croupier_hits8;
-
-/*
- Settings of a render. Its members are the library's; the struct may be copied. Threads may read it at the same time.
- */
-typedef struct croupier_settings {
-  /*
-   Not for programs.
-   */
-  uint64_t opaque[64];
-} croupier_settings;
-
-/*
- Sizes of a plan's blocks of memory. Each block starts at a multiple of CROUPIER_ALIGN bytes and may hold anything before.
- */
-typedef struct croupier_sizes {
-  /*
-   sizeof(croupier_sizes), set by the program.
-   */
-  uint32_t struct_size;
-  /*
-   Columns of the picture.
-   */
-  uint32_t width;
-  /*
-   Rows of the picture.
-   */
-  uint32_t height;
-  /*
-   Number of shards.
-   */
-  uint32_t shards;
-  /*
-   Bytes of a session's block.
-   */
-  uint64_t session;
-  /*
-   Bytes of a block that any shard fits into; croupier_plan_shard_size is exact.
-   */
-  uint64_t shard;
-  /*
-   Bytes of stack that a call needs at most, without what callbacks need.
-   */
-  uint64_t stack;
-} croupier_sizes;
-
-/*
- What a scene has.
- */
-typedef struct croupier_scene_facts {
-  /*
-   sizeof(croupier_scene_facts), set by the program.
-   */
-  uint32_t struct_size;
-  /*
-   Default columns of pictures.
-   */
-  uint32_t width;
-  /*
-   Default rows.
-   */
-  uint32_t height;
-  /*
-   Default number of path segments.
-   */
-  uint32_t max_depth;
-  /*
-   Triangles.
-   */
-  uint32_t triangles;
-  /*
-   Materials.
-   */
-  uint32_t materials;
-  /*
-   Lights.
-   */
-  uint32_t lights;
-  /*
-   Media.
-   */
-  uint32_t media;
-  /*
-   Objects; 0 in a scene without instances, else the world and what instances place.
-   */
-  uint32_t objects;
-  /*
-   Instances.
-   */
-  uint32_t instances;
-  /*
-   Smallest coordinates, world space.
-   */
-  float bounds_min[3];
-  /*
-   Largest coordinates.
-   */
-  float bounds_max[3];
-  /*
-   Identity of the scene as it is: changes with every edit, and comes back when an edit is taken back.
-   */
-  uint64_t identity;
-} croupier_scene_facts;
-
-/*
- An instance of an object.
- */
-typedef struct croupier_instance {
-  /*
-   sizeof(croupier_instance), set by the program.
-   */
-  uint32_t struct_size;
-  /*
-   Index of the object that it places.
-   */
-  uint32_t object;
-  /*
-   0 if it is hidden.
-   */
-  uint32_t visible;
-  /*
-   Index of its first light among the world's.
-   */
-  uint32_t first_light;
-  /*
-   Rows of the affine maps to the space around it, when the shutter opens and when it closes.
-   */
-  float to_world[2][3][4];
-} croupier_instance;
 
 /*
  Closest hits of the lanes in active (bit i is lane i). hits holds no hits when it is called; returns the lanes that hit.
@@ -1646,6 +1404,248 @@ typedef struct croupier_parts {
 } croupier_parts;
 
 /*
+ Lanes used of lanes offered: eight per packet.
+ */
+typedef struct croupier_utilisation {
+  /*
+   Packets run.
+   */
+  uint64_t packets;
+  /*
+   Active lanes in them.
+   */
+  uint64_t lanes;
+} croupier_utilisation;
+
+/*
+ Counts of work, and of every event in which a bound was reached.
+ */
+typedef struct croupier_counters {
+  /*
+   sizeof(croupier_counters), set by the program.
+   */
+  uint32_t struct_size;
+  /*
+   0.
+   */
+  uint32_t reserved;
+  /*
+   Closest-hit rays from the camera.
+   */
+  uint64_t camera_rays;
+  /*
+   Closest-hit rays from scattering.
+   */
+  uint64_t scatter_rays;
+  /*
+   Closest-hit rays that went on straight.
+   */
+  uint64_t straight_rays;
+  /*
+   Steps through media.
+   */
+  uint64_t medium_steps;
+  /*
+   Shadow rays, counted again behind every surface that they passed.
+   */
+  uint64_t shadow_rays;
+  /*
+   Camera samples finished.
+   */
+  uint64_t camera_samples;
+  /*
+   Samples of vertices.
+   */
+  uint64_t vertex_samples;
+  /*
+   Vertices at which roulette ended the path.
+   */
+  uint64_t paths_terminated;
+  /*
+   Samples that splitting added.
+   */
+  uint64_t splits;
+  /*
+   Splits that a nearly full ring limited.
+   */
+  uint64_t splits_limited_by_ring;
+  /*
+   Splits that the budget of their camera sample limited.
+   */
+  uint64_t splits_limited_by_budget;
+  /*
+   Shadow rays terminated by roulette.
+   */
+  uint64_t shadow_rays_terminated;
+  /*
+   Light samples left out by roulette.
+   */
+  uint64_t light_samples_skipped;
+  /*
+   Sum of the segments of all paths.
+   */
+  uint64_t path_segments;
+  /*
+   Samples offered to the statistics.
+   */
+  uint64_t samples_logged;
+  /*
+   Samples that were not learned from because their bin had enough.
+   */
+  uint64_t samples_refused;
+  /*
+   Shadow rays that were not learned from because their bin had enough.
+   */
+  uint64_t shadows_refused;
+  /*
+   Samples without a record because the ledger was full.
+   */
+  uint64_t ledger_full;
+  /*
+   Factors that were not finite and became 1.
+   */
+  uint64_t factors_not_finite;
+  /*
+   Paths that ended because of the longest length, before max-depth.
+   */
+  uint64_t max_length_reached;
+  /*
+   Light samples whose distance was clamped.
+   */
+  uint64_t distances_clamped;
+  /*
+   Rays with so many steps through a medium that roulette decided.
+   */
+  uint64_t media_roulettes;
+  /*
+   Shadow rays taken for blocked behind too many surfaces: light that is lost.
+   */
+  uint64_t passages_cut;
+  /*
+   Contributions that were not finite and were not added.
+   */
+  uint64_t non_finite;
+  /*
+   Index of the pixel of the first of them, plus 1; 0 without one.
+   */
+  uint64_t first_non_finite;
+  /*
+   Lanes of the scatter stage.
+   */
+  struct croupier_utilisation scatter;
+  /*
+   Lanes of the closest-hit stage.
+   */
+  struct croupier_utilisation trace;
+  /*
+   Lanes of the shadow-ray stage.
+   */
+  struct croupier_utilisation occlude;
+  /*
+   Lanes of the shading stage.
+   */
+  struct croupier_utilisation surface;
+  /*
+   Lanes of look-ups in statistics.
+   */
+  struct croupier_utilisation look_ups;
+  /*
+   Lanes of rays that passed surfaces.
+   */
+  struct croupier_utilisation passed;
+  /*
+   Largest number of vertices that waited at once.
+   */
+  uint64_t ring_peak;
+} croupier_counters;
+
+/*
+ A pixel of the picture so far. Linear Rec. 709.
+ */
+typedef struct croupier_pixel {
+  /*
+   Mean radiance.
+   */
+  float mean[3];
+  /*
+   Standard error of the mean.
+   */
+  float standard_error[3];
+  /*
+   Camera samples; 0 before the end of the first iteration.
+   */
+  uint32_t samples;
+  /*
+   Rays of all kinds, at most 2^32 - 1; 0 unless the settings ask for the AOV cost or are adaptive.
+   */
+  uint32_t rays;
+} croupier_pixel;
+
+/*
+ Estimated error of the picture against its own expectation.
+ */
+typedef struct croupier_error_estimate {
+  /*
+   sizeof(croupier_error_estimate), set by the program.
+   */
+  uint32_t struct_size;
+  /*
+   0.
+   */
+  uint32_t reserved;
+  /*
+   Mean over pixels and channels of variance / (mean^2 + 0.01), without the worst 0.01 % of the pixels, times independence.
+   */
+  double rel_mse;
+  /*
+   Lower end of its 95 % confidence interval.
+   */
+  double low;
+  /*
+   Upper end.
+   */
+  double high;
+  /*
+   The same mean over all pixels.
+   */
+  double rel_mse_all;
+  /*
+   Variance of the pixels over that of independent samples; 1 while it is not known.
+   */
+  double independence;
+} croupier_error_estimate;
+
+/*
+ One round of camera samples.
+ */
+typedef struct croupier_iteration {
+  /*
+   sizeof(croupier_iteration), set by the program.
+   */
+  uint32_t struct_size;
+  /*
+   Camera samples per pixel in it.
+   */
+  uint32_t samples;
+  /*
+   1 for the first; 0 before it.
+   */
+  uint64_t number;
+  /*
+   Camera samples per pixel before it.
+   */
+  uint32_t first_sample;
+  /*
+   0.
+   */
+  uint32_t reserved;
+  /*
+   Number of times that the picture began again.
+   */
+  uint64_t restarts;
+} croupier_iteration;
+
+/*
  Every status.
  */
 #define croupier_status_ALL { CROUPIER_OK, CROUPIER_NULL, CROUPIER_MISALIGNED, CROUPIER_SIZE, CROUPIER_STRUCT_SIZE, CROUPIER_NO_OBJECT, CROUPIER_DESTROYED, CROUPIER_BUSY, CROUPIER_OVERLAP, CROUPIER_INSTRUCTIONS, CROUPIER_RANGE, CROUPIER_TEXT, CROUPIER_SCENE, CROUPIER_SETTINGS, CROUPIER_EDIT, CROUPIER_EDIT_FIXED, CROUPIER_SCENE_CHANGED, CROUPIER_EFFECTS, CROUPIER_PLAN, CROUPIER_ITERATION, CROUPIER_UNFINISHED, CROUPIER_SHARDS, CROUPIER_NOT_SUSPENDED, CROUPIER_ABSENT, CROUPIER_SAVED, CROUPIER_COMPOSE, }
@@ -1655,50 +1655,137 @@ extern "C" {
 #endif // __cplusplus
 
 /*
- Bytes that croupier_scene_compose needs: of the blob (what always suffices; most take a third of it), and of intermediate
- results. CROUPIER_COMPOSE, with the record and the number that are wrong in the message, if the arrays make no scene.
+ CROUPIER_ABI_VERSION of the library that is loaded: the program needs at least the one that it was compiled with.
  */
-croupier_status croupier_scene_compose_size(const struct croupier_arrays *arrays,
-                                            size_t *blob_size,
-                                            size_t *scratch_size,
-                                            struct croupier_message *message);
+uint32_t croupier_abi_version(void);
 
 /*
- Builds a scene of arrays: its tree of triangles, its tables, everything that baking does. blob and scratch start at multiples
- of CROUPIER_ALIGN and overlap neither each other nor an array. *length becomes the blob's own length: blob and length are
- what croupier_scene_init takes. scratch is the program's again. Takes a time that grows with the triangles times their
- logarithm. CROUPIER_COMPOSE as of croupier_scene_compose_size.
+ Version of the library, such as 0.1.0. The text is the library's and stays.
  */
-croupier_status croupier_scene_compose(const struct croupier_arrays *arrays,
-                                       void *blob,
-                                       size_t blob_size,
-                                       void *scratch,
-                                       size_t scratch_size,
-                                       size_t *length,
+const char *croupier_version(void);
+
+/*
+ Instruction set that the library was compiled for: x86-64, x86-64-v3, aarch64 and the like. The text is the library's
+ and stays.
+ */
+const char *croupier_instruction_set(void);
+
+/*
+ CROUPIER_OK if the processor, and the operating system, have all instructions that the library was compiled for;
+ CROUPIER_INSTRUCTIONS, with the first that is missing in the message, if not: no other function is to be called then. On
+ other processors than x86-64 nothing is known, and the answer is CROUPIER_OK.
+ */
+croupier_status croupier_check_processor(struct croupier_message *message);
+
+/*
+ The best instruction set that processor and operating system offer, of those that there are builds for: x86-64,
+ x86-64-v3 or x86-64-v4; elsewhere that of the library. Writes at most size bytes, the last one 0; length, which may be
+ null, becomes the length of the whole text without it.
+ */
+croupier_status croupier_processor_instruction_set(char *text,
+                                                   size_t size,
+                                                   size_t *length,
+                                                   struct croupier_message *message);
+
+/*
+ What a status means, in a few English words that end with a zero byte. Never null, whatever the number. The text is the
+ library's and stays.
+ */
+const char *croupier_status_text(int32_t status);
+
+/*
+ Makes a scene object in memory (CROUPIER_SCENE_BYTES bytes at a multiple of CROUPIER_ALIGN) for a baked blob, which is
+ checked in one pass and then read in place. The blob starts at a multiple of 4, of 64 for full speed; it is the
+ scene's until croupier_scene_destroy, and edits change it. *scene becomes the handle, which is the address of the memory;
+ null after a failure. CROUPIER_SCENE, with the object and the number that are wrong in the message, if the blob is none.
+ */
+croupier_status croupier_scene_init(void *memory,
+                                    size_t memory_size,
+                                    void *blob,
+                                    size_t blob_size,
+                                    struct croupier_scene **scene,
+                                    struct croupier_message *message);
+
+/*
+ Ends a scene: its memory and its blob are the program's again. Sessions of it can still be read, not stepped.
+ CROUPIER_BUSY, and the scene goes on, while another call uses it.
+ */
+croupier_status croupier_scene_destroy(struct croupier_scene *scene,
                                        struct croupier_message *message);
 
 /*
- Fills in a material: its kind (croupier_material_kind), and what no material of the kind has. CROUPIER_RANGE if there is no
- such kind.
+ What the scene has, and its identity.
  */
-croupier_status croupier_material_init(struct croupier_material *material,
-                                       uint32_t kind,
-                                       struct croupier_message *message);
+croupier_status croupier_scene_info(const struct croupier_scene *scene,
+                                    struct croupier_scene_facts *facts,
+                                    struct croupier_message *message);
 
 /*
- The camera of a view, for croupier_arrays and croupier_scene_set_camera. CROUPIER_RANGE, with the number in the message, if
- there is none.
+ The camera as it is.
  */
-croupier_status croupier_camera_from_view(const struct croupier_view *view,
-                                          struct croupier_camera *camera,
+croupier_status croupier_scene_camera(const struct croupier_scene *scene,
+                                      struct croupier_camera *camera,
+                                      struct croupier_message *message);
+
+/*
+ Light index as it is. CROUPIER_RANGE if there is none.
+ */
+croupier_status croupier_scene_light(const struct croupier_scene *scene,
+                                     uint32_t index,
+                                     struct croupier_light *light,
+                                     struct croupier_message *message);
+
+/*
+ Material index as it is. CROUPIER_RANGE if there is none.
+ */
+croupier_status croupier_scene_material(const struct croupier_scene *scene,
+                                        uint32_t index,
+                                        struct croupier_material *material,
+                                        struct croupier_message *message);
+
+/*
+ What principled material index has besides croupier_scene_material. CROUPIER_RANGE if there is none, or it is of another
+ kind.
+ */
+croupier_status croupier_scene_principled(const struct croupier_scene *scene,
+                                          uint32_t index,
+                                          struct croupier_principled *principled,
                                           struct croupier_message *message);
 
 /*
- The record of a light, for croupier_arrays and croupier_scene_set_light. A black one is kept: it may light up later.
- CROUPIER_RANGE, with the number in the message, if there is none.
+ The environment as it is. CROUPIER_RANGE if there is none.
  */
-croupier_status croupier_light_from_source(const struct croupier_light_source *source,
-                                           struct croupier_light *light,
+croupier_status croupier_scene_environment(const struct croupier_scene *scene,
+                                           struct croupier_environment *environment,
+                                           struct croupier_message *message);
+
+/*
+ Instance index as it is. CROUPIER_RANGE if there is none.
+ */
+croupier_status croupier_scene_instance(const struct croupier_scene *scene,
+                                        uint32_t index,
+                                        struct croupier_instance *instance,
+                                        struct croupier_message *message);
+
+/*
+ Name of material index, empty if it has none. Writes at most size bytes, the last one 0; length, which may be null,
+ becomes the length of the whole name without it.
+ */
+croupier_status croupier_scene_material_name(const struct croupier_scene *scene,
+                                             uint32_t index,
+                                             char *name,
+                                             size_t size,
+                                             size_t *length,
+                                             struct croupier_message *message);
+
+/*
+ Name of object index as CROUPIER_AOV_OBJECT shows it, empty if it has none. Texts as of croupier_scene_material_name.
+ */
+croupier_status croupier_scene_object_name(const struct croupier_scene *scene,
+                                           uint32_t index,
+                                           char *name,
+                                           size_t size,
+                                           size_t *length,
                                            struct croupier_message *message);
 
 /*
@@ -1801,182 +1888,133 @@ croupier_status croupier_scene_seal(struct croupier_scene *scene,
                                     struct croupier_message *message);
 
 /*
- Most bytes that croupier_shard_save writes of shard index, in any iteration. CROUPIER_RANGE if the plan has fewer shards.
+ Bytes that croupier_scene_compose needs: of the blob (what always suffices; most take a third of it), and of intermediate
+ results. CROUPIER_COMPOSE, with the record and the number that are wrong in the message, if the arrays make no scene.
  */
-croupier_status croupier_plan_saved_shard_size(const struct croupier_plan *plan,
-                                               uint32_t index,
-                                               size_t *bytes,
-                                               struct croupier_message *message);
+croupier_status croupier_scene_compose_size(const struct croupier_arrays *arrays,
+                                            size_t *blob_size,
+                                            size_t *scratch_size,
+                                            struct croupier_message *message);
 
 /*
- Writes what the end of an iteration reads of a finished shard, for croupier_shard_load of another process; *written becomes
- the number of bytes. Equal sums give equal bytes. CROUPIER_UNFINISHED if the shard has not finished an iteration,
- CROUPIER_SIZE if there is too little room; nothing is written then.
+ Builds a scene of arrays: its tree of triangles, its tables, everything that baking does. blob and scratch start at multiples
+ of CROUPIER_ALIGN and overlap neither each other nor an array. *length becomes the blob's own length: blob and length are
+ what croupier_scene_init takes. scratch is the program's again. Takes a time that grows with the triangles times their
+ logarithm. CROUPIER_COMPOSE as of croupier_scene_compose_size.
  */
-croupier_status croupier_shard_save(const struct croupier_shard *shard,
-                                    void *bytes,
-                                    size_t size,
-                                    size_t *written,
-                                    struct croupier_message *message);
-
-/*
- Takes the place of the shard that croupier_shard_save has written: joins the iteration of the session with its sums,
- finished. Sessions of several processes that begin the same iterations and end each with all shards have the same picture
- and the same statistics to the bit. CROUPIER_PLAN or CROUPIER_SAVED, with the reason in the message, if the bytes are of
- another scene, plan, shard, iteration or version, or damaged; the shard is as before then.
- */
-croupier_status croupier_shard_load(struct croupier_shard *shard,
-                                    const struct croupier_session *session,
-                                    const void *bytes,
-                                    size_t size,
-                                    struct croupier_message *message);
-
-/*
- Goes on as if so many iterations, of so many camera samples per pixel in all, had been before: for one picture in parts
- that are rendered apart and added afterwards. Parts with other numbers of iterations and disjoint ranges of samples are
- independent. CROUPIER_ITERATION if one has begun since the picture did.
- */
-croupier_status croupier_session_skip(struct croupier_session *session,
-                                      uint64_t iterations,
-                                      uint32_t samples,
-                                      struct croupier_message *message);
-
-/*
- Bytes that croupier_session_save_statistics writes. CROUPIER_ABSENT if the strategy learns nothing of the scene.
- */
-croupier_status croupier_session_statistics_size(const struct croupier_session *session,
-                                                 size_t *bytes,
-                                                 struct croupier_message *message);
-
-/*
- Writes what was learned of the scene, for another run, another machine, another scene of the same bounds. The bytes are
- the same on every machine. CROUPIER_SIZE if there is too little room.
- */
-croupier_status croupier_session_save_statistics(const struct croupier_session *session,
-                                                 void *bytes,
-                                                 size_t size,
-                                                 struct croupier_message *message);
-
-/*
- Replaces (merge is 0) what was learned of the scene by saved bytes, or adds them. Whatever is loaded changes efficiency
- only. The bytes are checked first; CROUPIER_SAVED, with the reason in the message, if they are damaged or of another scene
- or objective, CROUPIER_ABSENT while an iteration runs or if the strategy learns nothing of the scene.
- */
-croupier_status croupier_session_load_statistics(struct croupier_session *session,
-                                                 const void *bytes,
-                                                 size_t size,
-                                                 uint32_t merge,
-                                                 struct croupier_message *message);
-
-/*
- The estimate of the pixels that the strategy works with (denoised, or means of blocks): red, green and blue of each, row by
- row. count is three times the number of pixels, or the answer is CROUPIER_SIZE. CROUPIER_ABSENT if the settings need none,
- and before the end of the first iteration.
- */
-croupier_status croupier_session_estimate(const struct croupier_session *session,
-                                          float *rgb,
-                                          size_t count,
-                                          struct croupier_message *message);
-
-/*
- Replaces the built-in estimate of the pixels by the host's (such as that of another denoiser), for good: red, green and
- blue of each pixel, row by row. It changes efficiency only. CROUPIER_SIZE if count is not three times the number of pixels,
- the settings have no estimate per pixel, or an iteration runs.
- */
-croupier_status croupier_session_give_estimate(struct croupier_session *session,
-                                               const float *rgb,
-                                               size_t count,
-                                               struct croupier_message *message);
-
-/*
- Pixels first to first + count - 1, row by row from the top left. CROUPIER_RANGE if there are not so many. While an
- iteration is being finished, some pixels have it and others do not.
- */
-croupier_status croupier_session_pixels(const struct croupier_session *session,
-                                        size_t first,
-                                        size_t count,
-                                        struct croupier_pixel *pixels,
-                                        struct croupier_message *message);
-
-/*
- Mean radiance of all pixels: red, green and blue of each, row by row from the top left. count is the number of floats, three
- times the number of pixels, or the answer is CROUPIER_SIZE.
- */
-croupier_status croupier_session_rgb(const struct croupier_session *session,
-                                     float *rgb,
-                                     size_t count,
-                                     struct croupier_message *message);
-
-/*
- Number of planes of an auxiliary value (croupier_aov); 0 if there is no such value.
- */
-uint32_t croupier_aov_channels(uint32_t aov);
-
-/*
- Plane channel of an auxiliary value (croupier_aov), a float per pixel, row by row from the top left. count is the number of
- pixels, or the answer is CROUPIER_SIZE. CROUPIER_ABSENT if the settings do not ask for it, and before the end of the
- first iteration; CROUPIER_RANGE if it has no such channel.
- */
-croupier_status croupier_session_plane(const struct croupier_session *session,
-                                       uint32_t aov,
-                                       uint32_t channel,
-                                       float *values,
-                                       size_t count,
+croupier_status croupier_scene_compose(const struct croupier_arrays *arrays,
+                                       void *blob,
+                                       size_t blob_size,
+                                       void *scratch,
+                                       size_t scratch_size,
+                                       size_t *length,
                                        struct croupier_message *message);
 
 /*
- Estimated error of the picture, as of the end of the last iteration.
+ Fills in a material: its kind (croupier_material_kind), and what no material of the kind has. CROUPIER_RANGE if there is no
+ such kind.
  */
-croupier_status croupier_session_error_estimate(const struct croupier_session *session,
-                                                struct croupier_error_estimate *estimate,
-                                                struct croupier_message *message);
+croupier_status croupier_material_init(struct croupier_material *material,
+                                       uint32_t kind,
+                                       struct croupier_message *message);
 
 /*
- The current iteration.
+ The camera of a view, for croupier_arrays and croupier_scene_set_camera. CROUPIER_RANGE, with the number in the message, if
+ there is none.
  */
-croupier_status croupier_session_iteration(const struct croupier_session *session,
-                                           struct croupier_iteration *iteration,
+croupier_status croupier_camera_from_view(const struct croupier_view *view,
+                                          struct croupier_camera *camera,
+                                          struct croupier_message *message);
+
+/*
+ The record of a light, for croupier_arrays and croupier_scene_set_light. A black one is kept: it may light up later.
+ CROUPIER_RANGE, with the number in the message, if there is none.
+ */
+croupier_status croupier_light_from_source(const struct croupier_light_source *source,
+                                           struct croupier_light *light,
                                            struct croupier_message *message);
 
 /*
- Counts of all finished iterations.
+ Makes settings of memory that may hold anything: the default ones, with size and depth of the scene. scene may be null;
+ then croupier_settings_set_size and croupier_settings_set of "max-depth" have to follow.
  */
-croupier_status croupier_session_counters(const struct croupier_session *session,
-                                          struct croupier_counters *counters,
-                                          struct croupier_message *message);
-
-/*
- Pixels of a shard in the iteration under way, for previews: writes red, green and blue of the mean of each pixel that has
- finished camera samples where croupier_session_rgb has them, and leaves the others as they are. count is three times the
- number of pixels of the picture, or the answer is CROUPIER_SIZE. Means are biased while samples of a pixel are in flight.
- *written, which may be null, becomes the number of pixels; 0 if the shard has not stepped in this iteration.
- */
-croupier_status croupier_shard_unfinished(const struct croupier_shard *shard,
-                                          const struct croupier_session *session,
-                                          float *rgb,
-                                          size_t count,
-                                          size_t *written,
-                                          struct croupier_message *message);
-
-/*
- Closest hits of eight rays with the scene's triangles: picking, visibility, and the built-in part of an intersector of the
- host's own. Lanes of active count (bit i is lane i); *hit becomes the lanes that hit.
- */
-croupier_status croupier_scene_closest(const struct croupier_scene *scene,
-                                       const struct croupier_rays8 *rays,
-                                       uint32_t active,
-                                       struct croupier_hits8 *hits,
-                                       uint32_t *hit,
+croupier_status croupier_settings_init(struct croupier_settings *settings,
+                                       const struct croupier_scene *scene,
                                        struct croupier_message *message);
 
 /*
- Lanes of active whose rays hit any of the scene's triangles.
+ Sets one setting from a text: names, values and their meaning are the options of the program croupier, such as
+ ("rrs", "ears"), ("aovs", "albedo,normal"), ("cache-bytes", "24MiB"). CROUPIER_RANGE if no setting has the name,
+ CROUPIER_SETTINGS if the text is no value in its range; nothing has changed then.
  */
-croupier_status croupier_scene_occluded(const struct croupier_scene *scene,
-                                        const struct croupier_rays8 *rays,
-                                        uint32_t active,
-                                        uint32_t *occluded,
-                                        struct croupier_message *message);
+croupier_status croupier_settings_set(struct croupier_settings *settings,
+                                      const char *name,
+                                      const char *value,
+                                      struct croupier_message *message);
+
+/*
+ Text of a setting, which croupier_settings_set reads back. Writes at most size bytes, the last one 0; length, which may be
+ null, becomes the length of the whole text without it. CROUPIER_RANGE if no setting has the name.
+ */
+croupier_status croupier_settings_get(const struct croupier_settings *settings,
+                                      const char *name,
+                                      char *value,
+                                      size_t size,
+                                      size_t *length,
+                                      struct croupier_message *message);
+
+/*
+ Number of settings.
+ */
+size_t croupier_settings_count(void);
+
+/*
+ Name of setting index, below croupier_settings_count(). Texts as of croupier_settings_get.
+ */
+croupier_status croupier_settings_name(size_t index,
+                                       char *name,
+                                       size_t size,
+                                       size_t *length,
+                                       struct croupier_message *message);
+
+/*
+ Meaning and range of setting index, a line. Texts as of croupier_settings_get.
+ */
+croupier_status croupier_settings_help(size_t index,
+                                       char *help,
+                                       size_t size,
+                                       size_t *length,
+                                       struct croupier_message *message);
+
+/*
+ Sets columns and rows of the picture, pixels; at least 1 x 1 and at most 2^31 pixels, which croupier_plan_init checks.
+ */
+croupier_status croupier_settings_set_size(struct croupier_settings *settings,
+                                           uint32_t width,
+                                           uint32_t height,
+                                           struct croupier_message *message);
+
+/*
+ Sets the number of shards, units of parallel work, 1 to 65536. The picture depends on it.
+ */
+croupier_status croupier_settings_set_shards(struct croupier_settings *settings,
+                                             uint32_t shards,
+                                             struct croupier_message *message);
+
+/*
+ Sets the seed of all random numbers: another one gives another, independent picture.
+ */
+croupier_status croupier_settings_set_seed(struct croupier_settings *settings,
+                                           uint64_t seed,
+                                           struct croupier_message *message);
+
+/*
+ Columns and rows of the picture, pixels; 0 x 0 while they are open.
+ */
+croupier_status croupier_settings_size(const struct croupier_settings *settings,
+                                       uint32_t *width,
+                                       uint32_t *height,
+                                       struct croupier_message *message);
 
 /*
  Makes a plan of memory that may hold anything: checks the settings and measures the blocks. CROUPIER_SETTINGS if they
@@ -2000,101 +2038,6 @@ croupier_status croupier_plan_shard_size(const struct croupier_plan *plan,
                                          uint32_t index,
                                          size_t *bytes,
                                          struct croupier_message *message);
-
-/*
- Makes a scene object in memory (CROUPIER_SCENE_BYTES bytes at a multiple of CROUPIER_ALIGN) for a baked blob, which is
- checked in one pass and then read in place. The blob starts at a multiple of 4, of 64 for full speed; it is the
- scene's until croupier_scene_destroy, and edits change it. *scene becomes the handle, which is the address of the memory;
- null after a failure. CROUPIER_SCENE, with the object and the number that are wrong in the message, if the blob is none.
- */
-croupier_status croupier_scene_init(void *memory,
-                                    size_t memory_size,
-                                    void *blob,
-                                    size_t blob_size,
-                                    struct croupier_scene **scene,
-                                    struct croupier_message *message);
-
-/*
- Ends a scene: its memory and its blob are the program's again. Sessions of it can still be read, not stepped.
- CROUPIER_BUSY, and the scene goes on, while another call uses it.
- */
-croupier_status croupier_scene_destroy(struct croupier_scene *scene,
-                                       struct croupier_message *message);
-
-/*
- What the scene has, and its identity.
- */
-croupier_status croupier_scene_info(const struct croupier_scene *scene,
-                                    struct croupier_scene_facts *facts,
-                                    struct croupier_message *message);
-
-/*
- The camera as it is.
- */
-croupier_status croupier_scene_camera(const struct croupier_scene *scene,
-                                      struct croupier_camera *camera,
-                                      struct croupier_message *message);
-
-/*
- Light index as it is. CROUPIER_RANGE if there is none.
- */
-croupier_status croupier_scene_light(const struct croupier_scene *scene,
-                                     uint32_t index,
-                                     struct croupier_light *light,
-                                     struct croupier_message *message);
-
-/*
- Material index as it is. CROUPIER_RANGE if there is none.
- */
-croupier_status croupier_scene_material(const struct croupier_scene *scene,
-                                        uint32_t index,
-                                        struct croupier_material *material,
-                                        struct croupier_message *message);
-
-/*
- What principled material index has besides croupier_scene_material. CROUPIER_RANGE if there is none, or it is of another
- kind.
- */
-croupier_status croupier_scene_principled(const struct croupier_scene *scene,
-                                          uint32_t index,
-                                          struct croupier_principled *principled,
-                                          struct croupier_message *message);
-
-/*
- The environment as it is. CROUPIER_RANGE if there is none.
- */
-croupier_status croupier_scene_environment(const struct croupier_scene *scene,
-                                           struct croupier_environment *environment,
-                                           struct croupier_message *message);
-
-/*
- Instance index as it is. CROUPIER_RANGE if there is none.
- */
-croupier_status croupier_scene_instance(const struct croupier_scene *scene,
-                                        uint32_t index,
-                                        struct croupier_instance *instance,
-                                        struct croupier_message *message);
-
-/*
- Name of material index, empty if it has none. Writes at most size bytes, the last one 0; length, which may be null,
- becomes the length of the whole name without it.
- */
-croupier_status croupier_scene_material_name(const struct croupier_scene *scene,
-                                             uint32_t index,
-                                             char *name,
-                                             size_t size,
-                                             size_t *length,
-                                             struct croupier_message *message);
-
-/*
- Name of object index as CROUPIER_AOV_OBJECT shows it, empty if it has none. Texts as of croupier_scene_material_name.
- */
-croupier_status croupier_scene_object_name(const struct croupier_scene *scene,
-                                           uint32_t index,
-                                           char *name,
-                                           size_t size,
-                                           size_t *length,
-                                           struct croupier_message *message);
 
 /*
  Makes a session of a scene in memory: as many bytes as croupier_plan_sizes says, at a multiple of CROUPIER_ALIGN. The scene
@@ -2195,88 +2138,6 @@ croupier_status croupier_session_change_scene(struct croupier_session *session,
                                               struct croupier_message *message);
 
 /*
- Makes settings of memory that may hold anything: the default ones, with size and depth of the scene. scene may be null;
- then croupier_settings_set_size and croupier_settings_set of "max-depth" have to follow.
- */
-croupier_status croupier_settings_init(struct croupier_settings *settings,
-                                       const struct croupier_scene *scene,
-                                       struct croupier_message *message);
-
-/*
- Sets one setting from a text: names, values and their meaning are the options of the program croupier, such as
- ("rrs", "ears"), ("aovs", "albedo,normal"), ("cache-bytes", "24MiB"). CROUPIER_RANGE if no setting has the name,
- CROUPIER_SETTINGS if the text is no value in its range; nothing has changed then.
- */
-croupier_status croupier_settings_set(struct croupier_settings *settings,
-                                      const char *name,
-                                      const char *value,
-                                      struct croupier_message *message);
-
-/*
- Text of a setting, which croupier_settings_set reads back. Writes at most size bytes, the last one 0; length, which may be
- null, becomes the length of the whole text without it. CROUPIER_RANGE if no setting has the name.
- */
-croupier_status croupier_settings_get(const struct croupier_settings *settings,
-                                      const char *name,
-                                      char *value,
-                                      size_t size,
-                                      size_t *length,
-                                      struct croupier_message *message);
-
-/*
- Number of settings.
- */
-size_t croupier_settings_count(void);
-
-/*
- Name of setting index, below croupier_settings_count(). Texts as of croupier_settings_get.
- */
-croupier_status croupier_settings_name(size_t index,
-                                       char *name,
-                                       size_t size,
-                                       size_t *length,
-                                       struct croupier_message *message);
-
-/*
- Meaning and range of setting index, a line. Texts as of croupier_settings_get.
- */
-croupier_status croupier_settings_help(size_t index,
-                                       char *help,
-                                       size_t size,
-                                       size_t *length,
-                                       struct croupier_message *message);
-
-/*
- Sets columns and rows of the picture, pixels; at least 1 x 1 and at most 2^31 pixels, which croupier_plan_init checks.
- */
-croupier_status croupier_settings_set_size(struct croupier_settings *settings,
-                                           uint32_t width,
-                                           uint32_t height,
-                                           struct croupier_message *message);
-
-/*
- Sets the number of shards, units of parallel work, 1 to 65536. The picture depends on it.
- */
-croupier_status croupier_settings_set_shards(struct croupier_settings *settings,
-                                             uint32_t shards,
-                                             struct croupier_message *message);
-
-/*
- Sets the seed of all random numbers: another one gives another, independent picture.
- */
-croupier_status croupier_settings_set_seed(struct croupier_settings *settings,
-                                           uint64_t seed,
-                                           struct croupier_message *message);
-
-/*
- Columns and rows of the picture, pixels; 0 x 0 while they are open.
- */
-croupier_status croupier_settings_size(const struct croupier_settings *settings,
-                                       uint32_t *width,
-                                       uint32_t *height,
-                                       struct croupier_message *message);
-
-/*
  Makes shard index of a plan in memory: as many bytes as croupier_plan_shard_size says, at a multiple of CROUPIER_ALIGN. It
  serves one session; make it anew for another one. *shard becomes the handle, which is the address of the memory; null
  after a failure. CROUPIER_RANGE if the plan has fewer shards.
@@ -2339,43 +2200,182 @@ croupier_status croupier_shard_counters(const struct croupier_shard *shard,
                                         struct croupier_message *message);
 
 /*
- What a status means, in a few English words that end with a zero byte. Never null, whatever the number. The text is the
- library's and stays.
+ Pixels first to first + count - 1, row by row from the top left. CROUPIER_RANGE if there are not so many. While an
+ iteration is being finished, some pixels have it and others do not.
  */
-const char *croupier_status_text(int32_t status);
+croupier_status croupier_session_pixels(const struct croupier_session *session,
+                                        size_t first,
+                                        size_t count,
+                                        struct croupier_pixel *pixels,
+                                        struct croupier_message *message);
 
 /*
- CROUPIER_ABI_VERSION of the library that is loaded: the program needs at least the one that it was compiled with.
+ Mean radiance of all pixels: red, green and blue of each, row by row from the top left. count is the number of floats, three
+ times the number of pixels, or the answer is CROUPIER_SIZE.
  */
-uint32_t croupier_abi_version(void);
+croupier_status croupier_session_rgb(const struct croupier_session *session,
+                                     float *rgb,
+                                     size_t count,
+                                     struct croupier_message *message);
 
 /*
- Version of the library, such as 0.1.0. The text is the library's and stays.
+ Number of planes of an auxiliary value (croupier_aov); 0 if there is no such value.
  */
-const char *croupier_version(void);
+uint32_t croupier_aov_channels(uint32_t aov);
 
 /*
- Instruction set that the library was compiled for: x86-64, x86-64-v3, aarch64 and the like. The text is the library's
- and stays.
+ Plane channel of an auxiliary value (croupier_aov), a float per pixel, row by row from the top left. count is the number of
+ pixels, or the answer is CROUPIER_SIZE. CROUPIER_ABSENT if the settings do not ask for it, and before the end of the
+ first iteration; CROUPIER_RANGE if it has no such channel.
  */
-const char *croupier_instruction_set(void);
+croupier_status croupier_session_plane(const struct croupier_session *session,
+                                       uint32_t aov,
+                                       uint32_t channel,
+                                       float *values,
+                                       size_t count,
+                                       struct croupier_message *message);
 
 /*
- CROUPIER_OK if the processor, and the operating system, have all instructions that the library was compiled for;
- CROUPIER_INSTRUCTIONS, with the first that is missing in the message, if not: no other function is to be called then. On
- other processors than x86-64 nothing is known, and the answer is CROUPIER_OK.
+ Estimated error of the picture, as of the end of the last iteration.
  */
-croupier_status croupier_check_processor(struct croupier_message *message);
+croupier_status croupier_session_error_estimate(const struct croupier_session *session,
+                                                struct croupier_error_estimate *estimate,
+                                                struct croupier_message *message);
 
 /*
- The best instruction set that processor and operating system offer, of those that there are builds for: x86-64,
- x86-64-v3 or x86-64-v4; elsewhere that of the library. Writes at most size bytes, the last one 0; length, which may be
- null, becomes the length of the whole text without it.
+ The current iteration.
  */
-croupier_status croupier_processor_instruction_set(char *text,
-                                                   size_t size,
-                                                   size_t *length,
-                                                   struct croupier_message *message);
+croupier_status croupier_session_iteration(const struct croupier_session *session,
+                                           struct croupier_iteration *iteration,
+                                           struct croupier_message *message);
+
+/*
+ Counts of all finished iterations.
+ */
+croupier_status croupier_session_counters(const struct croupier_session *session,
+                                          struct croupier_counters *counters,
+                                          struct croupier_message *message);
+
+/*
+ Pixels of a shard in the iteration under way, for previews: writes red, green and blue of the mean of each pixel that has
+ finished camera samples where croupier_session_rgb has them, and leaves the others as they are. count is three times the
+ number of pixels of the picture, or the answer is CROUPIER_SIZE. Means are biased while samples of a pixel are in flight.
+ *written, which may be null, becomes the number of pixels; 0 if the shard has not stepped in this iteration.
+ */
+croupier_status croupier_shard_unfinished(const struct croupier_shard *shard,
+                                          const struct croupier_session *session,
+                                          float *rgb,
+                                          size_t count,
+                                          size_t *written,
+                                          struct croupier_message *message);
+
+/*
+ Closest hits of eight rays with the scene's triangles: picking, visibility, and the built-in part of an intersector of the
+ host's own. Lanes of active count (bit i is lane i); *hit becomes the lanes that hit.
+ */
+croupier_status croupier_scene_closest(const struct croupier_scene *scene,
+                                       const struct croupier_rays8 *rays,
+                                       uint32_t active,
+                                       struct croupier_hits8 *hits,
+                                       uint32_t *hit,
+                                       struct croupier_message *message);
+
+/*
+ Lanes of active whose rays hit any of the scene's triangles.
+ */
+croupier_status croupier_scene_occluded(const struct croupier_scene *scene,
+                                        const struct croupier_rays8 *rays,
+                                        uint32_t active,
+                                        uint32_t *occluded,
+                                        struct croupier_message *message);
+
+/*
+ Bytes that croupier_session_save_statistics writes. CROUPIER_ABSENT if the strategy learns nothing of the scene.
+ */
+croupier_status croupier_session_statistics_size(const struct croupier_session *session,
+                                                 size_t *bytes,
+                                                 struct croupier_message *message);
+
+/*
+ Writes what was learned of the scene, for another run, another machine, another scene of the same bounds. The bytes are
+ the same on every machine. CROUPIER_SIZE if there is too little room.
+ */
+croupier_status croupier_session_save_statistics(const struct croupier_session *session,
+                                                 void *bytes,
+                                                 size_t size,
+                                                 struct croupier_message *message);
+
+/*
+ Replaces (merge is 0) what was learned of the scene by saved bytes, or adds them. Whatever is loaded changes efficiency
+ only. The bytes are checked first; CROUPIER_SAVED, with the reason in the message, if they are damaged or of another scene
+ or objective, CROUPIER_ABSENT while an iteration runs or if the strategy learns nothing of the scene.
+ */
+croupier_status croupier_session_load_statistics(struct croupier_session *session,
+                                                 const void *bytes,
+                                                 size_t size,
+                                                 uint32_t merge,
+                                                 struct croupier_message *message);
+
+/*
+ The estimate of the pixels that the strategy works with (denoised, or means of blocks): red, green and blue of each, row by
+ row. count is three times the number of pixels, or the answer is CROUPIER_SIZE. CROUPIER_ABSENT if the settings need none,
+ and before the end of the first iteration.
+ */
+croupier_status croupier_session_estimate(const struct croupier_session *session,
+                                          float *rgb,
+                                          size_t count,
+                                          struct croupier_message *message);
+
+/*
+ Replaces the built-in estimate of the pixels by the host's (such as that of another denoiser), for good: red, green and
+ blue of each pixel, row by row. It changes efficiency only. CROUPIER_SIZE if count is not three times the number of pixels,
+ the settings have no estimate per pixel, or an iteration runs.
+ */
+croupier_status croupier_session_give_estimate(struct croupier_session *session,
+                                               const float *rgb,
+                                               size_t count,
+                                               struct croupier_message *message);
+
+/*
+ Most bytes that croupier_shard_save writes of shard index, in any iteration. CROUPIER_RANGE if the plan has fewer shards.
+ */
+croupier_status croupier_plan_saved_shard_size(const struct croupier_plan *plan,
+                                               uint32_t index,
+                                               size_t *bytes,
+                                               struct croupier_message *message);
+
+/*
+ Writes what the end of an iteration reads of a finished shard, for croupier_shard_load of another process; *written becomes
+ the number of bytes. Equal sums give equal bytes. CROUPIER_UNFINISHED if the shard has not finished an iteration,
+ CROUPIER_SIZE if there is too little room; nothing is written then.
+ */
+croupier_status croupier_shard_save(const struct croupier_shard *shard,
+                                    void *bytes,
+                                    size_t size,
+                                    size_t *written,
+                                    struct croupier_message *message);
+
+/*
+ Takes the place of the shard that croupier_shard_save has written: joins the iteration of the session with its sums,
+ finished. Sessions of several processes that begin the same iterations and end each with all shards have the same picture
+ and the same statistics to the bit. CROUPIER_PLAN or CROUPIER_SAVED, with the reason in the message, if the bytes are of
+ another scene, plan, shard, iteration or version, or damaged; the shard is as before then.
+ */
+croupier_status croupier_shard_load(struct croupier_shard *shard,
+                                    const struct croupier_session *session,
+                                    const void *bytes,
+                                    size_t size,
+                                    struct croupier_message *message);
+
+/*
+ Goes on as if so many iterations, of so many camera samples per pixel in all, had been before: for one picture in parts
+ that are rendered apart and added afterwards. Parts with other numbers of iterations and disjoint ranges of samples are
+ independent. CROUPIER_ITERATION if one has begun since the picture did.
+ */
+croupier_status croupier_session_skip(struct croupier_session *session,
+                                      uint64_t iterations,
+                                      uint32_t samples,
+                                      struct croupier_message *message);
 
 #ifdef __cplusplus
 }  // extern "C"

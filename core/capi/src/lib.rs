@@ -31,24 +31,42 @@
 #![expect(non_camel_case_types, reason = "types have the names that C sees")]
 #![expect(clippy::missing_safety_doc, reason = "one promise for all functions: see the documentation of the crate")]
 
-mod compose;
-mod edit;
-mod exchange;
-mod fault;
-mod guarded;
-mod kernels;
-mod learned;
-mod memory;
-mod parts;
-mod picture;
-mod plan;
-mod records;
-mod scene;
-mod session;
-mod settings;
-mod shard;
-mod status;
+// in the order of the header
 mod version;
+
+mod status;
+
+mod fault;
+
+mod guarded;
+
+mod memory;
+
+mod records;
+
+mod scene;
+
+mod edit;
+
+mod compose;
+
+mod settings;
+
+mod plan;
+
+mod session;
+
+mod shard;
+
+mod picture;
+
+mod learned;
+
+mod exchange;
+
+mod parts;
+
+mod kernels;
 
 pub use compose::*;
 pub use edit::*;
