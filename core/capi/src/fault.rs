@@ -128,7 +128,8 @@ impl<'a> Text<'a> {
     }
 
     pub(crate) fn put(&mut self, text: &str) {
-        for (c, byte) in self.rest.by_ref().zip(text.bytes()) {
+        // the text first: a zip that ends takes one more of what it asks first
+        for (byte, c) in text.bytes().zip(self.rest.by_ref()) {
             *c = black_box(byte as c_char);
         }
     }

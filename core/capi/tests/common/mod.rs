@@ -1,5 +1,5 @@
 //! A host in Rust that sees the library as C does.
-#![allow(dead_code, clippy::allow_attributes, reason = "each test uses a part of it")]
+#![allow(dead_code, unused_macros, unused_imports, clippy::allow_attributes, reason = "each test uses a part of it")]
 
 use croupier_capi::*;
 use croupier_host::bake::{BakeOptions, bake};
