@@ -351,7 +351,7 @@ typedef struct croupier_material {
   float reflectance[3];
   // GGX width, 1e-4 to 1.
   float alpha;
-  // Conductors: real refractive index by channel. Dielectrics and plastics: eta[0] is the index behind the front side
+  // Conductors: real refractive index by channel. Dielectrics and plastics: the first is the index behind the front side
   // over that before it.
   float eta[3];
   // Plastics: reflectance of the interface from inside for diffuse light, which baking derives.

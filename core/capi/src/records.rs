@@ -204,7 +204,7 @@ pub struct croupier_material {
     pub reflectance: [f32; 3],
     /// GGX width, 1e-4 to 1.
     pub alpha: f32,
-    /// Conductors: real refractive index by channel. Dielectrics and plastics: eta[0] is the index behind the front side
+    /// Conductors: real refractive index by channel. Dielectrics and plastics: the first is the index behind the front side
     /// over that before it.
     pub eta: [f32; 3],
     /// Plastics: reflectance of the interface from inside for diffuse light, which baking derives.
