@@ -18,8 +18,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// Version of this interface: it grows when functions, members of structs or numbers are added, and a program for a smaller
-// one works on. What does not work on is another soname.
+// Version of this interface: it grows when functions, members of structs or numbers are added, and a program for a
+// smaller one works on. What does not work on is another soname.
 #define CROUPIER_ABI_VERSION 1
 
 // "No such index".
@@ -117,7 +117,8 @@ enum croupier_aov
   CROUPIER_AOV_DEPTH = 2,
   // Share of the camera samples that hit, 0 to 1.
   CROUPIER_AOV_ALPHA = 3,
-  // Sums of the factors of roulette at vertices of depth 1, 2, 3 and above, and numbers of these vertices: eight planes.
+  // Sums of the factors of roulette at vertices of depth 1, 2, 3 and above, and numbers of these vertices: eight
+  // planes.
   CROUPIER_AOV_FACTORS = 4,
   // Number of paths: the camera sample and what splitting added.
   CROUPIER_AOV_PATHS = 5,
@@ -239,12 +240,12 @@ typedef uint32_t croupier_material_kind;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// A scene: a baked blob in the program's memory. Calls that read it may run on several threads at a time, steps of shards
-// included; an edit needs it for itself.
+// A scene: a baked blob in the program's memory. Calls that read it may run on several threads at a time, steps of
+// shards included; an edit needs it for itself.
 typedef struct croupier_scene croupier_scene;
 
-// A session: the picture so far and what was learned, in the program's memory. Calls that take a const pointer to it may run
-// on several threads at a time; the others need it for themselves, or answer CROUPIER_BUSY.
+// A session: the picture so far and what was learned, in the program's memory. Calls that take a const pointer to it
+// may run on several threads at a time; the others need it for themselves, or answer CROUPIER_BUSY.
 typedef struct croupier_session croupier_session;
 
 // A shard: one unit of parallel work, in the program's memory. One call at a time uses it.
@@ -286,11 +287,11 @@ typedef struct croupier_scene_facts {
   uint64_t identity;
 } croupier_scene_facts;
 
-// The camera of a scene. A pixel sample is a point (x, y) in [0, width) x [0, height), y down; with X = 2 x / width - 1
-// and Y = 2 y / height - 1 the ray of a perspective camera looks along forward + right X + down Y, from origin or a point of
-// the lens; that of an orthographic one begins at origin + right X + down Y and runs along forward; a panoramic one
-// looks from origin to longitude pi X (0 is forward, positive towards right) and latitude pi/2 Y (positive towards down).
-// Pictures of another shape than width x height keep the height of the view.
+// The camera of a scene. A pixel sample is a point (x, y) in [0, width) x [0, height), y down; with X = 2 x / width -
+// 1 and Y = 2 y / height - 1 the ray of a perspective camera looks along forward + right X + down Y, from origin or a
+// point of the lens; that of an orthographic one begins at origin + right X + down Y and runs along forward; a
+// panoramic one looks from origin to longitude pi X (0 is forward, positive towards right) and latitude pi/2 Y
+// (positive towards down). Pictures of another shape than width x height keep the height of the view.
 typedef struct croupier_camera {
   // sizeof(croupier_camera), set by the program.
   uint32_t struct_size;
@@ -319,8 +320,8 @@ typedef struct croupier_camera {
 typedef struct croupier_light {
   // croupier_light_kind; cannot change.
   uint32_t kind;
-  // Area: index of the triangle; cannot change. Sphere, rectangle, disk: 1 if it emits to both sides, plus 2 if camera
-  // rays do not see it.
+  // Area: index of the triangle; cannot change. Sphere, rectangle, disk: 1 if it emits to both sides, plus 2 if
+  // camera rays do not see it.
   uint32_t triangle;
   // Area: area of the triangle, world units squared; cannot change.
   float area;
@@ -328,11 +329,11 @@ typedef struct croupier_light {
   uint32_t instance;
   // Point, spot: position. Sphere, rectangle, disk: middle. Directional, sun: unit direction towards the light.
   float vector[3];
-  // Area, sphere, rectangle, disk: radiance. Point: intensity. Spot: intensity on the axis. Directional, sun: irradiance on
-  // a facing surface. Up to 1e18.
+  // Area, sphere, rectangle, disk: radiance. Point: intensity. Spot: intensity on the axis. Directional, sun:
+  // irradiance on a facing surface. Up to 1e18.
   float emission[3];
-  // Spot: unit axis, 1 - cos of the outer and of the inner half angle, 0. Sun: 1 - cos of its angular radius, then 0.
-  // Sphere: radius, then 0. Rectangle: two halves of edges. Disk: unit normal, radius, 0, 0. Others: 0.
+  // Spot: unit axis, 1 - cos of the outer and of the inner half angle, 0. Sun: 1 - cos of its angular radius, then
+  // 0. Sphere: radius, then 0. Rectangle: two halves of edges. Disk: unit normal, radius, 0, 0. Others: 0.
   float params[6];
 } croupier_light;
 
@@ -340,19 +341,20 @@ typedef struct croupier_light {
 typedef struct croupier_material {
   // croupier_material_kind.
   uint32_t kind;
-  // 1 if both sides behave like the front, plus 2 if the texture's alpha is the share of light that meets the surface,
-  // plus 4 if rough models give back what single scattering between microfacets loses.
+  // 1 if both sides behave like the front, plus 2 if the texture's alpha is the share of light that meets the
+  // surface, plus 4 if rough models give back what single scattering between microfacets loses.
   uint32_t flags;
   // Index of the texture that replaces reflectance, or CROUPIER_NONE.
   uint32_t texture;
   // First entry of its tables. The library's: ignored when a material is set.
   uint32_t table;
-  // Diffuse albedo, or scale of the specular reflection, 0 to 1; base colour of a principled material. Linear Rec. 709.
+  // Diffuse albedo, or scale of the specular reflection, 0 to 1; base colour of a principled material. Linear Rec.
+  // 709.
   float reflectance[3];
   // GGX width, 1e-4 to 1.
   float alpha;
-  // Conductors: real refractive index by channel. Dielectrics and plastics: the first is the index behind the front side
-  // over that before it.
+  // Conductors: real refractive index by channel. Dielectrics and plastics: the first is the index behind the front
+  // side over that before it.
   float eta[3];
   // Plastics: reflectance of the interface from inside for diffuse light, which baking derives.
   float fdr;
@@ -378,8 +380,8 @@ typedef struct croupier_layer {
   float nodes[4];
 } croupier_layer;
 
-// What a principled material has besides croupier_material. Numbers without a range are from 0 to 1. The last four members
-// are derived by baking from the roughnesses, the coat and the sheen: keep them with those.
+// What a principled material has besides croupier_material. Numbers without a range are from 0 to 1. The last four
+// members are derived by baking from the roughnesses, the coat and the sheen: keep them with those.
 typedef struct croupier_principled {
   // sizeof(croupier_principled), set by the program.
   uint32_t struct_size;
@@ -407,13 +409,15 @@ typedef struct croupier_principled {
   float eta;
   // Factor on the tangential part of mapped normals, up to 1000.
   float normal_scale;
-  // 1 if what light passes is a sheet and not a solid, plus 2 if the alpha of the base texture multiplies the opacity.
+  // 1 if what light passes is a sheet and not a solid, plus 2 if the alpha of the base texture multiplies the
+  // opacity.
   uint32_t flags;
   // First entry of the rows of reflection among the scene's tables.
   uint32_t reflection;
   // First entry of the rows of energy among the scene's tables, or CROUPIER_NONE.
   uint32_t energy;
-  // Textures: base colour and opacity; metal (blue) and roughness (green); transmission (red); coat (red); normal; emission.
+  // Textures: base colour and opacity; metal (blue) and roughness (green); transmission (red); coat (red); normal;
+  // emission.
   struct croupier_texture_use textures[6];
   // Albedo of the coat at full strength.
   struct croupier_layer coat_layer;
@@ -468,8 +472,8 @@ typedef struct croupier_texture {
   uint32_t width;
   // Rows, at least 1.
   uint32_t height;
-  // Of textures of principled materials: 1 if red, green and blue are numbers and not sRGB, plus 2 (clamped) or 4 (mirrored)
-  // along u, plus 8 or 16 along v. Others have 0.
+  // Of textures of principled materials: 1 if red, green and blue are numbers and not sRGB, plus 2 (clamped) or 4
+  // (mirrored) along u, plus 8 or 16 along v. Others have 0.
   uint32_t flags;
 } croupier_texture;
 
@@ -510,7 +514,8 @@ typedef struct croupier_arrays {
   const struct croupier_camera *camera;
   // Positions of vertices, world space, each coordinate up to 1e9 as a magnitude.
   const float (*positions)[3];
-  // Normals of vertices, of any length, or null: all triangles are flat. Triangles with a vertex whose normal is 0 are flat.
+  // Normals of vertices, of any length, or null: all triangles are flat. Triangles with a vertex whose normal is 0
+  // are flat.
   const float (*normals)[3];
   // Texture coordinates of vertices, v upwards, or null.
   const float (*uvs)[2];
@@ -522,8 +527,8 @@ typedef struct croupier_arrays {
   const uint32_t *triangle_materials;
   // Number of triangles.
   size_t triangle_count;
-  // Materials, see croupier_material_init. fdr of plastics may be 0, and the table of rough ones CROUPIER_NONE: they are
-  // computed then.
+  // Materials, see croupier_material_init. fdr of plastics may be 0, and the table of rough ones CROUPIER_NONE:
+  // they are computed then.
   const struct croupier_material *materials;
   // Radiance that the triangles of each material emit from their front, or null: none emit.
   const float (*emission)[3];
@@ -549,8 +554,8 @@ typedef struct croupier_arrays {
   const struct croupier_medium *media;
   // Number of media.
   size_t medium_count;
-  // Lights that are no triangles, see croupier_light_from_source. In the scene they follow those of the triangles: first those
-  // without a shape, then the environment, then those with one.
+  // Lights that are no triangles, see croupier_light_from_source. In the scene they follow those of the triangles:
+  // first those without a shape, then the environment, then those with one.
   const struct croupier_light *lights;
   // Number of these lights.
   size_t light_count;
@@ -582,8 +587,8 @@ typedef struct croupier_view {
   double target[3];
   // Upwards, not parallel to the axis.
   double up[3];
-  // Perspective: full vertical field of view, degrees, above 0.001 and below 179.9. Orthographic: height of the picture, world
-  // units. Panoramic: not read.
+  // Perspective: full vertical field of view, degrees, above 0.001 and below 179.9. Orthographic: height of the
+  // picture, world units. Panoramic: not read.
   double extent;
   // Columns, 1 to 65536.
   uint32_t width;
@@ -636,7 +641,8 @@ typedef struct croupier_plan {
   uint64_t opaque[128];
 } croupier_plan;
 
-// Sizes of a plan's blocks of memory. Each block starts at a multiple of CROUPIER_ALIGN bytes and may hold anything before.
+// Sizes of a plan's blocks of memory. Each block starts at a multiple of CROUPIER_ALIGN bytes and may hold anything
+// before.
 typedef struct croupier_sizes {
   // sizeof(croupier_sizes), set by the program.
   uint32_t struct_size;
@@ -683,9 +689,9 @@ typedef struct croupier_hits8 {
   uint32_t instance[2][8];
 } croupier_hits8;
 
-// Closest hits of the lanes in active (bit i is lane i). hits holds no hits when it is called; returns the lanes that hit.
-// Lanes with numbers that cannot be (t outside the ray, no such triangle) count as no hit. May be called on several threads
-// at a time, with the same user.
+// Closest hits of the lanes in active (bit i is lane i). hits holds no hits when it is called; returns the lanes that
+// hit. Lanes with numbers that cannot be (t outside the ray, no such triangle) count as no hit. May be called on
+// several threads at a time, with the same user.
 typedef uint32_t (*croupier_closest)(void *user,
                                      const struct croupier_rays8 *rays,
                                      uint32_t active,
@@ -714,7 +720,8 @@ typedef struct croupier_surfaces8 {
   uint32_t object[8];
 } croupier_surfaces8;
 
-// What is where the hits of the lanes in own are, each of one of the host's own surfaces. Threads as of croupier_closest.
+// What is where the hits of the lanes in own are, each of one of the host's own surfaces. Threads as of
+// croupier_closest.
 typedef void (*croupier_surface)(void *user,
                                  const struct croupier_rays8 *rays,
                                  const struct croupier_hits8 *hits,
@@ -775,9 +782,9 @@ typedef uint32_t (*croupier_points)(void *user,
                                     uint32_t active,
                                     struct croupier_source_points8 *points);
 
-// What a host computes in place of the library. Members that are null are the library's own part. Callbacks must return:
-// no longjmp and no C++ exception may leave them. They may read the scene (croupier_scene_closest); calls that change an
-// object that is in use answer CROUPIER_BUSY.
+// What a host computes in place of the library. Members that are null are the library's own part. Callbacks must
+// return: no longjmp and no C++ exception may leave them. They may read the scene (croupier_scene_closest); calls
+// that change an object that is in use answer CROUPIER_BUSY.
 typedef struct croupier_parts {
   // sizeof(croupier_parts), set by the program.
   uint32_t struct_size;
@@ -895,7 +902,8 @@ typedef struct croupier_error_estimate {
   uint32_t struct_size;
   // 0.
   uint32_t reserved;
-  // Mean over pixels and channels of variance / (mean^2 + 0.01), without the worst 0.01 % of the pixels, times independence.
+  // Mean over pixels and channels of variance / (mean^2 + 0.01), without the worst 0.01 % of the pixels, times
+  // independence.
   double rel_mse;
   // Lower end of its 95 % confidence interval.
   double low;
@@ -936,31 +944,32 @@ uint32_t croupier_abi_version(void);
 // Version of the library, such as 0.1.0. The text is the library's and stays.
 const char *croupier_version(void);
 
-// Instruction set that the library was compiled for: x86-64, x86-64-v3, aarch64 and the like. The text is the library's
-// and stays.
+// Instruction set that the library was compiled for: x86-64, x86-64-v3, aarch64 and the like. The text is the
+// library's and stays.
 const char *croupier_instruction_set(void);
 
 // CROUPIER_OK if the processor, and the operating system, have all instructions that the library was compiled for;
-// CROUPIER_INSTRUCTIONS, with the first that is missing in the message, if not: no other function is to be called then. On
-// other processors than x86-64 nothing is known, and the answer is CROUPIER_OK.
+// CROUPIER_INSTRUCTIONS, with the first that is missing in the message, if not: no other function is to be called
+// then. On other processors than x86-64 nothing is known, and the answer is CROUPIER_OK.
 croupier_status croupier_check_processor(struct croupier_message *message);
 
 // The best instruction set that processor and operating system offer, of those that there are builds for: x86-64,
-// x86-64-v3 or x86-64-v4; elsewhere that of the library. Writes at most size bytes, the last one 0; length, which may be
-// null, becomes the length of the whole text without it.
+// x86-64-v3 or x86-64-v4; elsewhere that of the library. Writes at most size bytes, the last one 0; length, which may
+// be null, becomes the length of the whole text without it.
 croupier_status croupier_processor_instruction_set(char *text,
                                                    size_t size,
                                                    size_t *length,
                                                    struct croupier_message *message);
 
-// What a status means, in a few English words that end with a zero byte. Never null, whatever the number. The text is the
-// library's and stays.
+// What a status means, in a few English words that end with a zero byte. Never null, whatever the number. The text is
+// the library's and stays.
 const char *croupier_status_text(int32_t status);
 
-// Makes a scene object in memory (CROUPIER_SCENE_BYTES bytes at a multiple of CROUPIER_ALIGN) for a baked blob, which is
-// checked in one pass and then read in place. The blob starts at a multiple of 4, of 64 for full speed; it is the
-// scene's until croupier_scene_destroy, and edits change it. *scene becomes the handle, which is the address of the memory;
-// null after a failure. CROUPIER_SCENE, with the object and the number that are wrong in the message, if the blob is none.
+// Makes a scene object in memory (CROUPIER_SCENE_BYTES bytes at a multiple of CROUPIER_ALIGN) for a baked blob, which
+// is checked in one pass and then read in place. The blob starts at a multiple of 4, of 64 for full speed; it is the
+// scene's until croupier_scene_destroy, and edits change it. *scene becomes the handle, which is the address of the
+// memory; null after a failure. CROUPIER_SCENE, with the object and the number that are wrong in the message, if the
+// blob is none.
 croupier_status croupier_scene_init(void *memory,
                                     size_t memory_size,
                                     void *blob,
@@ -995,8 +1004,8 @@ croupier_status croupier_scene_material(const struct croupier_scene *scene,
                                         struct croupier_material *material,
                                         struct croupier_message *message);
 
-// What principled material index has besides croupier_scene_material. CROUPIER_RANGE if there is none, or it is of another
-// kind.
+// What principled material index has besides croupier_scene_material. CROUPIER_RANGE if there is none, or it is of
+// another kind.
 croupier_status croupier_scene_principled(const struct croupier_scene *scene,
                                           uint32_t index,
                                           struct croupier_principled *principled,
@@ -1022,7 +1031,8 @@ croupier_status croupier_scene_material_name(const struct croupier_scene *scene,
                                              size_t *length,
                                              struct croupier_message *message);
 
-// Name of object index as CROUPIER_AOV_OBJECT shows it, empty if it has none. Texts as of croupier_scene_material_name.
+// Name of object index as CROUPIER_AOV_OBJECT shows it, empty if it has none. Texts as of
+// croupier_scene_material_name.
 croupier_status croupier_scene_object_name(const struct croupier_scene *scene,
                                            uint32_t index,
                                            char *name,
@@ -1030,29 +1040,30 @@ croupier_status croupier_scene_object_name(const struct croupier_scene *scene,
                                            size_t *length,
                                            struct croupier_message *message);
 
-// Replaces the camera. CROUPIER_EDIT, with the number that is wrong in the message, if it breaks a rule of scenes; the scene
-// is as before then. As after every edit, sessions of the scene need croupier_session_change_scene before they step again.
+// Replaces the camera. CROUPIER_EDIT, with the number that is wrong in the message, if it breaks a rule of scenes;
+// the scene is as before then. As after every edit, sessions of the scene need croupier_session_change_scene before
+// they step again.
 croupier_status croupier_scene_set_camera(struct croupier_scene *scene,
                                           const struct croupier_camera *camera,
                                           struct croupier_message *message);
 
-// Replaces light index: emission, and what else its kind lets change (croupier_light). CROUPIER_EDIT_FIXED if another member
-// differs from croupier_scene_light. Takes a pass over the lights.
+// Replaces light index: emission, and what else its kind lets change (croupier_light). CROUPIER_EDIT_FIXED if another
+// member differs from croupier_scene_light. Takes a pass over the lights.
 croupier_status croupier_scene_set_light(struct croupier_scene *scene,
                                          uint32_t index,
                                          const struct croupier_light *light,
                                          struct croupier_message *message);
 
-// Gives all emitting triangles of a material this radiance, linear Rec. 709; *changed, which may be null, becomes their
-// number. Takes a pass over the lights.
+// Gives all emitting triangles of a material this radiance, linear Rec. 709; *changed, which may be null, becomes
+// their number. Takes a pass over the lights.
 croupier_status croupier_scene_set_emission(struct croupier_scene *scene,
                                             uint32_t material,
                                             const float (*radiance)[3],
                                             uint32_t *changed,
                                             struct croupier_message *message);
 
-// Replaces the environment's rotation and radiance or scale. CROUPIER_RANGE if there is none, CROUPIER_EDIT_FIXED if another
-// member differs.
+// Replaces the environment's rotation and radiance or scale. CROUPIER_RANGE if there is none, CROUPIER_EDIT_FIXED if
+// another member differs.
 croupier_status croupier_scene_set_environment(struct croupier_scene *scene,
                                                const struct croupier_environment *environment,
                                                struct croupier_message *message);
@@ -1073,9 +1084,9 @@ croupier_status croupier_scene_set_principled(struct croupier_scene *scene,
                                               const struct croupier_principled *principled,
                                               struct croupier_message *message);
 
-// Moves count instances in one round, whose boxes and lights are brought up to date once. *done, which may be null, becomes
-// the number of those that were moved: all of them, or those before the one that is refused (CROUPIER_EDIT; the message
-// has its index).
+// Moves count instances in one round, whose boxes and lights are brought up to date once. *done, which may be null,
+// becomes the number of those that were moved: all of them, or those before the one that is refused (CROUPIER_EDIT;
+// the message has its index).
 croupier_status croupier_scene_set_transforms(struct croupier_scene *scene,
                                               const uint32_t *indices,
                                               const struct croupier_transform *transforms,
@@ -1094,30 +1105,32 @@ croupier_status croupier_scene_rebuild_size(struct croupier_scene *scene,
                                             size_t *bytes,
                                             struct croupier_message *message);
 
-// Builds the world's tree anew over its instances as they are, which makes rays faster after far moves. scratch starts
-// at a multiple of 4 and is the program's again when the call returns. CROUPIER_SIZE if it is too small, CROUPIER_RANGE in a
-// scene without instances, CROUPIER_EDIT_FIXED if the blob has too little room; the tree is as it was then.
+// Builds the world's tree anew over its instances as they are, which makes rays faster after far moves. scratch
+// starts at a multiple of 4 and is the program's again when the call returns. CROUPIER_SIZE if it is too small,
+// CROUPIER_RANGE in a scene without instances, CROUPIER_EDIT_FIXED if the blob has too little room; the tree is as it
+// was then.
 croupier_status croupier_scene_rebuild(struct croupier_scene *scene,
                                        void *scratch,
                                        size_t scratch_size,
                                        struct croupier_message *message);
 
-// Makes the bytes of an edited scene a blob again, to be stored: until then their hash is that of the bytes before. Takes a
-// pass over all bytes. The identity of the scene changes.
+// Makes the bytes of an edited scene a blob again, to be stored: until then their hash is that of the bytes before.
+// Takes a pass over all bytes. The identity of the scene changes.
 croupier_status croupier_scene_seal(struct croupier_scene *scene,
                                     struct croupier_message *message);
 
-// Bytes that croupier_scene_compose needs: of the blob (what always suffices; most take a third of it), and of intermediate
-// results. CROUPIER_COMPOSE, with the record and the number that are wrong in the message, if the arrays make no scene.
+// Bytes that croupier_scene_compose needs: of the blob (what always suffices; most take a third of it), and of
+// intermediate results. CROUPIER_COMPOSE, with the record and the number that are wrong in the message, if the arrays
+// make no scene.
 croupier_status croupier_scene_compose_size(const struct croupier_arrays *arrays,
                                             size_t *blob_size,
                                             size_t *scratch_size,
                                             struct croupier_message *message);
 
-// Builds a scene of arrays: its tree of triangles, its tables, everything that baking does. blob and scratch start at multiples
-// of CROUPIER_ALIGN and overlap neither each other nor an array. *length becomes the blob's own length: blob and length are
-// what croupier_scene_init takes. scratch is the program's again. Takes a time that grows with the triangles times their
-// logarithm. CROUPIER_COMPOSE as of croupier_scene_compose_size.
+// Builds a scene of arrays: its tree of triangles, its tables, everything that baking does. blob and scratch start at
+// multiples of CROUPIER_ALIGN and overlap neither each other nor an array. *length becomes the blob's own length:
+// blob and length are what croupier_scene_init takes. scratch is the program's again. Takes a time that grows with
+// the triangles times their logarithm. CROUPIER_COMPOSE as of croupier_scene_compose_size.
 croupier_status croupier_scene_compose(const struct croupier_arrays *arrays,
                                        void *blob,
                                        size_t blob_size,
@@ -1126,14 +1139,14 @@ croupier_status croupier_scene_compose(const struct croupier_arrays *arrays,
                                        size_t *length,
                                        struct croupier_message *message);
 
-// Fills in a material: its kind (croupier_material_kind), and what no material of the kind has. CROUPIER_RANGE if there is no
-// such kind.
+// Fills in a material: its kind (croupier_material_kind), and what no material of the kind has. CROUPIER_RANGE if
+// there is no such kind.
 croupier_status croupier_material_init(struct croupier_material *material,
                                        uint32_t kind,
                                        struct croupier_message *message);
 
-// The camera of a view, for croupier_arrays and croupier_scene_set_camera. CROUPIER_RANGE, with the number in the message, if
-// there is none.
+// The camera of a view, for croupier_arrays and croupier_scene_set_camera. CROUPIER_RANGE, with the number in the
+// message, if there is none.
 croupier_status croupier_camera_from_view(const struct croupier_view *view,
                                           struct croupier_camera *camera,
                                           struct croupier_message *message);
@@ -1144,8 +1157,8 @@ croupier_status croupier_light_from_source(const struct croupier_light_source *s
                                            struct croupier_light *light,
                                            struct croupier_message *message);
 
-// Makes settings of memory that may hold anything: the default ones, with size and depth of the scene. scene may be null;
-// then croupier_settings_set_size and croupier_settings_set of "max-depth" have to follow.
+// Makes settings of memory that may hold anything: the default ones, with size and depth of the scene. scene may be
+// null; then croupier_settings_set_size and croupier_settings_set of "max-depth" have to follow.
 croupier_status croupier_settings_init(struct croupier_settings *settings,
                                        const struct croupier_scene *scene,
                                        struct croupier_message *message);
@@ -1158,8 +1171,8 @@ croupier_status croupier_settings_set(struct croupier_settings *settings,
                                       const char *value,
                                       struct croupier_message *message);
 
-// Text of a setting, which croupier_settings_set reads back. Writes at most size bytes, the last one 0; length, which may be
-// null, becomes the length of the whole text without it. CROUPIER_RANGE if no setting has the name.
+// Text of a setting, which croupier_settings_set reads back. Writes at most size bytes, the last one 0; length, which
+// may be null, becomes the length of the whole text without it. CROUPIER_RANGE if no setting has the name.
 croupier_status croupier_settings_get(const struct croupier_settings *settings,
                                       const char *name,
                                       char *value,
@@ -1184,7 +1197,8 @@ croupier_status croupier_settings_help(size_t index,
                                        size_t *length,
                                        struct croupier_message *message);
 
-// Sets columns and rows of the picture, pixels; at least 1 x 1 and at most 2^31 pixels, which croupier_plan_init checks.
+// Sets columns and rows of the picture, pixels; at least 1 x 1 and at most 2^31 pixels, which croupier_plan_init
+// checks.
 croupier_status croupier_settings_set_size(struct croupier_settings *settings,
                                            uint32_t width,
                                            uint32_t height,
@@ -1206,8 +1220,8 @@ croupier_status croupier_settings_size(const struct croupier_settings *settings,
                                        uint32_t *height,
                                        struct croupier_message *message);
 
-// Makes a plan of memory that may hold anything: checks the settings and measures the blocks. CROUPIER_SETTINGS if they
-// cannot be used, with the reason in the message.
+// Makes a plan of memory that may hold anything: checks the settings and measures the blocks. CROUPIER_SETTINGS if
+// they cannot be used, with the reason in the message.
 croupier_status croupier_plan_init(struct croupier_plan *plan,
                                    const struct croupier_settings *settings,
                                    struct croupier_message *message);
@@ -1223,9 +1237,9 @@ croupier_status croupier_plan_shard_size(const struct croupier_plan *plan,
                                          size_t *bytes,
                                          struct croupier_message *message);
 
-// Makes a session of a scene in memory: as many bytes as croupier_plan_sizes says, at a multiple of CROUPIER_ALIGN. The scene
-// stays where it is, and exists, as long as the session is used; the plan may go. *session becomes the handle, which is
-// the address of the memory; null after a failure.
+// Makes a session of a scene in memory: as many bytes as croupier_plan_sizes says, at a multiple of CROUPIER_ALIGN.
+// The scene stays where it is, and exists, as long as the session is used; the plan may go. *session becomes the
+// handle, which is the address of the memory; null after a failure.
 croupier_status croupier_session_init(void *memory,
                                       size_t memory_size,
                                       const struct croupier_plan *plan,
@@ -1233,8 +1247,8 @@ croupier_status croupier_session_init(void *memory,
                                       struct croupier_session **session,
                                       struct croupier_message *message);
 
-// croupier_session_init with parts of the host's own, which are copied. CROUPIER_RANGE if parts are there that do not go
-// together.
+// croupier_session_init with parts of the host's own, which are copied. CROUPIER_RANGE if parts are there that do not
+// go together.
 croupier_status croupier_session_init_with(void *memory,
                                            size_t memory_size,
                                            const struct croupier_plan *plan,
@@ -1243,9 +1257,9 @@ croupier_status croupier_session_init_with(void *memory,
                                            struct croupier_session **session,
                                            struct croupier_message *message);
 
-// Goes on with the session that croupier_session_suspend has left in memory, which may have been copied elsewhere or stored
-// since, with the bits that it would have had without the break. The plan must be equal; with another scene the picture
-// begins anew, with what was learned. CROUPIER_NOT_SUSPENDED if the memory holds no such session.
+// Goes on with the session that croupier_session_suspend has left in memory, which may have been copied elsewhere or
+// stored since, with the bits that it would have had without the break. The plan must be equal; with another scene
+// the picture begins anew, with what was learned. CROUPIER_NOT_SUSPENDED if the memory holds no such session.
 croupier_status croupier_session_resume(void *memory,
                                         size_t memory_size,
                                         const struct croupier_plan *plan,
@@ -1267,19 +1281,21 @@ croupier_status croupier_session_resume_with(void *memory,
 croupier_status croupier_session_suspend(struct croupier_session *session,
                                          struct croupier_message *message);
 
-// Ends a session: its memory is the program's again. CROUPIER_BUSY, and the session goes on, while another call uses it.
+// Ends a session: its memory is the program's again. CROUPIER_BUSY, and the session goes on, while another call uses
+// it.
 croupier_status croupier_session_destroy(struct croupier_session *session,
                                          struct croupier_message *message);
 
-// Begins a round of samples camera samples per pixel. One that is under way is abandoned. Shards notice at their next step.
+// Begins a round of samples camera samples per pixel. One that is under way is abandoned. Shards notice at their next
+// step.
 croupier_status croupier_session_begin_iteration(struct croupier_session *session,
                                                  uint32_t samples,
                                                  struct croupier_message *message);
 
-// Goes on with the end of the iteration: merges what the shards gathered, estimates the error, learns. All shards of the plan
-// in order, each finished; the same ones until *more is 0, when the next iteration can begin. units is a budget: work in the
-// time of a ray, some 300 instructions each. With the same bits whatever the budgets. CROUPIER_SHARDS, CROUPIER_UNFINISHED,
-// CROUPIER_PLAN, CROUPIER_ITERATION: the picture is as before then.
+// Goes on with the end of the iteration: merges what the shards gathered, estimates the error, learns. All shards of
+// the plan in order, each finished; the same ones until *more is 0, when the next iteration can begin. units is a
+// budget: work in the time of a ray, some 300 instructions each. With the same bits whatever the budgets.
+// CROUPIER_SHARDS, CROUPIER_UNFINISHED, CROUPIER_PLAN, CROUPIER_ITERATION: the picture is as before then.
 croupier_status croupier_session_finish_iteration(struct croupier_session *session,
                                                   struct croupier_shard *const *shards,
                                                   size_t count,
@@ -1287,23 +1303,23 @@ croupier_status croupier_session_finish_iteration(struct croupier_session *sessi
                                                   uint32_t *more,
                                                   struct croupier_message *message);
 
-// Forgets the picture and begins again with iteration 1; an iteration that is under way is abandoned. If keep is 0, what was
-// learned is forgotten too, and the pictures that follow are those of a new session to the bit.
+// Forgets the picture and begins again with iteration 1; an iteration that is under way is abandoned. If keep is 0,
+// what was learned is forgotten too, and the pictures that follow are those of a new session to the bit.
 croupier_status croupier_session_restart(struct croupier_session *session,
                                          uint32_t keep,
                                          struct croupier_message *message);
 
-// Goes over to a scene that was edited, or to another one, and begins a new picture of it as croupier_session_restart does.
-// Sizes and path length stay those of the plan. CROUPIER_EFFECTS if the library lacks what the scene needs; the session is
-// as before then.
+// Goes over to a scene that was edited, or to another one, and begins a new picture of it as croupier_session_restart
+// does. Sizes and path length stay those of the plan. CROUPIER_EFFECTS if the library lacks what the scene needs; the
+// session is as before then.
 croupier_status croupier_session_change_scene(struct croupier_session *session,
                                               const struct croupier_scene *scene,
                                               uint32_t keep,
                                               struct croupier_message *message);
 
-// Makes shard index of a plan in memory: as many bytes as croupier_plan_shard_size says, at a multiple of CROUPIER_ALIGN. It
-// serves one session; make it anew for another one. *shard becomes the handle, which is the address of the memory; null
-// after a failure. CROUPIER_RANGE if the plan has fewer shards.
+// Makes shard index of a plan in memory: as many bytes as croupier_plan_shard_size says, at a multiple of
+// CROUPIER_ALIGN. It serves one session; make it anew for another one. *shard becomes the handle, which is the
+// address of the memory; null after a failure. CROUPIER_RANGE if the plan has fewer shards.
 croupier_status croupier_shard_init(void *memory,
                                     size_t memory_size,
                                     const struct croupier_plan *plan,
@@ -1311,8 +1327,8 @@ croupier_status croupier_shard_init(void *memory,
                                     struct croupier_shard **shard,
                                     struct croupier_message *message);
 
-// Takes up the shard that croupier_shard_suspend has left in memory, which may have been copied elsewhere or stored since.
-// CROUPIER_NOT_SUSPENDED if the memory holds no shard of an equal plan with this index, suspended.
+// Takes up the shard that croupier_shard_suspend has left in memory, which may have been copied elsewhere or stored
+// since. CROUPIER_NOT_SUSPENDED if the memory holds no shard of an equal plan with this index, suspended.
 croupier_status croupier_shard_resume(void *memory,
                                       size_t memory_size,
                                       const struct croupier_plan *plan,
@@ -1328,19 +1344,20 @@ croupier_status croupier_shard_suspend(struct croupier_shard *shard,
 croupier_status croupier_shard_destroy(struct croupier_shard *shard,
                                        struct croupier_message *message);
 
-// Works until about rays rays (exceeded by less than one packet of 16) are traced or the shard has finished the iteration;
+// Works until about rays rays (exceeded by less than one packet of 16) are traced or the shard has finished the
+// iteration;
 // *more becomes 1 or 0. Many small steps and one big step give the same bits. Different shards may step on different threads
 // at a time, with the same session; a program cancels by not calling again. CROUPIER_PLAN if session and shard are of
-// different plans, CROUPIER_SCENE_CHANGED if the scene was edited since the session was told, CROUPIER_ITERATION if none has
-// begun; *more is 0 then.
+// different plans, CROUPIER_SCENE_CHANGED if the scene was edited since the session was told, CROUPIER_ITERATION if
+// none has begun; *more is 0 then.
 croupier_status croupier_shard_step(struct croupier_shard *shard,
                                     const struct croupier_session *session,
                                     uint64_t rays,
                                     uint32_t *more,
                                     struct croupier_message *message);
 
-// Starts no further camera samples in the iteration of the shard's last step: stepping on finishes those in flight, so that
-// the iteration can end early and the picture stays unbiased.
+// Starts no further camera samples in the iteration of the shard's last step: stepping on finishes those in flight,
+// so that the iteration can end early and the picture stays unbiased.
 croupier_status croupier_shard_stop(struct croupier_shard *shard,
                                     struct croupier_message *message);
 
@@ -1357,8 +1374,8 @@ croupier_status croupier_session_pixels(const struct croupier_session *session,
                                         struct croupier_pixel *pixels,
                                         struct croupier_message *message);
 
-// Mean radiance of all pixels: red, green and blue of each, row by row from the top left. count is the number of floats, three
-// times the number of pixels, or the answer is CROUPIER_SIZE.
+// Mean radiance of all pixels: red, green and blue of each, row by row from the top left. count is the number of
+// floats, three times the number of pixels, or the answer is CROUPIER_SIZE.
 croupier_status croupier_session_rgb(const struct croupier_session *session,
                                      float *rgb,
                                      size_t count,
@@ -1367,9 +1384,9 @@ croupier_status croupier_session_rgb(const struct croupier_session *session,
 // Number of planes of an auxiliary value (croupier_aov); 0 if there is no such value.
 uint32_t croupier_aov_channels(uint32_t aov);
 
-// Plane channel of an auxiliary value (croupier_aov), a float per pixel, row by row from the top left. count is the number of
-// pixels, or the answer is CROUPIER_SIZE. CROUPIER_ABSENT if the settings do not ask for it, and before the end of the
-// first iteration; CROUPIER_RANGE if it has no such channel.
+// Plane channel of an auxiliary value (croupier_aov), a float per pixel, row by row from the top left. count is the
+// number of pixels, or the answer is CROUPIER_SIZE. CROUPIER_ABSENT if the settings do not ask for it, and before the
+// end of the first iteration; CROUPIER_RANGE if it has no such channel.
 croupier_status croupier_session_plane(const struct croupier_session *session,
                                        uint32_t aov,
                                        uint32_t channel,
@@ -1392,9 +1409,10 @@ croupier_status croupier_session_counters(const struct croupier_session *session
                                           struct croupier_counters *counters,
                                           struct croupier_message *message);
 
-// Pixels of a shard in the iteration under way, for previews: writes red, green and blue of the mean of each pixel that has
-// finished camera samples where croupier_session_rgb has them, and leaves the others as they are. count is three times the
-// number of pixels of the picture, or the answer is CROUPIER_SIZE. Means are biased while samples of a pixel are in flight.
+// Pixels of a shard in the iteration under way, for previews: writes red, green and blue of the mean of each pixel
+// that has finished camera samples where croupier_session_rgb has them, and leaves the others as they are. count is
+// three times the number of pixels of the picture, or the answer is CROUPIER_SIZE. Means are biased while samples of
+// a pixel are in flight.
 // *written, which may be null, becomes the number of pixels; 0 if the shard has not stepped in this iteration.
 croupier_status croupier_shard_unfinished(const struct croupier_shard *shard,
                                           const struct croupier_session *session,
@@ -1403,8 +1421,8 @@ croupier_status croupier_shard_unfinished(const struct croupier_shard *shard,
                                           size_t *written,
                                           struct croupier_message *message);
 
-// Closest hits of eight rays with the scene's triangles: picking, visibility, and the built-in part of an intersector of the
-// host's own. Lanes of active count (bit i is lane i); *hit becomes the lanes that hit.
+// Closest hits of eight rays with the scene's triangles: picking, visibility, and the built-in part of an intersector
+// of the host's own. Lanes of active count (bit i is lane i); *hit becomes the lanes that hit.
 croupier_status croupier_scene_closest(const struct croupier_scene *scene,
                                        const struct croupier_rays8 *rays,
                                        uint32_t active,
@@ -1424,66 +1442,68 @@ croupier_status croupier_session_statistics_size(const struct croupier_session *
                                                  size_t *bytes,
                                                  struct croupier_message *message);
 
-// Writes what was learned of the scene, for another run, another machine, another scene of the same bounds. The bytes are
-// the same on every machine. CROUPIER_SIZE if there is too little room.
+// Writes what was learned of the scene, for another run, another machine, another scene of the same bounds. The bytes
+// are the same on every machine. CROUPIER_SIZE if there is too little room.
 croupier_status croupier_session_save_statistics(const struct croupier_session *session,
                                                  void *bytes,
                                                  size_t size,
                                                  struct croupier_message *message);
 
-// Replaces (merge is 0) what was learned of the scene by saved bytes, or adds them. Whatever is loaded changes efficiency
-// only. The bytes are checked first; CROUPIER_SAVED, with the reason in the message, if they are damaged or of another scene
-// or objective, CROUPIER_ABSENT while an iteration runs or if the strategy learns nothing of the scene.
+// Replaces (merge is 0) what was learned of the scene by saved bytes, or adds them. Whatever is loaded changes
+// efficiency only. The bytes are checked first; CROUPIER_SAVED, with the reason in the message, if they are damaged
+// or of another scene or objective, CROUPIER_ABSENT while an iteration runs or if the strategy learns nothing of the
+// scene.
 croupier_status croupier_session_load_statistics(struct croupier_session *session,
                                                  const void *bytes,
                                                  size_t size,
                                                  uint32_t merge,
                                                  struct croupier_message *message);
 
-// The estimate of the pixels that the strategy works with (denoised, or means of blocks): red, green and blue of each, row by
-// row. count is three times the number of pixels, or the answer is CROUPIER_SIZE. CROUPIER_ABSENT if the settings need none,
-// and before the end of the first iteration.
+// The estimate of the pixels that the strategy works with (denoised, or means of blocks): red, green and blue of
+// each, row by row. count is three times the number of pixels, or the answer is CROUPIER_SIZE. CROUPIER_ABSENT if the
+// settings need none, and before the end of the first iteration.
 croupier_status croupier_session_estimate(const struct croupier_session *session,
                                           float *rgb,
                                           size_t count,
                                           struct croupier_message *message);
 
-// Replaces the built-in estimate of the pixels by the host's (such as that of another denoiser), for good: red, green and
-// blue of each pixel, row by row. It changes efficiency only. CROUPIER_SIZE if count is not three times the number of pixels,
-// the settings have no estimate per pixel, or an iteration runs.
+// Replaces the built-in estimate of the pixels by the host's (such as that of another denoiser), for good: red, green
+// and blue of each pixel, row by row. It changes efficiency only. CROUPIER_SIZE if count is not three times the
+// number of pixels, the settings have no estimate per pixel, or an iteration runs.
 croupier_status croupier_session_give_estimate(struct croupier_session *session,
                                                const float *rgb,
                                                size_t count,
                                                struct croupier_message *message);
 
-// Most bytes that croupier_shard_save writes of shard index, in any iteration. CROUPIER_RANGE if the plan has fewer shards.
+// Most bytes that croupier_shard_save writes of shard index, in any iteration. CROUPIER_RANGE if the plan has fewer
+// shards.
 croupier_status croupier_plan_saved_shard_size(const struct croupier_plan *plan,
                                                uint32_t index,
                                                size_t *bytes,
                                                struct croupier_message *message);
 
-// Writes what the end of an iteration reads of a finished shard, for croupier_shard_load of another process; *written becomes
-// the number of bytes. Equal sums give equal bytes. CROUPIER_UNFINISHED if the shard has not finished an iteration,
-// CROUPIER_SIZE if there is too little room; nothing is written then.
+// Writes what the end of an iteration reads of a finished shard, for croupier_shard_load of another process; *written
+// becomes the number of bytes. Equal sums give equal bytes. CROUPIER_UNFINISHED if the shard has not finished an
+// iteration, CROUPIER_SIZE if there is too little room; nothing is written then.
 croupier_status croupier_shard_save(const struct croupier_shard *shard,
                                     void *bytes,
                                     size_t size,
                                     size_t *written,
                                     struct croupier_message *message);
 
-// Takes the place of the shard that croupier_shard_save has written: joins the iteration of the session with its sums,
-// finished. Sessions of several processes that begin the same iterations and end each with all shards have the same picture
-// and the same statistics to the bit. CROUPIER_PLAN or CROUPIER_SAVED, with the reason in the message, if the bytes are of
-// another scene, plan, shard, iteration or version, or damaged; the shard is as before then.
+// Takes the place of the shard that croupier_shard_save has written: joins the iteration of the session with its
+// sums, finished. Sessions of several processes that begin the same iterations and end each with all shards have the
+// same picture and the same statistics to the bit. CROUPIER_PLAN or CROUPIER_SAVED, with the reason in the message,
+// if the bytes are of another scene, plan, shard, iteration or version, or damaged; the shard is as before then.
 croupier_status croupier_shard_load(struct croupier_shard *shard,
                                     const struct croupier_session *session,
                                     const void *bytes,
                                     size_t size,
                                     struct croupier_message *message);
 
-// Goes on as if so many iterations, of so many camera samples per pixel in all, had been before: for one picture in parts
-// that are rendered apart and added afterwards. Parts with other numbers of iterations and disjoint ranges of samples are
-// independent. CROUPIER_ITERATION if one has begun since the picture did.
+// Goes on as if so many iterations, of so many camera samples per pixel in all, had been before: for one picture in
+// parts that are rendered apart and added afterwards. Parts with other numbers of iterations and disjoint ranges of
+// samples are independent. CROUPIER_ITERATION if one has begun since the picture did.
 croupier_status croupier_session_skip(struct croupier_session *session,
                                       uint64_t iterations,
                                       uint32_t samples,

@@ -1,7 +1,8 @@
 //! What goes wrong, and how it becomes a status and a message.
 //!
-//! Faults of the boundary are [`Fault`]s, which are written without the formatting of the standard library: entry points
-//! that know no other faults contain no panics, which is checked by linking. Errors of the core come as [`Failure`]s.
+//! Faults of the boundary are [`Fault`]s, which are written without the formatting of the standard library: entry
+//! points that know no other faults contain no panics, which is checked by linking. Errors of the core come as
+//! [`Failure`]s.
 
 use crate::status::croupier_status;
 use core::ffi::c_char;

@@ -30,8 +30,8 @@ fn the_manual_has_every_function() {
     assert!(gone.is_empty(), "docs/C.md has {gone:?}");
 }
 
-/// The examples in the manual are those that compile elsewhere, or parts of them: they call what there is. Killed by: a reader of
-/// names that sees none.
+/// The examples in the manual are those that compile elsewhere, or parts of them: they call what there is. Killed by:
+/// a reader of names that sees none.
 #[test]
 fn names_are_found() {
     let found = functions("x croupier_a(1) croupier_b; my_croupier_c( `croupier_d()`");

@@ -60,8 +60,8 @@ impl Arrays {
     }
 }
 
-/// A scene that C composes of the box's arrays gives the picture of the baked box. Killed by: an array that is left out or
-/// read with another stride.
+/// A scene that C composes of the box's arrays gives the picture of the baked box. Killed by: an array that is left
+/// out or read with another stride.
 #[test]
 fn composed_scenes_render() {
     let own = Arrays::of(&common::baked());
@@ -150,8 +150,8 @@ fn views_and_light_sources_become_records() {
     fails!(CROUPIER_RANGE, croupier_material_init(&raw mut material, 50));
 }
 
-/// Edits change the picture, and taken back give the old one to the bit. Killed by: an edit that reaches another record, an
-/// identity that does not follow.
+/// Edits change the picture, and taken back give the old one to the bit. Killed by: an edit that reaches another
+/// record, an identity that does not follow.
 #[test]
 fn edits_change_the_picture() {
     let own = OwnScene::new(&common::baked());
