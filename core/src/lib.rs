@@ -121,6 +121,11 @@ pub use setting::SettingError;
 pub use settings::{Settings, SettingsError};
 pub use tracer::{Budget, SavedShardError, Shard, ShardError, StepResult};
 
+/// The embedding guide.
+pub mod guide {
+    #![doc = include_str!("guide.md")]
+}
+
 /// Everything else that a host may replace, measure or test: kernels, statistics, the scene's layout.
 ///
 /// **Unstable.** Names, signatures and behaviour in here may change in any 0.x version, without a version that announces

@@ -128,6 +128,11 @@ impl AovSet {
     /// Parts of the radiance.
     pub(crate) const LIGHT: Self = Self::of(&[Aov::Emission, Aov::Direct, Aov::Indirect]);
 
+    /// One bit for each, by its number.
+    pub(crate) const fn bits(self) -> u32 {
+        self.0
+    }
+
     /// The set of these.
     pub const fn of(aovs: &[Aov]) -> Self {
         let (mut set, mut i) = (0, 0);

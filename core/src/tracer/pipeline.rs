@@ -93,7 +93,8 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
 
     let mut traced = trace(world, book, &rays, kind);
     let inside = if W::EFFECTS.contains(Effects::MEDIA) { rays.active & rays.media.inside() } else { Mask8::NONE };
-    let in_media = inside.any();
+    // the profile once more: compilers for wasm do not compute lanes of constant masks
+    let in_media = W::EFFECTS.contains(Effects::MEDIA) && inside.any();
     let mut light = F32x8::INFINITY;
     if emission::has_shapes::<W>(world.scene()) {
         let (clear, upto) = (rays.active.and_not(inside), rays.travelled + traced.hit.select(traced.t, rays.ray.tmax));
