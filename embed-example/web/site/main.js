@@ -261,6 +261,7 @@ function describe() {
   $('about').textContent = state.about;
   $('strategy').textContent = STRATEGIES[state.rrs][1];
   $('factors').hidden = state.plane !== 'factors';
+  $('denoised').hidden = state.plane !== 'denoised';
   $('planes').querySelector('[data-plane=denoised]').disabled = !LEARNS(state.rrs);
   $('place').textContent = state.workers === 0
     ? 'Between frames, on the page’s own thread.'

@@ -87,6 +87,8 @@ const context = await chromium.launchPersistentContext(profile, {
     '--disable-component-update', '--disable-sync',
   ],
 });
+// several workers, also where there are few processors
+await context.addInitScript(() => Object.defineProperty(navigator, 'hardwareConcurrency', { get: () => 4 }));
 const complaints = [];
 
 async function open(size) {
@@ -155,7 +157,9 @@ try {
   await page.locator('#places button').last().click();
   await begun(page);
   await rendered(page, 4);
+  expect(await page.locator('#places button').last().textContent() === '3 workers', 'there are three workers');
   expect((await look(page)).different > 0.2, 'workers render');
+  await page.screenshot({ path: join(shots, 'desktop-workers.png') });
   await page.locator('#places button').first().click();
   await begun(page);
 
