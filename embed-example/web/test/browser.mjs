@@ -159,6 +159,9 @@ try {
   await rendered(page, 4);
   expect(await page.locator('#places button').last().textContent() === '3 workers', 'there are three workers');
   expect((await look(page)).different > 0.2, 'workers render');
+  await page.waitForFunction(() => document.documentElement.dataset.relmse !== '', null, LONG);
+  const ofAll = Number(await page.evaluate(() => document.documentElement.dataset.relmse));
+  expect(ofAll > 0 && ofAll < 0.1, `their mean has an error like that of one picture: ${ofAll.toFixed(4)}`);
   await page.screenshot({ path: join(shots, 'desktop-workers.png') });
   await page.locator('#places button').first().click();
   await begun(page);
