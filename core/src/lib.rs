@@ -119,7 +119,12 @@ pub use scene::{Scene, SceneError};
 pub use session::{Session, SessionBuilder, SessionError, SessionState, SessionView};
 pub use setting::SettingError;
 pub use settings::{Settings, SettingsError};
-pub use tracer::{Budget, Shard, ShardError, StepResult};
+pub use tracer::{Budget, SavedShardError, Shard, ShardError, StepResult};
+
+/// The embedding guide.
+pub mod guide {
+    #![doc = include_str!("guide.md")]
+}
 
 /// Everything else that a host may replace, measure or test: kernels, statistics, the scene's layout.
 ///

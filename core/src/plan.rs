@@ -1,12 +1,12 @@
 //! How much memory a render needs: sizes first, so that nothing is ever asked for again.
 
-use crate::film::{AovLayout, DIGITS, Film};
+use crate::film::{AovLayout, DIGITS, Film, FilmSum};
 use crate::learn::{LearnedState, PixelEstimator};
-use crate::memory::{Layout, Measure};
+use crate::memory::{BLOCK_ALIGN, Carver, Layout, Measure, MemoryError};
 use crate::record::{SessionRecord, fingerprint};
 use crate::settings::{Settings, SettingsError};
 use crate::tiles::Tiles;
-use crate::tracer::{Job, Shard, ShardError};
+use crate::tracer::{Job, Shard, ShardError, longest};
 
 /// Stack that [`Shard::step`] and [`SessionState::finish_iteration`](crate::SessionState::finish_iteration) need at most,
 /// with any profile and optimised code, bytes: tested by threads that have no more.
@@ -56,6 +56,19 @@ impl Plan {
         Shard::measure(&self.job, self.job.tiles.pixels_of(index)).layout().unwrap_or(self.shard)
     }
 
+    /// Most bytes that [`Shard::save`] writes of shard `index`: a host allocates once for all iterations.
+    pub fn saved_shard(&self, index: u32) -> usize {
+        longest(&self.job, self.job.tiles.pixels_of(index))
+    }
+
+    /// Size and alignment of the block of a [`FilmSum`](crate::unstable::film::FilmSum), without a session; the largest that
+    /// cannot be had if the settings are [`adaptive`](Settings::adaptive): films of weighted samples cannot be added.
+    pub fn film_sum(&self) -> Layout {
+        let none = Layout { size: usize::MAX, align: BLOCK_ALIGN };
+        let layout = FilmSum::measure(&self.settings().film_layout()).layout();
+        layout.filter(|_| !self.settings().adaptive).unwrap_or(none)
+    }
+
     /// Bytes per pixel of the session's block and of the shards' blocks together, of what grows with the picture:
     ///
     /// | | session | shards |
@@ -95,6 +108,16 @@ impl Plan {
     /// Settings that the plan was made for.
     pub fn settings(&self) -> &Settings {
         &self.job.settings
+    }
+}
+
+impl<'m> FilmSum<'m> {
+    /// An empty film in a block of at least [`Plan::film_sum`] bytes.
+    ///
+    /// # Errors
+    /// A block that does not fit, and any block with [`Settings::adaptive`].
+    pub fn new(plan: &Plan, block: &'m mut [u8]) -> Result<Self, MemoryError> {
+        Self::carve(&mut Carver::new(block, plan.film_sum())?, &plan.settings().film_layout())
     }
 }
 

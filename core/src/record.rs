@@ -9,7 +9,7 @@ use crate::settings::Settings;
 use crate::tracer::{BYTES_PER_PATH, SHARD_RECORD_BYTES, ShardCursor};
 use crate::world::Iteration;
 use bytemuck::{Pod, Zeroable};
-use core::fmt::{self, Write};
+use core::fmt;
 use croupier_simd::REPRODUCIBLE;
 
 /// First bytes of a record.
@@ -146,25 +146,102 @@ impl SessionRecord {
 /// address and of the records at the head of blocks and in their slabs, how numbers are rounded.
 pub(crate) fn fingerprint(settings: &Settings) -> u64 {
     let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
-    // nothing here fails
-    let _ = write!(hash, "{} {}", env!("CARGO_PKG_VERSION"), size_of::<usize>());
-    let _ = write!(hash, " {} {SHARD_RECORD_BYTES} {BYTES_PER_PATH} {REPRODUCIBLE}", size_of::<SessionRecord>());
+    hash.add(env!("CARGO_PKG_VERSION").as_bytes());
+    for size in [size_of::<usize>(), size_of::<SessionRecord>(), SHARD_RECORD_BYTES, BYTES_PER_PATH] {
+        hash.add(&(size as u64).to_le_bytes());
+    }
+    hash.add(&[REPRODUCIBLE.into()]);
     for setting in Settings::TABLE {
+        hash.add(setting.name.as_bytes());
+        // not as text: programs without an operating system would carry all that formats numbers
         if let Some(value) = settings.value(setting.name) {
-            let _ = write!(hash, " {}={value}", setting.name);
+            value.bytes(|bytes| hash.add(bytes));
         }
     }
     hash.0
 }
 
-/// 64-bit FNV-1a of a text.
+/// 64-bit FNV-1a.
 struct Fnv(u64);
 
-impl Write for Fnv {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        for b in text.bytes() {
-            self.0 = (self.0 ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3);
+impl Fnv {
+    fn add(&mut self, bytes: &[u8]) {
+        for b in bytes {
+            self.0 = (self.0 ^ u64::from(*b)).wrapping_mul(0x0000_0100_0000_01b3);
         }
-        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::Strategy;
+    use std::collections::HashMap;
+    use std::string::{String, ToString};
+
+    /// Killed by: an option of a strategy, or a value of a setting, that is left out of the hash.
+    #[test]
+    fn other_settings_have_other_fingerprints() {
+        let mut seen: HashMap<u64, String> = HashMap::new();
+        let mut other = |name: &str, text: &str| {
+            let mut settings = Settings::default();
+            settings.set(name, text).expect(text);
+            if let Some(same) = seen.insert(fingerprint(&settings), std::format!("{name} {text}")) {
+                assert!(settings == Settings::default(), "{name} {text} has the fingerprint of {same}");
+            }
+        };
+        for (name, _) in Strategy::TABLE {
+            other("rrs", if *name == "fixed" { "fixed:2" } else { name });
+        }
+        for options in [
+            "albedo:product",
+            "bolin-meyer:plain",
+            "classic:6",
+            "classic:6:relative",
+            "ear:plain",
+            "ears:plain",
+            "fixed:3",
+            "threshold:0.5",
+            "throughput:mean",
+            "throughput:max:0.1",
+            "throughput:max:0.05:0.9",
+            "throughput:max:0.05:0.95:3",
+            "winners:2",
+            "winners:1:2",
+        ] {
+            other("rrs", options);
+        }
+        for (name, text) in [
+            ("size", "3x2"),
+            ("size", "2x3"),
+            ("seed", "4294967296"),
+            ("shards", "2"),
+            ("max-depth", "9"),
+            ("ring", "64"),
+            ("split-budget", "64"),
+            ("aovs", "albedo"),
+            ("aovs", "true"),
+            ("adaptive", "true"),
+            ("shadow-roulette", "true"),
+            ("control-variate", "cached"),
+            ("control-variate", "0.5"),
+            ("cache-bytes", "65536"),
+            ("ledger", "256"),
+            ("learn-samples", "9"),
+            ("subdivide-count", "1000"),
+            ("decay", "0.5"),
+            ("pixel-estimator", "blocks"),
+            ("objective", "absolute"),
+            ("norm", "max"),
+            ("factors", "0.5:2"),
+            ("factors", "0.05:2"),
+        ] {
+            other(name, text);
+        }
+        for setting in Settings::TABLE {
+            let tried = seen.values().any(|text| text.split(' ').next() == Some(&setting.name.to_string()));
+            assert!(tried, "no other value of {} was tried", setting.name);
+        }
     }
 }

@@ -519,6 +519,15 @@ impl<'m> SessionState<'m> {
         self.running = true;
     }
 
+    /// Goes on as if so many iterations, of so many camera samples per pixel in all, had been before: for one picture in
+    /// parts that are rendered apart. Parts with other numbers of iterations and disjoint ranges of samples draw other
+    /// random numbers, so that they are independent. Not while an iteration runs: nothing happens then.
+    pub fn skip(&mut self, iterations: u64, samples: u32) {
+        if !self.running {
+            self.iteration = Iteration { number: iterations, first_sample: samples, samples: 0 };
+        }
+    }
+
     /// The picture so far, without the iteration under way.
     pub fn film(&self) -> &Film<'m> {
         &self.film

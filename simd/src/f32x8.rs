@@ -19,38 +19,44 @@ impl F32x8 {
     pub const INFINITY: Self = Self::splat(f32::INFINITY);
 
     /// All lanes equal to `x`.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub const fn splat(x: f32) -> Self {
         Self(f32x8::splat(x))
     }
 
     /// Lane `i` = `a[i]`.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub const fn new(a: [f32; 8]) -> Self {
         Self(f32x8::new(a))
     }
 
     /// Lane `i` = `f(i)`: a gather is `F32x8::from_fn(|i| table[index[i]])`.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn from_fn(mut f: impl FnMut(usize) -> f32) -> Self {
         // written out: `core::array::from_fn` is not always inlined, and a gather is in every hot loop
         Self::new([f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7)])
     }
 
     /// Array of the lanes.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub const fn to_array(self) -> [f32; 8] {
         self.0.to_array()
     }
 
     /// Lane `i & 7`.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn lane(self, i: usize) -> f32 {
         self.to_array()[i & 7]
     }
 
     /// Copy of `self` with lane `i & 7` replaced by `x`.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn with_lane(self, i: usize, x: f32) -> Self {
         let mut a = self.to_array();
         a[i & 7] = x;
@@ -59,7 +65,8 @@ impl F32x8 {
 
     /// Sum of a product, `self * a + b`: two roundings in `reproducible` arithmetic, one in `fast` where the target
     /// fuses. Never use it where a sign must be exact (edge functions, NUMERICS TRI-1).
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn mul_add(self, a: Self, b: Self) -> Self {
         #[cfg(feature = "fast")]
         return Self(self.0.mul_add(a.0, b.0));
@@ -68,7 +75,8 @@ impl F32x8 {
     }
 
     /// Larger of both, `self < o ? o : self`: a NaN in either gives `self`, and so do two zeros of different sign.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn max(self, o: Self) -> Self {
         // `maxps o, self` is this rule in one instruction; other targets' maxima treat NaN and zeros differently.
         #[cfg(target_feature = "sse")]
@@ -78,7 +86,8 @@ impl F32x8 {
     }
 
     /// Smaller of both, `o < self ? o : self`: a NaN in either gives `self`, and so do two zeros of different sign.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn min(self, o: Self) -> Self {
         #[cfg(target_feature = "sse")]
         return Self(o.0.fast_min(self.0));
@@ -87,19 +96,22 @@ impl F32x8 {
     }
 
     /// Clamped to `lo` and `hi` (`lo <= hi`, no NaN); a NaN becomes `lo`.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn clamp(self, lo: f32, hi: f32) -> Self {
         Self::splat(lo).max(self).min(Self::splat(hi))
     }
 
     /// Absolute value.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn abs(self) -> Self {
         Self(self.0.abs())
     }
 
     /// Square root, correctly rounded; NaN below 0.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn sqrt(self) -> Self {
         #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
         return Self::new(self.to_array().map(|x| {
@@ -116,13 +128,15 @@ impl F32x8 {
     }
 
     /// Square root of `max(self, 0)`; a NaN becomes 0.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn safe_sqrt(self) -> Self {
         Self::ZERO.max(self).sqrt()
     }
 
     /// Nearest integer, ties to even. Keeps infinities, NaN and the sign of zero: -0.3 gives -0.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn round(self) -> Self {
         #[cfg(any(target_feature = "sse4.1", target_feature = "simd128", target_arch = "aarch64"))]
         return Self(self.0.round_ties_even());
@@ -137,7 +151,8 @@ impl F32x8 {
     }
 
     /// Largest integer not above. Keeps infinities, NaN and the sign of zero.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn floor(self) -> Self {
         #[cfg(any(target_feature = "sse4.1", target_feature = "simd128", target_arch = "aarch64"))]
         return Self(self.0.floor());
@@ -149,105 +164,122 @@ impl F32x8 {
     }
 
     /// Square.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn sqr(self) -> Self {
         self * self
     }
 
     /// Magnitude of `self`, sign of `s`.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn copysign(self, s: Self) -> Self {
         let sign = U32x8::splat(0x8000_0000);
         Self::from_bits((self.to_bits() & !sign) | (s.to_bits() & sign))
     }
 
     /// Is the value finite?
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn is_finite(self) -> Mask8 {
         self.abs().lt(Self::INFINITY)
     }
 
     /// Is the sign bit set?
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn is_sign_negative(self) -> Mask8 {
         let sign = U32x8::splat(0x8000_0000);
         (self.to_bits() & sign).eq(sign)
     }
 
     /// `self < o`, false for NaN.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn lt(self, o: Self) -> Mask8 {
         Mask8(self.0.simd_lt(o.0))
     }
 
     /// `self <= o`, false for NaN.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn le(self, o: Self) -> Mask8 {
         Mask8(self.0.simd_le(o.0))
     }
 
     /// `self > o`, false for NaN.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn gt(self, o: Self) -> Mask8 {
         Mask8(self.0.simd_gt(o.0))
     }
 
     /// `self >= o`, false for NaN.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn ge(self, o: Self) -> Mask8 {
         Mask8(self.0.simd_ge(o.0))
     }
 
     /// `self == o`, false for NaN.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn eq(self, o: Self) -> Mask8 {
         Mask8(self.0.simd_eq(o.0))
     }
 
     /// Bit patterns of the lanes.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn to_bits(self) -> U32x8 {
         bytemuck::cast(self)
     }
 
     /// Floats from bit patterns.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn from_bits(b: U32x8) -> Self {
         bytemuck::cast(b)
     }
 
     /// Integers, rounded towards zero and saturating; NaN gives 0.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn to_i32(self) -> I32x8 {
         I32x8(self.0.trunc_int())
     }
 
     /// Sum of the lanes in a fixed order: ((0+4)+(2+6)) + ((1+5)+(3+7)).
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn sum(self) -> f32 {
         self.reduce(|a, b| a + b)
     }
 
     /// Smallest lane; lanes must not be NaN.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn min_lane(self) -> f32 {
         self.reduce(|a, b| if b < a { b } else { a })
     }
 
     /// Largest lane; lanes must not be NaN.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn max_lane(self) -> f32 {
         self.reduce(|a, b| if b > a { b } else { a })
     }
 
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     fn reduce(self, f: impl Fn(f32, f32) -> f32) -> f32 {
         let a = self.to_array();
         f(f(f(a[0], a[4]), f(a[2], a[6])), f(f(a[1], a[5]), f(a[3], a[7])))
     }
 
     /// Transposes an 8x8 block: `out[r]` lane `c` = `rows[c]` lane `r`.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn transpose(rows: [Self; 8]) -> [Self; 8] {
         bytemuck::cast(f32x8::transpose(bytemuck::cast(rows)))
     }
@@ -255,13 +287,15 @@ impl F32x8 {
 
 impl Mask8 {
     /// `a` where set, else `b`.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn select(self, a: F32x8, b: F32x8) -> F32x8 {
         F32x8(self.0.select(a.0, b.0))
     }
 
     /// `x` where set, else +0 (whatever `x` holds there, NaN included).
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn zero_unless(self, x: F32x8) -> F32x8 {
         F32x8(self.0 & x.0)
     }
@@ -271,27 +305,31 @@ macro_rules! ops {
     ($($tr:ident $f:ident $atr:ident $af:ident $op:tt),*) => {$(
         impl $tr for F32x8 {
             type Output = Self;
-            #[inline(always)]
+            #[cfg_attr(feature = "compact", inline(never))]
+            #[cfg_attr(not(feature = "compact"), inline(always))]
             fn $f(self, o: Self) -> Self {
                 Self(self.0 $op o.0)
             }
         }
         impl $tr<f32> for F32x8 {
             type Output = Self;
-            #[inline(always)]
+            #[cfg_attr(feature = "compact", inline(never))]
+            #[cfg_attr(not(feature = "compact"), inline(always))]
             fn $f(self, o: f32) -> Self {
                 Self(self.0 $op f32x8::splat(o))
             }
         }
         impl $tr<F32x8> for f32 {
             type Output = F32x8;
-            #[inline(always)]
+            #[cfg_attr(feature = "compact", inline(never))]
+            #[cfg_attr(not(feature = "compact"), inline(always))]
             fn $f(self, o: F32x8) -> F32x8 {
                 F32x8(f32x8::splat(self) $op o.0)
             }
         }
         impl $atr for F32x8 {
-            #[inline(always)]
+            #[cfg_attr(feature = "compact", inline(never))]
+            #[cfg_attr(not(feature = "compact"), inline(always))]
             fn $af(&mut self, o: Self) {
                 *self = *self $op o;
             }
@@ -303,7 +341,8 @@ ops!(Add add AddAssign add_assign +, Sub sub SubAssign sub_assign -,
 
 impl Neg for F32x8 {
     type Output = Self;
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     fn neg(self) -> Self {
         Self::from_bits(self.to_bits() ^ U32x8::splat(0x8000_0000))
     }

@@ -6,8 +6,17 @@
 //! Two arithmetics: the default, *reproducible*, uses only IEEE `+ - * / sqrt`, comparisons and integer
 //! operations in a fixed order, so that every target computes the same bits. With the feature `fast`
 //! [`F32x8::mul_add`] fuses where the target can; nothing else changes.
+//!
+//! Operations are inlined, which is right for processors with vector instructions. On one without, each is some 30
+//! instructions: with the feature `compact` they are called instead. That changes size and speed only.
 #![no_std]
 #![cfg_attr(not(all(target_arch = "arm", target_abi = "eabihf")), forbid(unsafe_code))]
+
+#[cfg(target_endian = "big")]
+compile_error!(
+    "croupier needs a little-endian target: scene blobs, shards and learned statistics are little-endian records that are \
+     read where they lie, so that a big-endian machine would compute with other numbers"
+);
 
 mod f32x8;
 mod int;

@@ -15,74 +15,86 @@ impl Mask8 {
     pub const NONE: Self = Self(f32x8::splat(0.0));
 
     /// Mask with all lanes equal to `b`.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn splat(b: bool) -> Self {
         Self(bytemuck::cast(wide::u32x8::splat(u32::from(b).wrapping_neg())))
     }
 
     /// Mask with all lanes.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn all_lanes() -> Self {
         Self(!f32x8::splat(0.0))
     }
 
     /// Mask with lane `i` from bit `i`; higher bits are ignored.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn from_bits(bits: u32) -> Self {
         let b = wide::u32x8::new(BITS);
         Self(bytemuck::cast((wide::u32x8::splat(bits) & b).simd_eq(b)))
     }
 
     /// Mask with the first `n` lanes.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn first(n: usize) -> Self {
         Self::from_bits((1u32 << n.min(8)) - 1)
     }
 
     /// Bits of the lanes: bit `i` is lane `i`.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn bits(self) -> u32 {
         self.0.to_bitmask()
     }
 
     /// Is any lane set?
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn any(self) -> bool {
         self.bits() != 0
     }
 
     /// Are all lanes set?
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn all(self) -> bool {
         self.bits() == 0xff
     }
 
     /// Is no lane set?
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn none(self) -> bool {
         self.bits() == 0
     }
 
     /// Number of set lanes.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn count(self) -> u32 {
         self.bits().count_ones()
     }
 
     /// State of lane `i`; `false` outside `0..8`.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn lane(self, i: usize) -> bool {
         i < 8 && self.bits() >> i & 1 == 1
     }
 
     /// Numbers of the set lanes, ascending.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn lanes(self) -> Lanes {
         Lanes(self.bits())
     }
 
     /// `self` without the lanes of `other`.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn and_not(self, other: Self) -> Self {
         self & !other
     }
@@ -94,7 +106,8 @@ pub struct Lanes(u32);
 
 impl Iterator for Lanes {
     type Item = usize;
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     fn next(&mut self) -> Option<usize> {
         if self.0 == 0 {
             return None;
@@ -109,7 +122,8 @@ macro_rules! bit_op {
     ($tr:ident, $f:ident, $op:tt) => {
         impl $tr for Mask8 {
             type Output = Self;
-            #[inline(always)]
+            #[cfg_attr(feature = "compact", inline(never))]
+            #[cfg_attr(not(feature = "compact"), inline(always))]
             fn $f(self, o: Self) -> Self {
                 Self(self.0 $op o.0)
             }
@@ -122,21 +136,24 @@ bit_op!(BitXor, bitxor, ^);
 
 impl Not for Mask8 {
     type Output = Self;
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     fn not(self) -> Self {
         Self(!self.0)
     }
 }
 
 impl BitAndAssign for Mask8 {
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     fn bitand_assign(&mut self, o: Self) {
         *self = *self & o;
     }
 }
 
 impl BitOrAssign for Mask8 {
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     fn bitor_assign(&mut self, o: Self) {
         *self = *self | o;
     }

@@ -75,7 +75,8 @@ const ATAN: [f32; 9] = [
 ];
 
 /// Horner's rule, highest coefficient first.
-#[inline(always)]
+#[cfg_attr(feature = "compact", inline(never))]
+#[cfg_attr(not(feature = "compact"), inline(always))]
 fn poly<const N: usize>(x: F32x8, c: [f32; N]) -> F32x8 {
     let mut r = F32x8::splat(c[0]);
     for k in &c[1..] {
@@ -85,25 +86,29 @@ fn poly<const N: usize>(x: F32x8, c: [f32; N]) -> F32x8 {
 }
 
 /// 2^n for integers -126 <= n <= 127.
-#[inline(always)]
+#[cfg_attr(feature = "compact", inline(never))]
+#[cfg_attr(not(feature = "compact"), inline(always))]
 fn exp2i(n: I32x8) -> F32x8 {
     F32x8::from_bits(((n + I32x8::splat(127)) << 23).to_u32())
 }
 
 /// The upper 12 significant bits: products of two such numbers are exact.
-#[inline(always)]
+#[cfg_attr(feature = "compact", inline(never))]
+#[cfg_attr(not(feature = "compact"), inline(always))]
 fn head(x: F32x8) -> F32x8 {
     F32x8::from_bits(x.to_bits() & U32x8::splat(0xffff_f000))
 }
 
 /// x with its sign flipped where `m`.
-#[inline(always)]
+#[cfg_attr(feature = "compact", inline(never))]
+#[cfg_attr(not(feature = "compact"), inline(always))]
 fn negate_if(m: Mask8, x: F32x8) -> F32x8 {
     F32x8::from_bits(x.to_bits() ^ m.zero_unless(F32x8::splat(-0.0)).to_bits())
 }
 
 /// e^(x + lo) for |lo| < 1e-4; any x.
-#[inline(always)]
+#[cfg_attr(feature = "compact", inline(never))]
+#[cfg_attr(not(feature = "compact"), inline(always))]
 fn exp_sum(x: F32x8, lo: F32x8) -> F32x8 {
     // beyond these the scaling below gives 0 and infinity by itself; a NaN passes
     let x = x.max(F32x8::splat(-104.0)).min(F32x8::splat(89.0));
@@ -119,7 +124,8 @@ fn exp_sum(x: F32x8, lo: F32x8) -> F32x8 {
 }
 
 /// (e, f) with x = 2^e (1 + f) and sqrt(1/2) <= 1 + f < sqrt(2), f exact; for finite x > 0.
-#[inline(always)]
+#[cfg_attr(feature = "compact", inline(never))]
+#[cfg_attr(not(feature = "compact"), inline(always))]
 fn frexp(x: F32x8) -> (F32x8, F32x8) {
     let tiny = x.lt(F32x8::splat(f32::MIN_POSITIVE));
     let bits = tiny.select(x * 8_388_608.0, x).to_bits();
@@ -132,14 +138,16 @@ fn frexp(x: F32x8) -> (F32x8, F32x8) {
 impl F32x8 {
     /// e^x within 1.02 ULP, monotonic. Subnormal results are rounded, not flushed; 0 below -103.98, +infinity above
     /// 88.72.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn exp(self) -> Self {
         // -0, not 0: adding it is no operation, and the compiler knows
         exp_sum(self, Self::splat(-0.0))
     }
 
     /// Natural logarithm within 0.8 ULP, monotonic, subnormals included; -infinity at +-0, NaN below.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn ln(self) -> Self {
         let (e, f) = frexp(self);
         let z = f * f;
@@ -156,7 +164,8 @@ impl F32x8 {
     /// x^0 = 1 and x^1 = x for every x, 1^y = 1 for every y but NaN; 0 and infinity as in IEEE 754.
     /// The logarithm is carried in two floats, because its relative error grows to |y ln x| times as much
     /// in the result.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn powf(self, y: Self) -> Self {
         let (e, f) = frexp(self);
         // hi + lo = ln(1 + f): f^2/2 is split so that its large part is exact
@@ -193,7 +202,8 @@ impl F32x8 {
     /// (sin, cos) of 2 pi u, each within 1.65 ULP (also next to its zeros). The reduction is exact for every finite u
     /// (NUMERICS SMP-9): both are exactly 0 or +-1 at multiples of 1/4 (the sign of such a zero means nothing). NaN at
     /// infinity.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn sin_cos_2pi(self) -> (Self, Self) {
         let u = self - self.round();
         let m = u.mul_add(Self::splat(4.0), Self::splat(ROUND));
@@ -208,7 +218,8 @@ impl F32x8 {
     }
 
     /// (large, asin(|x|) or, where large, 2 asin(sqrt((1 - |x|) / 2)) = acos(|x|)), |x| clamped to 1.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     fn asin_parts(self) -> (Mask8, Self) {
         let a = self.abs().min(Self::ONE);
         let big = a.gt(Self::splat(0.5));
@@ -219,7 +230,8 @@ impl F32x8 {
     }
 
     /// Arc cosine of x clamped to [-1, 1], in [0, pi], within 1.16 ULP, monotonic.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn acos(self) -> Self {
         let (big, v) = self.asin_parts();
         let neg = self.is_sign_negative();
@@ -228,7 +240,8 @@ impl F32x8 {
     }
 
     /// Arc sine of x clamped to [-1, 1], in [-pi/2, pi/2], within 2.41 ULP, monotonic.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn asin(self) -> Self {
         let (big, v) = self.asin_parts();
         big.select(FRAC_PI_2 - (v - FRAC_PI_2 * PI_LO), v).copysign(self)
@@ -236,7 +249,8 @@ impl F32x8 {
 
     /// Angle of the point (x, self) in [-pi, pi] within 2 ULP, with the signs and limits of IEEE 754: a zero x takes
     /// its side from its sign, and the origin is +-0 or +-pi.
-    #[inline(always)]
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
     pub fn atan2(self, x: Self) -> Self {
         let (ay, ax) = (self.abs(), x.abs());
         let swap = ay.gt(ax);

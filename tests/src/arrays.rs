@@ -41,7 +41,8 @@ pub struct Arrays {
 }
 
 impl Arrays {
-    /// Arrays of a blob. Each triangle gets vertices of its own if it is flat, so that vertices of smooth ones keep theirs.
+    /// Arrays of a blob. Each triangle gets vertices of its own if it is flat, so that vertices of smooth ones keep
+    /// theirs.
     pub fn of(scene: &Scene<'_>) -> Self {
         assert!(scene.objects.is_empty(), "without instances");
         let mut emission = vec![[0.0; 3]; scene.materials.len()];

@@ -11,6 +11,7 @@ use croupier::unstable::scene::blob::{Light, Material};
 use croupier::{Budget, Plan, Scene, Session, Settings, Shard, StepResult, Strategy};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::renderer::{Keep, Renderer};
+use croupier_tests::arrays::Arrays;
 use croupier_tests::scenes::{blob, cornell, everything};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -77,6 +78,22 @@ fn nothing_is_allocated_between_bytes_and_picture() {
             render::<Full>(&scene, strategy);
         }
     }
+}
+
+/// From arrays to bytes. Killed by: a `Vec` anywhere in composing, in its checks or the tables of plastics.
+#[test]
+fn composing_allocates_nothing() {
+    let baked = blob(&everything([20, 12]));
+    let arrays = Arrays::of(&Scene::from_bytes(&baked).unwrap());
+    let parts = arrays.parts();
+    let layout = without_allocating(|| parts.layout()).unwrap();
+    let mut bytes = AlignedBytes::zeroed(layout.blob.size);
+    let mut scratch = AlignedBytes::zeroed(layout.scratch.size);
+    let effects = without_allocating(|| {
+        let composed = parts.compose(bytes.as_mut(), scratch.as_mut()).unwrap();
+        Scene::from_bytes(composed).unwrap().effects
+    });
+    assert_eq!(effects, Scene::from_bytes(&baked).unwrap().effects);
 }
 
 fn render<P: Profile>(bytes: &[u8], strategy: Strategy) {

@@ -9,6 +9,9 @@ use super::setup::Setup;
 use super::single::{Hits, Keys, walk};
 use crate::scene::blob::{Leaf, Node};
 
+/// Do groups walk as packets? Not where code must be small: single rays find the same hits.
+const PACKETS: bool = !cfg!(feature = "compact");
+
 /// Traces the rays `lanes` of `s` through the tree of triangles at node `root`. Closest: improves `hits`. Any: returns the
 /// lanes with a hit that blocks.
 #[inline(always)]
@@ -24,7 +27,7 @@ pub(super) fn trace<const ANY: bool, B: Blocking>(
     while left != 0 {
         let group = s.alike(left.trailing_zeros() as usize & 7, left);
         left &= !group;
-        if group.count_ones() <= FEW {
+        if !PACKETS || group.count_ones() <= FEW {
             single |= group;
         } else {
             occluded |= walk_packet::<ANY, B>((tree, root), s, group, hits, stack, blocking);

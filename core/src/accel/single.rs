@@ -134,7 +134,11 @@ pub(super) fn walk<const ANY: bool, B: Blocking>(
     stack: &mut Keys,
     blocking: &mut B,
 ) -> u32 {
-    let (mut found, deep) = take_turns::<ANY, { STACK / 8 }, B>(tree, root, (s, lanes), hits, stack, blocking);
+    // where code must be small, there is only the loop that gives a ray the whole stack
+    let (mut found, deep) = match cfg!(feature = "compact") {
+        true => (0, lanes),
+        false => take_turns::<ANY, { STACK / 8 }, B>(tree, root, (s, lanes), hits, stack, blocking),
+    };
     for i in Mask8::from_bits(deep).lanes() {
         found |= take_turns::<ANY, STACK, B>(tree, root, (s, 1 << i), hits, stack, blocking).0;
     }

@@ -2,7 +2,8 @@
 //!
 //! 1. Every part is checked, so that what is written passes [`Scene::from_bytes`](crate::Scene::from_bytes).
 //! 2. Sections of known length are written, triangles before the lights that refer to them.
-//! 3. The tree is built behind them: nodes, then leaves. How many there are is known only then; the leaves move up to the
+//! 3. The tree is built behind them: nodes, then leaves. How many there are is known only then; the leaves move up to
+//! the
 //!    nodes.
 
 use super::draft::{Draft, Length, records};
@@ -42,7 +43,8 @@ impl Counts {
     }
 }
 
-/// Nodes that a tree over `n` triangles takes at most. A node with fewer than eight children has leaves only, at least two of
+/// Nodes that a tree over `n` triangles takes at most. A node with fewer than eight children has leaves only, at least
+/// two of
 /// them, and, but for the root, more than eight triangles; so with `f` full nodes and `p` others, p <= n / 9 and
 /// 8 f + 2 p <= f + p - 1 + n.
 fn most_nodes(triangles: usize) -> usize {
@@ -119,11 +121,13 @@ impl SceneParts<'_> {
     /// Composes the blob of the scene at the start of `blob`, and returns it. Both blocks must be aligned to
     /// [`BLOCK_ALIGN`](crate::BLOCK_ALIGN); [`Self::layout`] says how large they must be. Nothing is read from them.
     ///
-    /// The same parts give the same bytes. Takes some microseconds a triangle, and 10^6 evaluations of Fresnel's equations
+    /// The same parts give the same bytes. Takes some microseconds a triangle, and 10^6 evaluations of Fresnel's
+    /// equations
     /// for each rough plastic without a table.
     ///
     /// # Errors
-    /// The first part that cannot be part of a scene, a block that is too small or misaligned. The blocks may have changed then.
+    /// The first part that cannot be part of a scene, a block that is too small or misaligned. The blocks may have
+    /// changed then.
     pub fn compose<'m>(&self, blob: &'m mut [u8], scratch: &mut [u8]) -> Result<&'m mut [u8], ComposeError> {
         let counts = self.check()?;
         let layout = self.layout_of(&counts)?;
@@ -371,7 +375,8 @@ impl SceneParts<'_> {
         let n = primitives.len();
         let all = draft.rest();
         let [node, leaf] = [size_of::<Node>(), size_of::<Leaf>()];
-        // 7 full nodes and as many others as leaves halved, in the notation of `most_nodes`: 7 nodes for 4 leaves at most
+        // 7 full nodes and as many others as leaves halved, in the notation of `most_nodes`: 7 nodes for 4 leaves at
+        // most
         let fitting = all.len().saturating_sub(node).saturating_mul(7) / (7 * leaf + 4 * node);
         let (mut most, mut leaves_room) = (most_nodes(n), n);
         if most.saturating_mul(node).saturating_add(n.saturating_mul(leaf)) > all.len() {

@@ -52,7 +52,8 @@ impl<'m> Draft<'m> {
         Ok(Self { bytes, sections: 0, end: FIRST })
     }
 
-    /// Adds a section of `count` records, behind all others, with the bytes that the block has there; none if that is 0.
+    /// Adds a section of `count` records, behind all others, with the bytes that the block has there; none if that is
+    /// 0.
     /// Returns where it is.
     pub(super) fn section<T: Pod>(&mut self, kind: SectionKind, count: usize) -> Result<Range<usize>, MemoryError> {
         let start = self.end;

@@ -41,7 +41,8 @@ pub enum ComposeError {
         /// Medium.
         index: u32,
     },
-    /// A material whose tables composing does not compute: principled, or without a table of its own though compensated.
+    /// A material whose tables composing does not compute: principled, or without a table of its own though
+    /// compensated.
     Tables {
         /// Material.
         index: u32,

@@ -6,7 +6,8 @@ use crate::light::luminance;
 use crate::scene::blob::Alias;
 use core::f64::consts::{PI, TAU};
 
-/// A lat-long map as the kernels read it: bilinear in polar angle and azimuth. Cell (i, j) spans the texel columns i, i + 1
+/// A lat-long map as the kernels read it: bilinear in polar angle and azimuth. Cell (i, j) spans the texel columns i, i
+/// + 1
 /// (wrapping) and the rows j, j + 1; row j lies at the polar angle `j pi / (height - 1)`.
 #[derive(Clone, Copy, Debug)]
 pub struct LatLong<'a> {
@@ -45,7 +46,8 @@ impl<'a> LatLong<'a> {
         self.width
     }
 
-    /// Integral of the sine of the polar angle over cells of row `j`: in all, and weighted with 0 at the upper edge to 1 at the
+    /// Integral of the sine of the polar angle over cells of row `j`: in all, and weighted with 0 at the upper edge to
+    /// 1 at the
     /// lower one.
     fn sines<M: Math>(&self, j: usize) -> [f64; 2] {
         let step = PI / self.rows() as f64;
@@ -57,7 +59,8 @@ impl<'a> LatLong<'a> {
         [all, ((sin_b - sin_a) / step - cos_b).clamp(0.0, all)]
     }
 
-    /// Integrals of the luminance over the cells of row `j`, in luminance x sr, one after the other. Within a cell the map
+    /// Integrals of the luminance over the cells of row `j`, in luminance x sr, one after the other. Within a cell the
+    /// map
     /// is linear in the polar angle, weighted with its sine; the integral is exact.
     pub fn row<M: Math>(&self, j: usize) -> impl Fn(usize) -> f64 + use<'a, M> {
         let [all, lower] = self.sines::<M>(j);

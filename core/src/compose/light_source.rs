@@ -12,7 +12,8 @@ use bytemuck::Zeroable;
 /// 1e-3 of it.
 pub const MIN_CONE_DEG: f32 = 1e-2;
 
-/// A light that is not a triangle, in the units of scene files. World space; directions have any length but 0; emission is
+/// A light that is not a triangle, in the units of scene files. World space; directions have any length but 0; emission
+/// is
 /// linear Rec. 709, 0 to [`MAX_EMISSION`] a channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LightSource {
@@ -67,7 +68,8 @@ pub enum LightSource {
     Rectangle {
         /// Middle.
         position: [f32; 3],
-        /// Edges, at right angles to 1e-3, halves of lengths in [`SHAPE_SIZE_RANGE`]; the front is where their cross product points.
+        /// Edges, at right angles to 1e-3, halves of lengths in [`SHAPE_SIZE_RANGE`]; the front is where their cross
+        /// product points.
         edges: [[f32; 3]; 2],
         /// Radiance.
         radiance: [f32; 3],
@@ -135,6 +137,19 @@ fn versine<M: Math>(degrees: f32) -> f32 {
 }
 
 impl LightSource {
+    /// Kind of the light.
+    pub const fn kind(&self) -> LightKind {
+        match self {
+            Self::Point { .. } => LightKind::Point,
+            Self::Spot { .. } => LightKind::Spot,
+            Self::Directional { .. } => LightKind::Directional,
+            Self::Sun { .. } => LightKind::Sun,
+            Self::Sphere { .. } => LightKind::Sphere,
+            Self::Rectangle { .. } => LightKind::Rectangle,
+            Self::Disk { .. } => LightKind::Disk,
+        }
+    }
+
     /// The record of the light, for [`SceneParts::lights`](super::SceneParts::lights) and
     /// [`SceneEdit::light`](crate::SceneEdit::light). A black one is kept: it may light up later.
     ///
@@ -152,48 +167,46 @@ impl LightSource {
         let emission = |rgb| all_within(Field::Emission, rgb, [0.0, MAX_EMISSION]);
         let position = |p| all_within(Field::Position, p, [-MAX_COORDINATE, MAX_COORDINATE]);
         let size = |x| within(Field::ShapeSize, x, SHAPE_SIZE_RANGE);
-        let light = |kind: LightKind, vector, emission, params| Light {
-            kind: kind as u32,
+        let light = |vector, emission, params| Light {
+            kind: self.kind() as u32,
             vector,
             emission,
             params,
             ..Zeroable::zeroed()
         };
         Ok(match *self {
-            Self::Point { position: p, intensity } => {
-                light(LightKind::Point, position(p)?, emission(intensity)?, [0.0; 6])
-            }
+            Self::Point { position: p, intensity } => light(position(p)?, emission(intensity)?, [0.0; 6]),
             Self::Spot { position: p, direction, intensity, inner_deg, outer_deg } => {
                 let [x, y, z] = unit::<M>(direction)?;
                 within(Field::Cone, outer_deg, [MIN_CONE_DEG, 180.0])?;
                 within(Field::Cone, inner_deg, [0.0, outer_deg])?;
                 let params = [x, y, z, versine::<M>(outer_deg), versine::<M>(inner_deg), 0.0];
-                light(LightKind::Spot, position(p)?, emission(intensity)?, params)
+                light(position(p)?, emission(intensity)?, params)
             }
             Self::Directional { direction, irradiance } => {
                 let towards = unit::<M>(direction)?.map(|x| -x);
-                light(LightKind::Directional, towards, emission(irradiance)?, [0.0; 6])
+                light(towards, emission(irradiance)?, [0.0; 6])
             }
             Self::Sun { direction, irradiance, angle_deg } => {
                 let towards = unit::<M>(direction)?.map(|x| -x);
                 within(Field::Cone, angle_deg, [MIN_CONE_DEG, 90.0])?;
                 let params = [versine::<M>(angle_deg / 2.0), 0.0, 0.0, 0.0, 0.0, 0.0];
-                light(LightKind::Sun, towards, emission(irradiance)?, params)
+                light(towards, emission(irradiance)?, params)
             }
             Self::Sphere { position: p, radius, radiance, sides } => {
                 let params = [size(radius)?, 0.0, 0.0, 0.0, 0.0, 0.0];
-                let sphere = light(LightKind::Sphere, position(p)?, emission(radiance)?, params);
+                let sphere = light(position(p)?, emission(radiance)?, params);
                 Light { triangle: sides.flags(), ..sphere }
             }
             Self::Disk { position: p, direction, radius, radiance, sides } => {
                 let [x, y, z] = unit::<M>(direction)?;
                 let params = [x, y, z, size(radius)?, 0.0, 0.0];
-                let disk = light(LightKind::Disk, position(p)?, emission(radiance)?, params);
+                let disk = light(position(p)?, emission(radiance)?, params);
                 Light { triangle: sides.flags(), ..disk }
             }
             Self::Rectangle { position: p, edges, radiance, sides } => {
                 let params = half_edges::<M>(edges)?;
-                let rectangle = light(LightKind::Rectangle, position(p)?, emission(radiance)?, params);
+                let rectangle = light(position(p)?, emission(radiance)?, params);
                 Light { triangle: sides.flags(), ..rectangle }
             }
         })

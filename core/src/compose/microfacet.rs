@@ -88,12 +88,14 @@ pub struct Facet {
 }
 
 impl Facet {
-    /// Cosine z of the reflected direction, and z + q where G1 = 2 z / (z + q); `None` if it leaves through the surface.
+    /// Cosine z of the reflected direction, and z + q where G1 = 2 z / (z + q); `None` if it leaves through the
+    /// surface.
     pub fn reflected<M: Math>(&self) -> Option<(f64, f64)> {
         self.masked::<M>(2.0 * self.cos * self.m - self.mu)
     }
 
-    /// Cosine of the direction refracted at `cos_t` into the relative index `eta`, seen from behind, as [`Self::reflected`].
+    /// Cosine of the direction refracted at `cos_t` into the relative index `eta`, seen from behind, as
+    /// [`Self::reflected`].
     pub fn refracted<M: Math>(&self, eta: f64, cos_t: f64) -> Option<(f64, f64)> {
         self.masked::<M>(self.mu / eta - (self.cos / eta - cos_t) * self.m)
     }
@@ -126,7 +128,8 @@ pub fn visible<M: Math>(rule: &[(f64, f64)], alpha: f64, mu: f64, mut f: impl Fn
     }
 }
 
-/// Node `i` of the `n` of Gauss-Legendre quadrature on [0, 1], and its weight (Newton's method on the Legendre polynomial).
+/// Node `i` of the `n` of Gauss-Legendre quadrature on [0, 1], and its weight (Newton's method on the Legendre
+/// polynomial).
 pub fn gauss_legendre<M: Math>(n: usize, i: usize) -> (f64, f64) {
     let (_, mut x) = M::sin_cos(PI * (i as f64 + 0.75) / (n as f64 + 0.5));
     let mut slope = 1.0;

@@ -1,4 +1,5 @@
-//! Scenes from arrays, in the caller's memory: what baking does for hosts that bring triangles at run time and have neither
+//! Scenes from arrays, in the caller's memory: what baking does for hosts that bring triangles at run time and have
+//! neither
 //! files nor an allocator.
 //!
 //! | file | holds |

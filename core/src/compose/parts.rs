@@ -3,9 +3,11 @@
 use crate::memory::Layout;
 use crate::scene::blob::{Camera, Light, Material, Medium, Texture};
 
-/// Arrays that make up a scene, all in the caller's memory. Lengths are in the scene's unit, emission is linear Rec. 709.
+/// Arrays that make up a scene, all in the caller's memory. Lengths are in the scene's unit, emission is linear Rec.
+/// 709.
 ///
-/// Records of materials, textures, media and lights are those of the blob ([`crate::unstable::scene::blob`]): what composing
+/// Records of materials, textures, media and lights are those of the blob ([`crate::unstable::scene::blob`]): what
+/// composing
 /// derives of them is left at 0 or [`NONE`](crate::unstable::scene::blob::NONE).
 ///
 /// ```
@@ -55,17 +57,20 @@ use crate::scene::blob::{Camera, Light, Material, Medium, Texture};
 pub struct SceneParts<'a> {
     /// Positions of vertices, world space, each coordinate up to 1e9 as a magnitude.
     pub positions: &'a [[f32; 3]],
-    /// Normals of vertices, of any length; or nothing: all triangles are flat. Triangles with a vertex whose normal is 0 are
+    /// Normals of vertices, of any length; or nothing: all triangles are flat. Triangles with a vertex whose normal is
+    /// 0 are
     /// flat.
     pub normals: &'a [[f32; 3]],
     /// Texture coordinates of vertices, v upwards; or nothing.
     pub uvs: &'a [[f32; 2]],
-    /// Vertices of triangles, counter-clockwise seen from the front. Triangles without an area that `f32` can hold are left
+    /// Vertices of triangles, counter-clockwise seen from the front. Triangles without an area that `f32` can hold are
+    /// left
     /// out and counted; others keep their order.
     pub triangles: &'a [[u32; 3]],
     /// Materials of triangles; or nothing: all have material 0.
     pub triangle_materials: &'a [u32],
-    /// Materials. Left to composing: `fdr` of a smooth plastic if it is 0, `table` and `fdr` of a rough plastic whose table is
+    /// Materials. Left to composing: `fdr` of a smooth plastic if it is 0, `table` and `fdr` of a rough plastic whose
+    /// table is
     /// [`NONE`](crate::unstable::scene::blob::NONE). Others with tables refer to [`Self::tables`].
     pub materials: &'a [Material],
     /// Radiance that the triangles of each material emit from their front; or nothing: none emit.
@@ -80,7 +85,8 @@ pub struct SceneParts<'a> {
     pub texels: &'a [u32],
     /// Homogeneous media, those of higher priority first. Their boundaries must be closed, which is not checked.
     pub media: &'a [Medium],
-    /// Lights that are not triangles, see [`LightSource::record`](super::LightSource::record). In the blob they follow those of
+    /// Lights that are not triangles, see [`LightSource::record`](super::LightSource::record). In the blob they follow
+    /// those of
     /// the triangles: first those without a shape, then the environment, then those with one.
     pub lights: &'a [Light],
     /// Environment; a black one is left out.
@@ -154,7 +160,8 @@ impl SceneParts<'_> {
 /// Memory that composing needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ComposeLayout {
-    /// The block for the blob: what always suffices. Most trees take a third of it; the blob's own length is known once it is
+    /// The block for the blob: what always suffices. Most trees take a third of it; the blob's own length is known once
+    /// it is
     /// composed. A block that is smaller will do as long as the tree fits.
     pub blob: Layout,
     /// The block for intermediate results.

@@ -5,7 +5,8 @@ use super::math::{Math, Portable, cross, dot, narrow, normalized, scaled, sub};
 use crate::scene::Field;
 use crate::scene::blob::{Camera, CameraKind, MAX_COORDINATE, MAX_SIDE};
 
-/// A camera by where it is and what it looks at. World space, in f64, so that the difference is precise far from the origin.
+/// A camera by where it is and what it looks at. World space, in f64, so that the difference is precise far from the
+/// origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     /// Projection.
@@ -16,7 +17,8 @@ pub struct View {
     pub target: [f64; 3],
     /// Upwards, not parallel to the axis.
     pub up: [f64; 3],
-    /// Perspective: full vertical field of view, degrees, above 0.001 and below 179.9. Orthographic: height of the image,
+    /// Perspective: full vertical field of view, degrees, above 0.001 and below 179.9. Orthographic: height of the
+    /// image,
     /// world units, 1e-12 to 1e9. Panoramic: not read.
     pub extent: f64,
     /// Columns and rows, 1 to 65536. Pixels are square.
@@ -48,7 +50,8 @@ impl View {
     /// [`SceneEdit::camera`](crate::SceneEdit::camera).
     ///
     /// # Errors
-    /// The first number out of its range; [`Field::Direction`] for an axis without a length, [`Field::ImagePlane`] for an
+    /// The first number out of its range; [`Field::Direction`] for an axis without a length, [`Field::ImagePlane`] for
+    /// an
     /// upward direction along it or an extent out of its range.
     pub fn record(&self) -> Result<Camera, FieldError> {
         self.record_with::<Portable>()

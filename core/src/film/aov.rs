@@ -128,6 +128,11 @@ impl AovSet {
     /// Parts of the radiance.
     pub(crate) const LIGHT: Self = Self::of(&[Aov::Emission, Aov::Direct, Aov::Indirect]);
 
+    /// One bit for each, by its number.
+    pub(crate) const fn bits(self) -> u32 {
+        self.0
+    }
+
     /// The set of these.
     pub const fn of(aovs: &[Aov]) -> Self {
         let (mut set, mut i) = (0, 0);
@@ -242,6 +247,16 @@ impl<'m> AovSums<'m> {
         Self { layout, values }
     }
 
+    /// All values.
+    pub(crate) fn bytes(&self) -> &[u8] {
+        bytemuck::cast_slice(self.values)
+    }
+
+    /// All values, to be changed.
+    pub(crate) fn bytes_mut(&mut self) -> &mut [u8] {
+        bytemuck::cast_slice_mut(self.values)
+    }
+
     /// Values of a pixel; none if there are none.
     #[inline]
     pub(crate) fn row(&self, pixel: usize) -> &[f32] {
@@ -321,6 +336,16 @@ impl<'m> AovPlanes<'m> {
     /// Value of a pixel, 0 where there is none.
     fn value(&self, aov: Aov, channel: usize, pixel: usize) -> f64 {
         self.plane(aov, channel).and_then(|p| p.get(pixel)).map_or(0.0, |x| f64::from(*x))
+    }
+
+    /// Number of planes.
+    pub(crate) fn planes(&self) -> usize {
+        self.layout.planes
+    }
+
+    /// Does the plane hold indices?
+    pub(crate) fn is_index(&self, plane: usize) -> bool {
+        self.layout.is_id(plane)
     }
 
     pub(crate) fn is_empty(&self) -> bool {

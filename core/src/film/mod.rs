@@ -8,6 +8,7 @@
 //! | `coverage` | shares of a pixel by index |
 //! | `short` | 32-bit numbers with the range of `f64` |
 //! | `error` | relMSE of a pixel, [`ErrorEstimate`] |
+//! | `film_sum` | films of several renders, added |
 //! | `independence` | correlation of an iteration's samples, measured |
 //! | `selection` | sums without the largest values |
 //! | `sqrt` | square root in f64 |
@@ -15,6 +16,7 @@
 mod aov;
 mod coverage;
 mod error;
+mod film_sum;
 mod independence;
 mod pixel;
 mod selection;
@@ -24,6 +26,7 @@ mod sqrt;
 pub use aov::{Aov, AovSet, PixelAov};
 pub(crate) use aov::{AovLayout, AovSums};
 pub use error::{ErrorEstimate, REL_MSE_EPSILON};
+pub use film_sum::FilmSum;
 pub use pixel::PixelStats;
 pub(crate) use pixel::PixelSums;
 pub(crate) use selection::{DIGITS, Selection};

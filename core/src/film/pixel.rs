@@ -49,6 +49,11 @@ impl PixelSums {
         self.samples = self.samples.saturating_add(1);
     }
 
+    /// Are these sums that samples may have?
+    pub(crate) fn is_sound(&self) -> bool {
+        self.sum.iter().all(|x| x.is_finite()) && self.spread.iter().all(|x| long(*x).is_finite())
+    }
+
     /// Mean and its squared standard error per channel, for two independent samples of weight 1 at least.
     pub(super) fn mean_and_variance(&self) -> [[f64; 2]; 3] {
         let n = f64::from(self.samples);

@@ -47,6 +47,10 @@ impl RrsStrategy for Adrrs {
     const NEEDS_ALBEDO: bool = true;
     const SPACE: Option<Space> = Some(Space::Scene);
 
+    fn option_bits(&self) -> [u32; 4] {
+        [0; 4]
+    }
+
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
         guarded(v)

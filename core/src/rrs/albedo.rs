@@ -29,6 +29,10 @@ impl RrsStrategy for Albedo {
         f.write_str(if self.product { "product" } else { "" })
     }
 
+    fn option_bits(&self) -> [u32; 4] {
+        [self.product.into(), 0, 0, 0]
+    }
+
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
         let a = v.albedo.mean();

@@ -31,6 +31,10 @@ impl RrsStrategy for BolinMeyer {
         f.write_str(if self.plain { "plain" } else { "" })
     }
 
+    fn option_bits(&self) -> [u32; 4] {
+        [self.plain.into(), 0, 0, 0]
+    }
+
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
         ears::grown(v, ears::efficient_factor(&v.learned, v.beta), self.plain)

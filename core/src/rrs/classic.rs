@@ -48,6 +48,10 @@ impl RrsStrategy for Classic {
         self.relative
     }
 
+    fn option_bits(&self) -> [u32; 4] {
+        [self.start, self.relative.into(), 0, 0]
+    }
+
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
         let early = v.depth.lt(U32x8::splat(self.start));

@@ -15,6 +15,10 @@ impl Contribution {
 }
 
 impl RrsStrategy for Contribution {
+    fn option_bits(&self) -> [u32; 4] {
+        [0; 4]
+    }
+
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
         v.last_weight.max_component().min(F32x8::ONE)

@@ -26,6 +26,10 @@ impl RrsStrategy for Ear {
         Ears { plain: self.plain }.write_options(f)
     }
 
+    fn option_bits(&self) -> [u32; 4] {
+        [self.plain.into(), 0, 0, 0]
+    }
+
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
         let l = &v.learned;

@@ -103,6 +103,10 @@ impl RrsStrategy for Ears {
         f.write_str(if self.plain { "plain" } else { "" })
     }
 
+    fn option_bits(&self) -> [u32; 4] {
+        [self.plain.into(), 0, 0, 0]
+    }
+
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
         grown(v, efficient_factor(&v.learned, v.beta), self.plain)

@@ -27,6 +27,10 @@ impl RrsStrategy for Fixed {
         write!(f, "{}", self.factor)
     }
 
+    fn option_bits(&self) -> [u32; 4] {
+        [self.factor.to_bits(), 0, 0, 0]
+    }
+
     #[inline(always)]
     fn factor(&self, _: &Vertices8) -> F32x8 {
         F32x8::splat(self.factor)

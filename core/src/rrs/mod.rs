@@ -100,6 +100,9 @@ pub trait RrsStrategy {
         Ok(())
     }
 
+    /// Bits of the options: equal strategies have equal ones, and others do not. Those that there are not are 0.
+    fn option_bits(&self) -> [u32; 4];
+
     /// Factor per lane, before clamping to [[`MIN_FACTOR`], [`MAX_FACTOR`]]. Lanes that are not finite count as 1.
     fn factor(&self, v: &Vertices8) -> F32x8;
 }
@@ -159,6 +162,11 @@ macro_rules! strategies {
             /// May the factor be 0, so that the picture is biased?
             pub const fn is_biased(&self) -> bool {
                 match self { $(Self::$name(_) => <$name as RrsStrategy>::BIASED),* }
+            }
+
+            /// Bits of the options ([`RrsStrategy::option_bits`]).
+            pub(crate) fn option_bits(&self) -> [u32; 4] {
+                match self { $(Self::$name(x) => x.option_bits()),* }
             }
 
             /// Factor per lane: unbiased strategies are clamped to [[`MIN_FACTOR`], [`MAX_FACTOR`]], and a factor

@@ -14,6 +14,10 @@ impl None {
 }
 
 impl RrsStrategy for None {
+    fn option_bits(&self) -> [u32; 4] {
+        [0; 4]
+    }
+
     fn factor(&self, _: &Vertices8) -> F32x8 {
         F32x8::ONE
     }

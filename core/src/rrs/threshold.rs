@@ -28,6 +28,10 @@ impl RrsStrategy for Threshold {
         write!(f, "{}", self.eps)
     }
 
+    fn option_bits(&self) -> [u32; 4] {
+        [self.eps.to_bits(), 0, 0, 0]
+    }
+
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
         v.beta.max_component().gt(F32x8::splat(self.eps)).zero_unless(F32x8::ONE)

@@ -51,6 +51,10 @@ impl RrsStrategy for Throughput {
         write!(f, "{}:{}:{}:{}", self.norm.name(), self.low, self.high, self.start)
     }
 
+    fn option_bits(&self) -> [u32; 4] {
+        [self.norm as u32, self.low.to_bits(), self.high.to_bits(), self.start]
+    }
+
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
         let early = v.depth.lt(U32x8::splat(self.start));

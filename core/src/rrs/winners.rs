@@ -36,6 +36,10 @@ impl RrsStrategy for Winners {
         write!(f, "{}:{}", self.reflected, self.visible)
     }
 
+    fn option_bits(&self) -> [u32; 4] {
+        [self.reflected.to_bits(), self.visible.to_bits(), 0, 0]
+    }
+
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
         let narrow = v.shininess + F32x8::ONE;

@@ -152,6 +152,27 @@ pub enum SettingValue {
     Strategy(Strategy),
 }
 
+impl SettingValue {
+    /// Shows the value's bytes, for hashes: those of different values of one setting differ.
+    pub(crate) fn bytes(self, mut show: impl FnMut(&[u8])) {
+        let mut word = |x: u32| show(&x.to_le_bytes());
+        match self {
+            Self::FromScene => {}
+            Self::Flag(x) => word(x.into()),
+            Self::Integer(x) | Self::Bytes(x) => show(&x.to_le_bytes()),
+            Self::Number(x) => word(x.to_bits()),
+            Self::Pair(xs) => xs.into_iter().for_each(|x| word(x.to_bits())),
+            Self::Size(xs) => xs.into_iter().for_each(word),
+            Self::Word(x) => show(x.as_bytes()),
+            Self::Aovs(x) => word(x.bits()),
+            Self::Strategy(x) => {
+                x.option_bits().into_iter().for_each(&mut word);
+                show(x.name().as_bytes());
+            }
+        }
+    }
+}
+
 impl fmt::Display for SettingValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -185,6 +185,34 @@ impl<'m> Bookkeeping<'m> {
         }
     }
 
+    /// Number of pixels that have begun.
+    pub(super) fn begun(&self) -> usize {
+        self.begun
+    }
+
+    /// Bytes of [`Self::sums`] of `pixels` pixels.
+    pub(super) fn lengths(&self, pixels: usize) -> [usize; 3] {
+        let rays = if self.rays.is_empty() { 0 } else { pixels * size_of::<u32>() };
+        [pixels * size_of::<PixelSums>(), rays, pixels * self.aovs.layout.planes * size_of::<f32>()]
+    }
+
+    /// Sums of the pixels that have begun, their rays and their auxiliary sums, as bytes.
+    pub(super) fn sums(&self) -> [&[u8]; 3] {
+        let parts = [bytemuck::cast_slice(self.pixels), bytemuck::cast_slice(self.rays), self.aovs.bytes()];
+        let lengths = self.lengths(self.begun);
+        [0, 1, 2].map(|i| parts[i].get(..lengths[i]).unwrap_or(&[]))
+    }
+
+    /// Takes `begun` pixels from the bytes of [`Self::sums`].
+    pub(super) fn load(&mut self, begun: usize, sums: [&[u8]; 3]) {
+        let pixels = bytemuck::cast_slice_mut(self.pixels);
+        let parts = [pixels, bytemuck::cast_slice_mut(self.rays), self.aovs.bytes_mut()];
+        for (part, bytes) in parts.into_iter().zip(sums) {
+            part.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
+        }
+        self.begun = begun.min(self.pixels.len());
+    }
+
     /// Opens a camera sample: its root and, if it is `learned` from, its ledger record. `None` cannot happen while
     /// roots outnumber vertices by two packets.
     pub(super) fn open_camera_sample(&mut self, target: PixelTarget, learned: bool) -> Option<(u32, u32)> {

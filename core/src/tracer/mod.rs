@@ -20,6 +20,7 @@
 //! | `free_list` | free slots of slabs |
 //! | `packets`, `path` | what stages hand to each other |
 //! | `shard`, `state`, `job` | one unit of parallel work, what it keeps, and what all of them share |
+//! | `save` | a finished shard as bytes, for other machines |
 
 mod aov;
 mod book;
@@ -46,6 +47,7 @@ mod relief;
 mod ring;
 mod root;
 mod roulette;
+mod save;
 mod scatter;
 mod settle;
 mod shading;
@@ -60,6 +62,8 @@ mod vertex;
 pub(crate) use job::Job;
 pub(crate) use media_set::media_at;
 pub use occlude::MAX_PASSED;
+pub use save::SavedShardError;
+pub(crate) use save::longest;
 pub use shard::{Budget, Shard, ShardError, StepResult};
 pub(crate) use shard::{SHARD_RECORD_BYTES, ShardCursor};
 

@@ -80,7 +80,7 @@ pub struct Shard<'m> {
     record: &'m mut ShardRecord,
     index: u32,
     /// What the books belong to; iteration 0 is none.
-    joined: Identity,
+    pub(super) joined: Identity,
     pub(super) state: State<'m>,
 }
 

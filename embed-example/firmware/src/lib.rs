@@ -1,88 +1,20 @@
-//! What the firmware computes. Hosts run the same function and must get the same numbers: `reproducible` arithmetic
-//! and the scene door do not depend on the machine.
+//! What the firmware computes: [`probe`], numbers that tell machines apart, and [`Renderer`], a picture in small steps.
+//! Hosts run the same functions and must get the same numbers: in `reproducible` arithmetic they do not depend on the
+//! machine.
 #![no_std]
 #![forbid(unsafe_code)]
 
-use croupier::Scene;
-use croupier::unstable::Effects;
-use croupier::unstable::profile::{Custom, Profile};
-use croupier::unstable::rng::Key8;
-use croupier::unstable::scene::blob::content_hash;
-use croupier::unstable::simd::{F32x8, U32x8};
+mod picture;
+mod probe;
+mod sensor;
 
-/// Kernels for the firmware's scenes: what they call for, and no more. A session of them is
-/// `Session::builder(scene).profile::<Kernels>().build(&plan, block)`.
-pub type Kernels = Custom<{ SURFACES.with(LIGHTS).with(Effects::LENS).0 }>;
-const SURFACES: Effects =
-    Effects::DIFFUSE.with(Effects::ROUGH_PLASTIC).with(Effects::TEXTURES).with(Effects::SMOOTH_NORMALS);
-const LIGHTS: Effects = Effects::AREA_LIGHTS.with(Effects::ENVIRONMENT).with(Effects::DELTA_LIGHTS);
+pub use picture::{
+    BETWEEN_TICKS, Failure, ITERATIONS, Kernels, Renderer, SESSION_BYTES, SHARD_BYTES, box_bytes, settings,
+};
+pub use probe::{ProbeKernels, probe, scene_bytes};
+pub use sensor::Sensor;
 
-/// Bytes at an address that is a multiple of 64.
+/// Bytes at an address that is a multiple of 64, as scenes and blocks of memory need it.
+#[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-struct Aligned<const N: usize>([u8; N]);
-
-/// A baked scene with one of everything, in flash.
-static SCENE: &Aligned<{ include_bytes!("../tiny.crp").len() }> = &Aligned(*include_bytes!("../tiny.crp"));
-
-/// The scene's bytes.
-pub fn scene_bytes() -> &'static [u8] {
-    &SCENE.0
-}
-
-/// Chains numbers into a hash.
-struct Hash(u64);
-
-impl Hash {
-    fn add(&mut self, x: u64) {
-        let mut bytes = [0; 16];
-        for (to, from) in bytes.iter_mut().zip(self.0.to_le_bytes().into_iter().chain(x.to_le_bytes())) {
-            *to = from;
-        }
-        self.0 = content_hash(&bytes);
-    }
-
-    fn add_floats(&mut self, x: F32x8) {
-        x.to_bits().to_array().into_iter().for_each(|b| self.add(u64::from(b)));
-    }
-}
-
-/// Results by name, in a fixed order.
-pub fn probe() -> [(&'static str, u64); 3] {
-    [("simd", simd()), ("scene", scene(scene_bytes())), ("damaged", damaged(scene_bytes()))]
-}
-
-/// The bits of arithmetic and of every elementary function on random numbers.
-fn simd() -> u64 {
-    let mut hash = Hash(0);
-    for i in 0..64 {
-        let key = Key8 { lo: U32x8::new([0, 1, 2, 3, 4, 5, 6, 7]), hi: U32x8::splat(i) };
-        let [a, b, c, d] = key.uniforms(0);
-        let (x, y) = (a * 40.0 - 20.0, b * 1e6);
-        let (sin, cos) = c.sin_cos_2pi();
-        for f in
-            [x + y, x / (y + 1.0), y.sqrt(), x.exp(), y.ln(), b.powf(x), sin, cos, (d * 2.0 - 1.0).acos(), x.atan2(y)]
-        {
-            hash.add_floats(f);
-        }
-    }
-    hash.0
-}
-
-/// What a blob holds, through the validating door; 0 if it is refused, or if [`Kernels`] are not enough for it.
-fn scene(bytes: &[u8]) -> u64 {
-    let Ok(scene) = Scene::from_bytes(bytes) else { return 0 };
-    if !Kernels::EFFECTS.contains(scene.effects) {
-        return 0;
-    }
-    let mut hash = Hash(scene.hash);
-    let counts = [scene.nodes.len(), scene.leaves.len(), scene.triangles.len(), scene.lights.len()];
-    counts.into_iter().for_each(|n| hash.add(n as u64));
-    hash.add(u64::from(scene.effects.0));
-    hash.0
-}
-
-/// How many truncations of a blob are refused.
-fn damaged(bytes: &[u8]) -> u64 {
-    let cuts = (0..bytes.len()).step_by(61);
-    cuts.filter(|cut| bytes.get(..*cut).is_none_or(|b| Scene::from_bytes(b).is_err())).count() as u64
-}
+pub struct Aligned<const N: usize>(pub [u8; N]);

@@ -1,69 +1,56 @@
-//! Prints the results of [`croupier_firmware::probe`], one `name hash` per line, and ends with status 0.
+//! Renders the box and serves a sensor meanwhile; prints the hash of the picture and what it took, one `name value` per
+//! line, and ends with status 0.
 //!
-//! Cortex-M7 object code without any library. It runs in a user-mode emulator, whose system calls stand in for a
-//! serial port; on a board, `write` and `exit` are the only functions to replace (and a reset handler must switch the
-//! FPU on and fill `.data` and `.bss`).
-//!
-//! There is no panic handler that could run: it calls a function that does not exist, so that the program links only
-//! if the optimiser has proved that nothing in it can panic.
+//! Cortex-M7 object code without any library and without a heap; see `board` for how it starts and how it ends.
 #![no_std]
 #![no_main]
 
-use core::arch::asm;
+mod board;
 
-/// Number of the system call that writes bytes.
-const WRITE: u32 = 4;
-/// Number of the system call that ends the program.
-const EXIT_GROUP: u32 = 248;
+use board::{Block, clock, exit, line, line_hexadecimal, stack_used, start_clock, write};
+use croupier_firmware::{BETWEEN_TICKS, Failure, Renderer, SESSION_BYTES, SHARD_BYTES, Sensor, box_bytes};
 
-fn system_call(number: u32, a: u32, b: u32, c: u32) -> u32 {
-    let result;
-    // SAFETY: both calls used here read memory at most. r7 is the frame pointer, hence kept in r12.
-    unsafe {
-        asm!("mov r12, r7", "mov r7, {number}", "svc 0", "mov r7, r12",
-            number = in(reg) number, inlateout("r0") a => result, in("r1") b, in("r2") c, out("r12") _);
-    }
-    result
-}
+static SESSION: Block<SESSION_BYTES> = Block::new();
+static SHARD: Block<SHARD_BYTES> = Block::new();
 
-fn write(text: &[u8]) {
-    system_call(WRITE, 1, text.as_ptr() as u32, text.len() as u32);
-}
-
-fn exit(status: u32) -> ! {
-    system_call(EXIT_GROUP, status, 0, 0);
-    loop {}
-}
-
-/// A number as 16 hexadecimal digits and a line end.
-fn hexadecimal(x: u64) -> [u8; 17] {
-    core::array::from_fn(|i| match i {
-        16 => b'\n',
-        _ => match (x >> (60 - 4 * i)) as u8 & 15 {
-            digit @ 0..10 => b'0' + digit,
-            digit => b'a' - 10 + digit,
-        },
-    })
-}
-
-/// Where the emulator starts.
 #[unsafe(no_mangle)]
-extern "C" fn reset() -> ! {
-    for (name, hash) in croupier_firmware::probe() {
-        write(name.as_bytes());
-        write(b" ");
-        write(&hexadecimal(hash));
+extern "C" fn main() -> ! {
+    match render() {
+        Ok(()) => exit(0),
+        Err(failure) => {
+            write(b"failed: ");
+            write(failure.name().as_bytes());
+            line(": bytes needed", failure.needed() as u64);
+            exit(1)
+        }
     }
-    exit(0)
 }
 
-unsafe extern "C" {
-    /// Does not exist.
-    fn something_can_panic() -> !;
+fn render() -> Result<(), Failure> {
+    // SAFETY: once each, because `main` is called once.
+    let (session, shard) = unsafe { (SESSION.take(), SHARD.take()) };
+    let mut renderer = Renderer::new(box_bytes(), session, shard)?;
+    let mut sensor = Sensor::default();
+    start_clock();
+    while renderer.work(BETWEEN_TICKS)? {
+        sensor.serve(renderer.rays(), clock());
+    }
+    line_hexadecimal("picture", renderer.hash());
+    renderer.report().into_iter().chain(sensor.report()).for_each(|(name, count)| line(name, count));
+    let [tracing, ending] = sensor.most_time;
+    for (name, time) in [("time", sensor.time), ("time_tracing", tracing), ("time_ending", ending)] {
+        line(name, time);
+    }
+    let [used, stack] = stack_used();
+    line("stack_used", used as u64);
+    line("stack", stack as u64);
+    Ok(())
 }
 
+/// The compiler keeps bounds checks of indices that are always within; `sizes.txt` counts them. None of them is known to
+/// fail.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-    // SAFETY: never linked, see above.
-    unsafe { something_can_panic() }
+    write(b"panicked\n");
+    exit(2)
 }

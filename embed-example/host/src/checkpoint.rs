@@ -190,13 +190,13 @@ impl From<io::Error> for CheckpointError {
 }
 
 /// Version of this crate and of the machine's words.
-fn version() -> String {
+pub(crate) fn version() -> String {
     let order = if cfg!(target_endian = "little") { "little" } else { "big" };
     format!("{} ({}-bit, {order}-endian)", env!("CARGO_PKG_VERSION"), usize::BITS)
 }
 
 /// Version and settings, one a line.
-fn describe(settings: &Settings) -> String {
+pub(crate) fn describe(settings: &Settings) -> String {
     let mut out = format!("version={}\n", version());
     for row in Settings::TABLE {
         if let Some(value) = settings.get(row.name) {

@@ -4,12 +4,14 @@
 mod calibrate;
 mod error;
 mod observe;
+mod part;
 mod result;
 pub mod schedule;
 
 pub use calibrate::Calibration;
 pub use error::DriveError;
 pub use observe::{Observer, Progress, Target, Unobserved};
+pub use part::{Part, PartError, Share};
 pub use result::{CacheRecord, IterationRecord, Rendered};
 
 use crate::blob::AlignedBytes;
@@ -23,7 +25,8 @@ use croupier::unstable::light::PowerSelector;
 use croupier::unstable::profile::{AnyProfile, Profile, ProfileVisitor};
 use croupier::unstable::rrs::Space;
 use croupier::{
-    Budget, Counters, ErrorEstimate, Film, Plan, Scene, Session, SessionError, Settings, Shard, StepResult,
+    Budget, Counters, ErrorEstimate, Film, Plan, Scene, Session, SessionError, SessionState, Settings, Shard,
+    StepResult,
 };
 use rayon::prelude::*;
 use schedule::Work;
@@ -41,6 +44,8 @@ pub struct Options<'a> {
     pub settings: Settings,
     /// Stop condition.
     pub target: Target,
+    /// The part of a picture to be rendered; all of it if absent.
+    pub part: Option<Part>,
     /// Threads; 0 is one per processor. The image does not depend on them.
     pub threads: usize,
     /// Pixel estimate that strategies which learn use instead of the denoised picture, rgb, row by row: efficiency
@@ -65,6 +70,7 @@ impl Options<'_> {
         Self {
             settings,
             target,
+            part: None,
             threads: 0,
             pixel_estimate: None,
             cache: None,
@@ -119,6 +125,7 @@ pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
     observer: &dyn Observer,
 ) -> Result<Rendered, DriveError> {
     let settings = &options.settings;
+    let share = share(settings, options.part, options.target)?;
     resumes_alone(options.resume, options.cache.is_some(), options.pixel_estimate.is_some())?;
     if options.cache.is_some() || options.save_cache {
         needs_cache(settings)?;
@@ -133,6 +140,10 @@ pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
         Some(_) => builder().resume(&plan, shared.as_mut())?,
         None => builder().build(&plan, shared.as_mut())?,
     };
+    match &saved {
+        Some(saved) => same_part(&session, saved, share)?,
+        None => session.skip(share.iterations, share.first),
+    }
     let mut shards = Vec::with_capacity(blocks.len());
     for (i, b) in blocks.iter_mut().enumerate() {
         shards.push(Shard::new(&plan, i as u32, b.as_mut())?);
@@ -155,7 +166,7 @@ pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
     while !stopped_early {
         let (last, error) = iterations.last().map_or((Work::default(), None), |i| (i.work, Some(i.error)));
         let now = Work { seconds: observer.seconds().unwrap_or_else(|| start.elapsed().as_secs_f64()), ..all };
-        let next = begun.unwrap_or_else(|| schedule::next(options.target, learns(settings), &now, &last, error));
+        let next = begun.unwrap_or_else(|| schedule::next(share.target, learns(settings), &now, &last, error));
         // shards of a small picture finish in a single step and never ask the observer
         stopped_early = next > 0 && all.samples > 0 && observer.stop();
         let done = next == 0 || stopped_early;
@@ -210,6 +221,7 @@ pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
         planes: planes(film),
         counters: *session.counters(),
         error: film.error_estimate(),
+        first_sample: share.first,
         spp: all.samples,
         seconds,
         profile: P::NAME,
@@ -221,6 +233,26 @@ pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
         cache: used.filter(|_| options.save_cache).map(save).transpose()?,
         calibration: used.filter(|_| options.calibrate).and_then(|c| calibrate::calibrate(c, &scene)),
     })
+}
+
+/// What a part renders; all of the picture without one.
+pub(crate) fn share(settings: &Settings, part: Option<Part>, target: Target) -> Result<Share, PartError> {
+    match part {
+        Some(_) if settings.adaptive => Err(PartError::Adaptive),
+        Some(part) => part.share(target),
+        None => Ok(Share::whole(target)),
+    }
+}
+
+/// Fails if a session that was resumed has taken other samples than those of this share of the picture.
+fn same_part(session: &SessionState<'_>, saved: &checkpoint::Progress, share: Share) -> Result<(), DriveError> {
+    let i = session.iteration();
+    let before = i.first_sample.wrapping_add(i.samples);
+    let first = before.wrapping_sub(saved.work.samples).wrapping_sub(saved.begun.unwrap_or(0));
+    // parts are further apart than a part has iterations
+    let part = |n: u64| n >> 32;
+    let same = first == share.first && part(i.number) == part(share.iterations);
+    if same { Ok(()) } else { Err(DriveError::OtherPart(first, share.first)) }
 }
 
 /// Fails if a checkpoint is to be resumed together with what would replace a part of it.
@@ -239,7 +271,7 @@ fn threads(wanted: usize, shards: usize) -> usize {
 }
 
 /// All planes of auxiliary values that a film has.
-fn planes(film: &Film<'_>) -> Vec<(Aov, Vec<Vec<f32>>)> {
+pub(crate) fn planes(film: &Film<'_>) -> Vec<(Aov, Vec<Vec<f32>>)> {
     let of = |aov: Aov| {
         let channels = (0..aov.channels().len()).map(|c| film.plane(aov, c).map(<[f32]>::to_vec));
         Some((aov, channels.collect::<Option<Vec<_>>>()?)).filter(|(_, channels)| !channels.is_empty())
@@ -290,7 +322,7 @@ fn learns(s: &Settings) -> bool {
     s.strategy.needs_image() || s.shadow_roulette || s.adaptive
 }
 
-fn save(cache: &Cache<'_>) -> Result<Vec<u8>, CacheError> {
+pub(crate) fn save(cache: &Cache<'_>) -> Result<Vec<u8>, CacheError> {
     let mut bytes = vec![0; cache.saved_len()];
     cache.save(&mut bytes)?;
     Ok(bytes)

@@ -11,6 +11,7 @@
 //! | [`effects`] | reasons for a scene's effects | files |
 //! | [`drive`] | memory, threads, iterations around the core | files |
 //! | [`checkpoint`] | files that a render goes on from | how light is transported |
+//! | [`part`] | files with parts of a picture, and their sum | how light is transported |
 //! | [`render`] | options in, pictures with layers out | how light is transported |
 //! | [`lightmap`], [`probes`] | irradiance of surfaces texel by texel, radiance at points as spherical harmonics | files |
 //! | [`memory`] | bytes of a render against those of the machine | files of scenes |
@@ -40,6 +41,7 @@ pub mod load;
 pub mod look;
 pub mod memory;
 pub mod microfacet;
+pub mod part;
 pub mod principled;
 pub mod probes;
 pub mod render;

@@ -4,8 +4,9 @@ pub use crate::drive::{DriveError as RenderError, Observer, Progress, Target};
 
 use crate::checkpoint::Schedule;
 use crate::cryptomatte;
-use crate::drive::{self, Options, Rendered, drive_scene};
+use crate::drive::{self, Options, Part, Rendered, drive_scene};
 use crate::image::{Channel, Picture};
+use crate::part::{Merged, Names};
 use crate::statistics::Statistics;
 use croupier::unstable::STACK_BYTES;
 use croupier::unstable::denoise::{Planes, scratch_len};
@@ -28,6 +29,8 @@ pub struct RenderOptions {
     pub settings: Settings,
     /// Stop condition.
     pub target: Target,
+    /// The part of a picture to be rendered; all of it if absent.
+    pub part: Option<Part>,
     /// Threads; 0 is one per processor. The image does not depend on them.
     pub threads: usize,
     /// Saved cache to begin with. Needs a strategy that learns from the scene.
@@ -58,6 +61,7 @@ impl RenderOptions {
         Self {
             settings,
             target: Target::Spp(64),
+            part: None,
             threads: 0,
             cache: None,
             save_cache: false,
@@ -201,6 +205,7 @@ pub fn check(options: &RenderOptions) -> Result<(), RenderError> {
         settings.max_depth = 1;
     }
     Plan::new(&settings)?;
+    drive::share(&settings, options.part, options.target)?;
     drive::resumes_alone(options.resume.as_deref(), options.cache.is_some(), false)?;
     if options.cache.is_some() || options.save_cache { drive::needs_cache(&settings) } else { Ok(()) }
 }
@@ -216,9 +221,29 @@ pub fn render_scene(
     options: &RenderOptions,
     observer: &dyn Observer,
 ) -> Result<RenderResult, RenderError> {
+    let (rendered, plan) = render_part(scene, options, observer)?;
+    let names = Names::of(&scene, options.settings.aovs);
+    Ok(RenderResult {
+        picture: picture(&rendered, &names, options.denoise),
+        stats: stats(&rendered),
+        statistics: Statistics::of(&rendered),
+        plan,
+        cache: rendered.cache,
+        stopped_early: rendered.stopped_early,
+        checkpoint_error: rendered.checkpoint_error,
+    })
+}
+
+/// Renders the part of a picture that the options ask for, as sums: for [`part::write`](crate::part::write).
+pub fn render_part(
+    scene: Scene<'_>,
+    options: &RenderOptions,
+    observer: &dyn Observer,
+) -> Result<(Rendered, PlanSummary), RenderError> {
     let settings = options.settings.with_scene(&scene);
     let plan = PlanSummary::new(&scene, &settings)?;
     let o = Options {
+        part: options.part,
         threads: options.threads,
         cache: options.cache.as_deref(),
         save_cache: options.save_cache,
@@ -227,20 +252,12 @@ pub fn render_scene(
         resume: options.resume.as_deref(),
         ..Options::new(settings, options.target)
     };
-    let rendered = drive_scene(scene, &o, observer)?;
-    let mut picture = picture(&scene, &rendered);
-    if options.denoise {
-        picture.add3("denoised", RGB, &denoised(&rendered));
-    }
-    Ok(RenderResult {
-        picture,
-        stats: stats(&rendered),
-        statistics: Statistics::of(&rendered),
-        plan,
-        cache: rendered.cache,
-        stopped_early: rendered.stopped_early,
-        checkpoint_error: rendered.checkpoint_error,
-    })
+    Ok((drive_scene(scene, &o, observer)?, plan))
+}
+
+/// Picture of parts that were merged, with all layers, and its figures.
+pub fn merged(parts: &Merged, denoise: bool) -> (Picture, RenderStats) {
+    (picture(&parts.rendered, &parts.names, denoise), stats(&parts.rendered))
 }
 
 /// Memory that [`render_scene`] would take.
@@ -264,8 +281,8 @@ fn denoised(r: &Rendered) -> Vec<[f32; 3]> {
     done.expect("memory of the sizes asked for")
 }
 
-/// Picture with all layers that the film holds.
-fn picture(scene: &Scene<'_>, r: &Rendered) -> Picture {
+/// Picture with all layers that the film holds, and the denoised one if it is wanted.
+fn picture(r: &Rendered, names: &Names, denoise: bool) -> Picture {
     let mut picture = Picture::new(r.size[0] as usize, r.size[1] as usize);
     picture.add3("", RGB, &r.image());
     picture.add3("stderr", RGB, &r.stderr());
@@ -275,24 +292,28 @@ fn picture(scene: &Scene<'_>, r: &Rendered) -> Picture {
     }
     picture.add1("samples", "N", &r.pixels.iter().map(|p| p.samples as f32).collect::<Vec<_>>());
     for (aov, channels) in &r.planes {
-        add_aov(&mut picture, scene, r, *aov, channels);
+        add_aov(&mut picture, names, r, *aov, channels);
+    }
+    if denoise {
+        picture.add3("denoised", RGB, &denoised(r));
     }
     picture
 }
 
 /// Adds the layers of an auxiliary value. What is known of first hits becomes the mean over the camera samples that hit, if
 /// their share is known.
-fn add_aov(picture: &mut Picture, scene: &Scene<'_>, r: &Rendered, aov: Aov, channels: &[Vec<f32>]) {
+fn add_aov(picture: &mut Picture, names: &Names, r: &Rendered, aov: Aov, channels: &[Vec<f32>]) {
     let ranks = <&[Vec<f32>; 4]>::try_from(channels);
-    let named = |name: &str, what: &str, i: u32| if name.is_empty() { format!("{what} {i}") } else { name.to_owned() };
+    let named = |names: &[String], what: &str, i: u32| match names.get(i as usize).filter(|n| !n.is_empty()) {
+        Some(name) => name.clone(),
+        None => format!("{what} {i}"),
+    };
     match (aov, ranks) {
         (Aov::MaterialCoverage, Ok(ranks)) => {
-            return cryptomatte::add(picture, "CryptoMaterial", ranks, |i| {
-                named(scene.material_name(i), "material", i)
-            });
+            return cryptomatte::add(picture, "CryptoMaterial", ranks, |i| named(&names.materials, "material", i));
         }
         (Aov::ObjectCoverage, Ok(ranks)) => {
-            return cryptomatte::add(picture, "CryptoObject", ranks, |i| named(scene.object_name(i), "object", i));
+            return cryptomatte::add(picture, "CryptoObject", ranks, |i| named(&names.objects, "object", i));
         }
         _ => {}
     }

@@ -181,16 +181,16 @@ fn every_profile_runs_and_none_that_a_scene_does_not_need() {
     assert!(AnyProfile::ALL.len() <= 12, "each profile is compiled into every host");
 }
 
-/// The firmware's own profile renders its scene as the full one does. Killed by: a profile of another scene.
+/// A firmware's own profile renders its scene as the full one does. Killed by: a profile of another scene.
 #[test]
 fn the_firmware_has_kernels_for_its_scene() {
     let blob = Parts::tiny().blob();
     let scene = Scene::from_bytes(blob.bytes()).unwrap();
-    let surplus: Vec<_> = croupier_firmware::Kernels::EFFECTS.without(scene.effects).names().collect();
-    let missing: Vec<_> = scene.effects.without(croupier_firmware::Kernels::EFFECTS).names().collect();
+    let surplus: Vec<_> = croupier_firmware::ProbeKernels::EFFECTS.without(scene.effects).names().collect();
+    let missing: Vec<_> = scene.effects.without(croupier_firmware::ProbeKernels::EFFECTS).names().collect();
     assert!(surplus.is_empty() && missing.is_empty(), "{surplus:?} not needed, {missing:?} missing");
     let (settings, samples) = (Settings { size: [8, 8], ..settings(&scene, "classic") }, [2]);
-    let own = Render(scene, &settings, &samples).visit::<croupier_firmware::Kernels>();
+    let own = Render(scene, &settings, &samples).visit::<croupier_firmware::ProbeKernels>();
     assert!(own.bits() == Render(scene, &settings, &samples).visit::<Full>().bits() && own.mean() > 0.0);
 }
 

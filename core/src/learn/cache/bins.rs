@@ -53,6 +53,13 @@ impl BinRecord {
         true
     }
 
+    /// Are these sums that samples may have?
+    pub(super) fn is_sound(&self) -> bool {
+        let Self { count: _, pairs: _, cost, sum, sqr, pair, nee } = self;
+        let all = [sum, sqr, pair].into_iter().flatten().chain([cost, nee]);
+        all.into_iter().all(|x| (0.0..=f32::MAX).contains(x))
+    }
+
     /// Adds the square of a finite contribution of next event estimation, times its probability.
     pub(super) fn add_nee(&mut self, x: [f32; 3], nee_probability: f32) {
         if self.count != BIN_LIMIT {
@@ -84,6 +91,11 @@ pub(super) struct ShadowRecord {
 }
 
 impl ShadowRecord {
+    /// Are these counts that rays may have?
+    pub(super) fn is_sound(&self) -> bool {
+        self.visible <= self.rays
+    }
+
     /// Adds a ray; `false` if the record is full.
     pub(super) fn add(&mut self, visible: bool) -> bool {
         if self.rays == BIN_LIMIT {

@@ -21,7 +21,7 @@ impl CacheSize {
         ROOTS + 7 * self.subdivisions
     }
 
-    pub(super) fn bins(self) -> usize {
+    pub(crate) fn bins(self) -> usize {
         self.leaves() as usize * BINS
     }
 }

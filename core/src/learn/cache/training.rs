@@ -77,6 +77,40 @@ impl<'m> Training<'m> {
         self.clear >= self.used
     }
 
+    /// Bytes of a bin in [`Self::sums`].
+    pub(crate) const BIN_BYTES: usize = size_of::<BinRecord>() + size_of::<ShadowRecord>();
+
+    /// Number of bins in use.
+    pub(crate) fn used(&self) -> usize {
+        self.used
+    }
+
+    /// Bytes of [`Self::sums`] of so many bins.
+    pub(crate) fn lengths(bins: usize) -> [usize; 2] {
+        [bins * size_of::<BinRecord>(), bins * size_of::<ShadowRecord>()]
+    }
+
+    /// Sums of the bins in use, and their shadow rays, as bytes.
+    pub(crate) fn sums(&self) -> [&[u8]; 2] {
+        [bytemuck::cast_slice(self.records()), bytemuck::cast_slice(self.shadows())]
+    }
+
+    /// The first bin in the bytes of [`Self::sums`] with numbers that no samples have.
+    pub(crate) fn unsound(records: &[u8], shadows: &[u8]) -> Option<usize> {
+        let record = |b: &[u8]| !bytemuck::pod_read_unaligned::<BinRecord>(b).is_sound();
+        let shadow = |b: &[u8]| !bytemuck::pod_read_unaligned::<ShadowRecord>(b).is_sound();
+        let first = records.chunks_exact(size_of::<BinRecord>()).position(record);
+        first.or_else(|| shadows.chunks_exact(size_of::<ShadowRecord>()).position(shadow))
+    }
+
+    /// Takes the bytes of [`Self::sums`] of as many bins as are in use.
+    pub(crate) fn load(&mut self, [records, shadows]: [&[u8]; 2]) {
+        let copy = |to: &mut [u8], from: &[u8]| to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+        copy(bytemuck::cast_slice_mut(self.used_mut()), records);
+        copy(bytemuck::cast_slice_mut(self.shadows_mut()), shadows);
+        self.clear = self.used;
+    }
+
     /// Adds a sample. Negative values count as 0, values above [`MAX_VALUE`](super::MAX_VALUE) as that.
     ///
     /// `false` if it was not taken: the bin does not exist, a number is not finite, or the bin has

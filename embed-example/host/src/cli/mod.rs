@@ -11,6 +11,7 @@ mod console;
 mod info;
 mod lightmap;
 mod look;
+mod merge;
 mod notes;
 mod output;
 mod probes;
@@ -44,6 +45,8 @@ static VERSION: LazyLock<String> =
 enum Command {
     /// Render a scene to an EXR file with all layers and a PNG beside it
     Render(render::Args),
+    /// Make the picture of parts that `render --part` wrote, in any order
+    Merge(merge::Args),
     /// Bake a scene into one file that is mapped instead of loaded
     Bake(bake::Args),
     /// Print what a scene contains, the effects it needs and the memory a render takes
@@ -64,6 +67,7 @@ pub(crate) fn run() -> ExitCode {
     let outcome = match cli.command {
         None => render::run(None, &cli.render),
         Some(Command::Render(args)) => render::run(args.scene.as_deref(), &args.flags),
+        Some(Command::Merge(args)) => merge::run(&args).map(done),
         Some(Command::Bake(args)) => bake::run(&args).map(done),
         Some(Command::Info(args)) => info::run(&args).map(done),
         Some(Command::Lightmap(args)) => lightmap::run(&args),

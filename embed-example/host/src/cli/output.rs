@@ -24,10 +24,10 @@ const FALSE_COLOR: [(&str, &str); 6] = [
 /// Paths of all files of a render.
 #[derive(Debug)]
 pub(crate) struct Outputs<'a> {
-    /// EXR file with all layers.
+    /// EXR file with all layers, or a part of a picture.
     pub(crate) exr: &'a Path,
-    /// Tone-mapped picture, beside the EXR.
-    pub(crate) png: PathBuf,
+    /// Tone-mapped picture, beside the EXR; parts have none.
+    pub(crate) png: Option<PathBuf>,
     /// Saved cache, if asked for.
     pub(crate) cache: Option<&'a Path>,
     /// Checkpoint, if asked for.
@@ -59,12 +59,18 @@ impl<'a> Outputs<'a> {
     pub(crate) fn new(exr: &'a Path, cache: Option<&'a Path>, checkpoint: Option<&'a Path>, false_color: bool) -> Self {
         let drawings = FALSE_COLOR.iter().filter(|_| false_color);
         let false_color = drawings.map(|(layer, _)| exr.with_extension(format!("{layer}.png"))).collect();
-        Self { exr, png: exr.with_extension("png"), cache, checkpoint, false_color }
+        Self { exr, png: Some(exr.with_extension("png")), cache, checkpoint, false_color }
+    }
+
+    /// Names of the files of a part of a picture.
+    pub(crate) fn part(part: &'a Path, cache: Option<&'a Path>, checkpoint: Option<&'a Path>) -> Self {
+        Self { exr: part, png: None, cache, checkpoint, false_color: Vec::new() }
     }
 
     /// Every file.
     fn all(&self) -> Vec<&Path> {
-        let pictures = [self.exr, &self.png].into_iter().chain(self.false_color.iter().map(PathBuf::as_path));
+        let pictures = [self.exr].into_iter().chain(self.png.as_deref());
+        let pictures = pictures.chain(self.false_color.iter().map(PathBuf::as_path));
         pictures.chain(self.cache).chain(self.checkpoint).collect()
     }
 
@@ -91,11 +97,10 @@ impl<'a> Outputs<'a> {
     pub(crate) fn write(&self, picture: &Picture, cache: Option<&[u8]>, image: &str, exposure: Exposure) -> Written {
         let mut written = Written::default();
         written.add(self.exr, picture.write_exr(self.exr));
-        if let Some((path, bytes)) = self.cache.zip(cache) {
-            let all = write_whole(path, |out| out.write_all(bytes).map_err(|e| ImageError::Write(path.into(), e)));
-            written.add(path, all);
+        self.write_cache(cache, &mut written);
+        if let Some(png) = &self.png {
+            written.add(png, self.write_png(png, picture, image, exposure));
         }
-        written.add(&self.png, self.write_png(picture, image, exposure));
         for (path, (layer, title)) in self.false_color.iter().zip(FALSE_COLOR) {
             let Some(channel) = picture.layer(layer).and_then(|l| l.channels.first()) else { continue };
             let factors = layer.starts_with("factor");
@@ -106,13 +111,32 @@ impl<'a> Outputs<'a> {
         written
     }
 
-    fn write_png(&self, picture: &Picture, layer: &str, exposure: Exposure) -> Result<(), ImageError> {
+    /// Writes a part, and the saved cache.
+    pub(crate) fn write_part(
+        &self,
+        part: impl FnOnce(&Path) -> Result<(), ImageError>,
+        cache: Option<&[u8]>,
+    ) -> Written {
+        let mut written = Written::default();
+        written.add(self.exr, part(self.exr));
+        self.write_cache(cache, &mut written);
+        written
+    }
+
+    fn write_cache(&self, cache: Option<&[u8]>, written: &mut Written) {
+        if let Some((path, bytes)) = self.cache.zip(cache) {
+            let all = write_whole(path, |out| out.write_all(bytes).map_err(|e| ImageError::Write(path.into(), e)));
+            written.add(path, all);
+        }
+    }
+
+    fn write_png(&self, png: &Path, picture: &Picture, layer: &str, exposure: Exposure) -> Result<(), ImageError> {
         let image = picture.rgb(layer).ok_or_else(|| ImageError::NoRgb(self.exr.into()))?;
         let stops = match exposure {
             Exposure::Stops(stops) => stops,
             Exposure::Auto => auto(&image),
         };
-        write_png(&self.png, picture.width, picture.height, &tonemap(&image, stops, Curve::Shoulder))
+        write_png(png, picture.width, picture.height, &tonemap(&image, stops, Curve::Shoulder))
     }
 }
 
@@ -189,7 +213,7 @@ mod tests {
             let dir = tempfile::tempdir().unwrap();
             let mut names: Vec<PathBuf> = (0..9).map(|n| dir.path().join(n.to_string())).collect();
             names[i] = lost.join(i.to_string());
-            let (png, false_color) = (names[2].clone(), names[3..].to_vec());
+            let (png, false_color) = (Some(names[2].clone()), names[3..].to_vec());
             let outputs = Outputs { exr: &names[0], png, cache: Some(&names[1]), checkpoint: None, false_color };
             assert!(outputs.check().unwrap_err().contains("not a folder"));
             assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);

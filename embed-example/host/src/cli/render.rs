@@ -4,16 +4,22 @@ use super::cache::CacheFlags;
 use super::checkpoint::CheckpointFlags;
 use super::console::{Outcome, note, say, say_json};
 use super::notes::{Notes, about};
-use super::output::Outputs;
+use super::output::{Outputs, Written};
 use super::progress::Rendering;
 use super::settings::SettingsFlags;
 use super::until::Until;
-use super::values::{Exposure, exposure, exr_path};
+use super::values::{Exposure, exposure, is_part, picture_path};
 use super::{scene, signals};
+use clap::error::ErrorKind;
 use croupier::Scene;
 use croupier::unstable::MAX_PATH_LENGTH;
+use croupier::unstable::rrs::Space;
+use croupier_host::drive::{Part, Rendered};
 use croupier_host::memory::{Demand, machine};
-use croupier_host::render::{PlanSummary, RenderOptions, RenderResult, RenderStats, check, plan, render_scene};
+use croupier_host::part;
+use croupier_host::render::{
+    PlanSummary, RenderError, RenderOptions, RenderResult, RenderStats, check, plan, render_part, render_scene,
+};
 use croupier_host::statistics::Statistics;
 use croupier_host::text;
 use serde::Serialize;
@@ -32,9 +38,14 @@ pub(crate) struct Args {
 /// Flags of a render.
 #[derive(clap::Args)]
 pub(crate) struct Flags {
-    /// EXR file of the picture; a tone-mapped PNG is written beside it
-    #[arg(short, long, value_name = "FILE", default_value = "croupier.exr", value_parser = exr_path)]
-    output: PathBuf,
+    /// EXR file of the picture; a tone-mapped PNG is written beside it. With --part a .crpart file
+    /// [default: croupier.exr, or part-K-of-N.crpart]
+    #[arg(short, long, value_name = "FILE", value_parser = picture_path)]
+    output: Option<PathBuf>,
+    /// Render part K of N of the picture into one file, for `merge`: with --spp a share of its samples, with --seconds or
+    /// --rays so much for each part. Parts learn apart from each other
+    #[arg(long, value_name = "K/N", value_parser = str::parse::<Part>, conflicts_with_all = ["denoise", "false_color"])]
+    part: Option<Part>,
     #[command(flatten)]
     settings: SettingsFlags,
     #[command(flatten)]
@@ -73,6 +84,7 @@ impl Flags {
     fn options(&self) -> Result<RenderOptions, Box<dyn Error>> {
         let mut options = RenderOptions {
             target: self.until.target(),
+            part: self.part,
             threads: self.threads.into(),
             denoise: self.denoise,
             calibrate: self.stats,
@@ -80,9 +92,27 @@ impl Flags {
         };
         self.cache.apply(&mut options)?;
         self.checkpoint.apply(&mut options);
+        // a part has all that was learned
+        options.save_cache |= self.part.is_some() && options.settings.strategy.space() == Some(Space::Scene);
         // Said before the scene is loaded.
         check(&options)?;
         Ok(options)
+    }
+}
+
+impl Flags {
+    /// File of the picture or of the part.
+    fn output(&self) -> PathBuf {
+        let output = self.output.clone().unwrap_or_else(|| match self.part {
+            None => "croupier.exr".into(),
+            Some(part) => format!("part-{}-of-{}.crpart", part.number(), part.of()).into(),
+        });
+        let text = match (self.part, is_part(&output)) {
+            (None, true) => "--output FILE.crpart needs --part K/N",
+            (Some(_), false) => "--part needs an --output whose name ends in .crpart",
+            _ => return output,
+        };
+        clap::Error::raw(ErrorKind::ArgumentConflict, format!("{text}\n")).exit()
     }
 }
 
@@ -101,7 +131,8 @@ struct Report<'a> {
     seed: u64,
     stopped_early: bool,
     output: &'a Path,
-    png: &'a Path,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    png: Option<&'a Path>,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     false_color: &'a [PathBuf],
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -117,12 +148,16 @@ struct Report<'a> {
 /// Runs the command.
 pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Result<ExitCode, Box<dyn Error>> {
     let checkpoint = flags.checkpoint.output();
-    let outputs = Outputs::new(&flags.output, flags.cache.cache_out.as_deref(), checkpoint, flags.false_color);
+    let (output, cache_out) = (flags.output(), flags.cache.cache_out.as_deref());
+    let outputs = match flags.part {
+        None => Outputs::new(&output, cache_out, checkpoint, flags.false_color),
+        Some(_) => Outputs::part(&output, cache_out, checkpoint),
+    };
     // Said now, not after an hour of rendering.
     outputs.check()?;
     let mut options = flags.options()?;
     // the first picture that anyone sees
-    options.denoise |= path.is_none();
+    options.denoise |= path.is_none() && flags.part.is_none();
     let scene::Opened { bytes, mut notes, mut files, exposure } = scene::open(path, &flags.scene)?;
     files.extend(flags.cache.cache_in.clone());
     outputs.spare(&files, flags.checkpoint.input())?;
@@ -151,17 +186,26 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Result<ExitCode, Box<dy
         ))?;
     }
     let watch = Rendering::start(options.target);
-    let result = render_scene(validated, &options, &watch).map_err(|e| {
+    let failed = |e: RenderError| {
         let about_file = flags.cache.about(&e).or_else(|| flags.checkpoint.about(&e));
         about_file.unwrap_or_else(|| about(path)(&e))
-    })?;
+    };
+    let exposure = flags.exposure.unwrap_or(exposure);
+    if let Some(part) = flags.part {
+        let (rendered, _) = render_part(validated, &options, &watch).map_err(failed)?;
+        drop(watch);
+        let stops = if let Exposure::Stops(stops) = exposure { Some(stops) } else { None };
+        let write = |file: &Path| part::write(file, &validated, &settings, part, &rendered, stops);
+        let written = outputs.write_part(write, rendered.cache.as_deref());
+        return report_part(part, &rendered, &written, &notes, flags.json, &output);
+    }
+    let result = render_scene(validated, &options, &watch).map_err(failed)?;
     drop(watch);
     let RenderResult { picture, stats, statistics, plan, cache, stopped_early, checkpoint_error } = &result;
     if let Some([x, y]) = stats.first_non_finite {
         let count = stats.counters.get("non_finite").unwrap_or(&1);
         notes.add(path, format!("{count} contributions were not finite and left out, the first in pixel ({x}, {y})"));
     }
-    let exposure = flags.exposure.unwrap_or(exposure);
     let image = if options.denoise { "denoised" } else { "" };
     let mut written = outputs.write(picture, cache.as_deref(), image, exposure);
     if checkpoint_error.is_none() {
@@ -178,7 +222,7 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Result<ExitCode, Box<dy
         seed: options.settings.seed,
         stopped_early: *stopped_early,
         output: outputs.exr,
-        png: &outputs.png,
+        png: outputs.png.as_deref(),
         false_color: &outputs.false_color,
         cache_out: outputs.cache,
         checkpoint,
@@ -197,11 +241,77 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Result<ExitCode, Box<dy
     if let Some(e) = checkpoint_error {
         return Err(e.clone().into());
     }
-    let status = signals::exit_status().filter(|_| *stopped_early);
-    if let Some(signal) = signals::received().filter(|_| *stopped_early) {
+    Ok(exit_status(*stopped_early))
+}
+
+/// Exit status of a render, and a note if a signal ended it.
+fn exit_status(stopped_early: bool) -> ExitCode {
+    if let Some(signal) = signals::received().filter(|_| stopped_early) {
         note(&format!("{} ended the render: the picture is partial", signals::name(signal)));
     }
-    Ok(status.map_or(ExitCode::SUCCESS, ExitCode::from))
+    signals::exit_status().filter(|_| stopped_early).map_or(ExitCode::SUCCESS, ExitCode::from)
+}
+
+/// Figures of a part of a picture.
+#[derive(Serialize)]
+struct PartReport<'a> {
+    part: u32,
+    of: u32,
+    /// Number of the first camera sample of each pixel, and samples per pixel.
+    first_sample: u32,
+    spp: u32,
+    rays: u64,
+    seconds: f64,
+    stopped_early: bool,
+    #[serde(flatten)]
+    notes: &'a Notes,
+    output: &'a Path,
+    /// Complete files.
+    written: &'a [PathBuf],
+}
+
+/// Says what has become of a part.
+fn report_part(
+    part: Part,
+    r: &Rendered,
+    written: &Written,
+    notes: &Notes,
+    json: bool,
+    output: &Path,
+) -> Result<ExitCode, Box<dyn Error>> {
+    let (number, of, spp, seconds) = (part.number(), part.of(), r.spp, r.seconds);
+    let (rays, stopped_early, files) = (r.counters.rays(), r.stopped_early, &written.files);
+    let first_sample = r.first_sample;
+    if json {
+        let report = PartReport {
+            part: number,
+            of,
+            first_sample,
+            spp,
+            rays,
+            seconds,
+            stopped_early,
+            notes,
+            output,
+            written: files,
+        };
+        say_json(&report)?;
+    } else {
+        let partial = if stopped_early { "partial: " } else { "" };
+        let millions = rays as f64 * 1e-6;
+        say(&format!(
+            "{partial}part {number} of {of}: {spp} samples per pixel from {first_sample} on, {millions:.1} million rays in {seconds:.1} s"
+        ))?;
+        let names: Vec<_> = files.iter().map(|p| text::path(p)).collect();
+        say(&format!("wrote {}", names.join(", ")))?;
+    }
+    if let Some(e) = &written.error {
+        return Err(e.to_string().into());
+    }
+    if let Some(e) = &r.checkpoint_error {
+        return Err(e.clone().into());
+    }
+    Ok(exit_status(stopped_early))
 }
 
 /// Note that paths end earlier than the scene asks for, if no flag asked for it.

@@ -1,11 +1,24 @@
 //! Values of flags that are no settings of the core.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The name of an EXR file.
 pub(crate) fn exr_path(text: &str) -> Result<PathBuf, String> {
     path_ending_in("exr", text)
 }
+
+/// The name of an EXR file, or of a part of a picture.
+pub(crate) fn picture_path(text: &str) -> Result<PathBuf, String> {
+    exr_path(text).or_else(|e| path_ending_in(PART, text).map_err(|_| format!("{e}, with --part in .{PART}")))
+}
+
+/// Whether this is the name of a part of a picture.
+pub(crate) fn is_part(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(PART))
+}
+
+/// How names of parts of pictures end.
+const PART: &str = "crpart";
 
 /// The name of a baked scene.
 pub(crate) fn crp_path(text: &str) -> Result<PathBuf, String> {

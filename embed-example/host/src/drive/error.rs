@@ -1,5 +1,6 @@
 //! Errors of a render.
 
+use super::part::PartError;
 use crate::checkpoint::CheckpointError;
 use crate::text;
 use croupier::unstable::learn::cache::CacheError;
@@ -26,6 +27,10 @@ pub enum DriveError {
     Resumed(&'static str),
     /// The checkpoint cannot be resumed.
     Checkpoint(CheckpointError),
+    /// There is no such part of the picture.
+    Part(PartError),
+    /// The checkpoint is of another part of the picture: numbers of the first sample per pixel of both.
+    OtherPart(u32, u32),
     /// No memory for a block of so many bytes.
     Memory(usize),
     /// The thread pool cannot start.
@@ -40,7 +45,7 @@ impl DriveError {
 
     /// Whether the error is about the checkpoint that was to be resumed.
     pub fn is_about_checkpoint(&self) -> bool {
-        matches!(self, Self::Checkpoint(_) | Self::Session(SessionError::Resume(_)))
+        matches!(self, Self::Checkpoint(_) | Self::OtherPart(..) | Self::Session(SessionError::Resume(_)))
     }
 
     /// Whether more memory for the cache would avoid the error.
@@ -66,6 +71,10 @@ impl fmt::Display for DriveError {
             }
             Self::Resumed(what) => write!(f, "a checkpoint has its own {what}: give one or the other"),
             Self::Checkpoint(e) => e.fmt(f),
+            Self::Part(e) => e.fmt(f),
+            Self::OtherPart(there, here) => {
+                write!(f, "the checkpoint is of another part: it begins with sample {there} of each pixel, not {here}")
+            }
             Self::Memory(bytes) => write!(f, "no memory for a block of {}", text::bytes(*bytes as u64)),
             Self::Threads(e) => write!(f, "cannot start threads: {e}"),
         }
@@ -84,5 +93,5 @@ macro_rules! from {
     )*};
 }
 from!(SceneError => Scene, SettingsError => Settings, SessionError => Session, ShardError => Shard, CacheError => Cache,
-      CheckpointError => Checkpoint,
+      CheckpointError => Checkpoint, PartError => Part,
       rayon::ThreadPoolBuildError => Threads);

@@ -54,6 +54,8 @@ pub struct Rendered {
     pub counters: Counters,
     /// Error estimate of the picture.
     pub error: ErrorEstimate,
+    /// Number of the first camera sample of each pixel: not 0 in parts of a picture ([`Part`](super::Part)).
+    pub first_sample: u32,
     /// Camera samples per pixel of the finished iterations.
     pub spp: u32,
     /// Wall time of rendering alone.
