@@ -273,9 +273,14 @@ function describe() {
 // --- what is asked for ---
 
 function setScene(scene, blob, about, gain = 1) {
-  Object.assign(state, { scene, blob, about, gain });
   // the scene's own view
-  preview.open(blob, { size: '16x16', rrs: 'classic' });
+  try {
+    preview.open(blob, { size: '16x16', rrs: 'classic' });
+  } catch (error) {
+    if (state.blob) openPreview();
+    throw error;
+  }
+  Object.assign(state, { scene, blob, about, gain });
   state.orbit = new Orbit(preview.scene.view());
   describe();
   open();
@@ -294,6 +299,10 @@ async function choose(scene) {
 async function openFile(file) {
   if (!file) return;
   try {
+    if (file.name.endsWith('.crp')) {
+      const blob = new Uint8Array(await file.arrayBuffer());
+      return setScene('obj', blob, `${file.name}: ${(blob.length / 1e6).toFixed(1)} MB, baked.`);
+    }
     const { blob, faces } = fromObj(composer, await file.text());
     setScene('obj', blob, `${file.name}: ${faces.toLocaleString('en')} triangles of clay.`);
   } catch (error) {

@@ -169,6 +169,8 @@ try {
   await drop(page, 'broken.obj', 'v 0 0 0\nf 1 2 3\n');
   await page.waitForSelector('#problem:not([hidden])', LONG);
   expect((await page.locator('#problem').textContent()).includes('line 2'), 'a broken file is refused by line');
+  await drop(page, 'broken.crp', 'nothing');
+  await page.waitForFunction(() => document.getElementById('problem').textContent.includes('no scene'), null, LONG);
   await drop(page, 'roof.obj', OBJ);
   await page.waitForFunction(() => document.documentElement.dataset.scene === 'obj', null, LONG);
   await begun(page);
