@@ -25,6 +25,7 @@ export function draw(svg, curves, target) {
   for (let d = x0; d <= x1; d++) {
     const at = x(10 ** d).toFixed(1);
     parts.push(`<line class="grid" x1="${at}" x2="${at}" y1="${TOP}" y2="${height - BOTTOM}"/>`);
+    if ((d - x0) % Math.ceil((x1 - x0) / 3)) continue;
     const anchor = d === x0 ? 'start' : d === x1 ? 'end' : 'middle';
     const label = `${+(10 ** d).toFixed(3)} s`;
     parts.push(`<text x="${at}" y="${height - 4}" text-anchor="${anchor}">${label}</text>`);

@@ -83,7 +83,7 @@ export class Crowd {
     const half = Math.sqrt(sum((r, w) => (w * (r.high - r.relMse)) ** 2));
     return {
       relMse, low: Math.max(0, relMse - half), high: relMse + half, spp, rays: sum((r) => r.rays),
-      seconds: Math.max(...all.map((r) => r.seconds)),
+      seconds: Math.max(...all.map((r) => r.seconds)), known: all.every((r) => r.known),
     };
   }
 }

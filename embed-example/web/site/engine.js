@@ -4,6 +4,8 @@ import { Picture, Scene } from './croupier.js';
 
 /** Most samples per pixel of an iteration: error, factors and statistics are renewed after each. */
 const LARGEST_ITERATION = 4;
+/** Samples per pixel from which on the error is known: the variance of a single sample is a guess. */
+const FEWEST_JUDGED = 4;
 
 /** An instance of the module with a scene and a picture of it. The clock is here, not in the module. */
 export class Engine {
@@ -68,7 +70,9 @@ export class Engine {
       } else {
         this.samples += this.iteration;
         this.phase = 'next';
-        this.result = { ...picture.numbers(), seconds: (this.elapsed + after - start) / 1000 };
+        const numbers = picture.numbers();
+        const seconds = (this.elapsed + after - start) / 1000;
+        this.result = { ...numbers, seconds, known: numbers.spp >= FEWEST_JUDGED };
         ended = true;
       }
       now = after;

@@ -209,12 +209,12 @@ const rate = (x) => (x >= 1e6 ? `${(x / 1e6).toFixed(1)} M` : `${Math.round(x / 
 const number = (x) => (x >= 1e-3 ? String(+x.toPrecision(3)) : x.toExponential(1).replace('e-', 'e\u2212'));
 
 function report(result) {
-  const known = result && result.spp >= 4;
+  const known = result?.known;
   $('spp').textContent = result ? +result.spp.toFixed(1) : '0';
   $('relmse').textContent = known ? number(result.relMse) : '–';
   $('interval').textContent = known
     ? `95 % between ${number(result.low)} and ${number(result.high)}, after ${short(result.seconds)}`
-    : 'measured from four samples per pixel on';
+    : crowd ? 'known from four samples per pixel of each worker on' : 'known from four samples per pixel on';
   $('remaining').textContent = known ? remaining(result) : '–';
   chart();
   Object.assign(document.documentElement.dataset, { spp: result?.spp ?? 0, relmse: known ? result.relMse : '' });
@@ -224,7 +224,7 @@ function report(result) {
 function remaining({ relMse, seconds }) {
   const left = seconds * relMse / state.target - seconds;
   if (left <= 0) {
-    const first = curves[state.rrs].find((p) => p.spp >= 4 && p.relMse <= state.target);
+    const first = curves[state.rrs].find((p) => p.known && p.relMse <= state.target);
     return `reached after ${short((first ?? { seconds }).seconds)}`;
   }
   return `in about ${short(left)}`;
@@ -232,7 +232,7 @@ function remaining({ relMse, seconds }) {
 
 function chart() {
   const known = Object.entries(curves).map(([rrs, points]) => ({
-    color: STRATEGIES[rrs][0], current: rrs === state.rrs, points: points.filter((p) => p.spp >= 4),
+    color: STRATEGIES[rrs][0], current: rrs === state.rrs, points: points.filter((p) => p.known),
   }));
   draw($('chart'), known, state.target);
 }
@@ -261,6 +261,7 @@ function describe() {
   $('about').textContent = state.about;
   $('strategy').textContent = STRATEGIES[state.rrs][1];
   $('factors').hidden = state.plane !== 'factors';
+  $('denoised').hidden = state.plane !== 'denoised';
   $('planes').querySelector('[data-plane=denoised]').disabled = !LEARNS(state.rrs);
   $('place').textContent = state.workers === 0
     ? 'Between frames, on the page’s own thread.'
@@ -272,9 +273,14 @@ function describe() {
 // --- what is asked for ---
 
 function setScene(scene, blob, about, gain = 1) {
-  Object.assign(state, { scene, blob, about, gain });
   // the scene's own view
-  preview.open(blob, { size: '16x16', rrs: 'classic' });
+  try {
+    preview.open(blob, { size: '16x16', rrs: 'classic' });
+  } catch (error) {
+    if (state.blob) openPreview();
+    throw error;
+  }
+  Object.assign(state, { scene, blob, about, gain });
   state.orbit = new Orbit(preview.scene.view());
   describe();
   open();
@@ -293,6 +299,10 @@ async function choose(scene) {
 async function openFile(file) {
   if (!file) return;
   try {
+    if (file.name.endsWith('.crp')) {
+      const blob = new Uint8Array(await file.arrayBuffer());
+      return setScene('obj', blob, `${file.name}: ${(blob.length / 1e6).toFixed(1)} MB, baked.`);
+    }
     const { blob, faces } = fromObj(composer, await file.text());
     setScene('obj', blob, `${file.name}: ${faces.toLocaleString('en')} triangles of clay.`);
   } catch (error) {

@@ -87,6 +87,8 @@ const context = await chromium.launchPersistentContext(profile, {
     '--disable-component-update', '--disable-sync',
   ],
 });
+// several workers, also where there are few processors
+await context.addInitScript(() => Object.defineProperty(navigator, 'hardwareConcurrency', { get: () => 4 }));
 const complaints = [];
 
 async function open(size) {
@@ -155,13 +157,20 @@ try {
   await page.locator('#places button').last().click();
   await begun(page);
   await rendered(page, 4);
+  expect(await page.locator('#places button').last().textContent() === '3 workers', 'there are three workers');
   expect((await look(page)).different > 0.2, 'workers render');
+  await page.waitForFunction(() => document.documentElement.dataset.relmse !== '', null, LONG);
+  const ofAll = Number(await page.evaluate(() => document.documentElement.dataset.relmse));
+  expect(ofAll > 0 && ofAll < 0.1, `their mean has an error like that of one picture: ${ofAll.toFixed(4)}`);
+  await page.screenshot({ path: join(shots, 'desktop-workers.png') });
   await page.locator('#places button').first().click();
   await begun(page);
 
   await drop(page, 'broken.obj', 'v 0 0 0\nf 1 2 3\n');
   await page.waitForSelector('#problem:not([hidden])', LONG);
   expect((await page.locator('#problem').textContent()).includes('line 2'), 'a broken file is refused by line');
+  await drop(page, 'broken.crp', 'nothing');
+  await page.waitForFunction(() => document.getElementById('problem').textContent.includes('no scene'), null, LONG);
   await drop(page, 'roof.obj', OBJ);
   await page.waitForFunction(() => document.documentElement.dataset.scene === 'obj', null, LONG);
   await begun(page);

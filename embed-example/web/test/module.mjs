@@ -58,6 +58,14 @@ while (!picture.finish(1000));
 const { relMse, spp } = picture.numbers();
 expect(spp === 4 && relMse > 0 && relMse < 10, `a composed scene renders, relMSE ${relMse.toFixed(3)}`);
 
+// means by samples
+core.reset();
+const [sum, more] = [core.take(32), core.take(32)];
+core.floats(sum, 8).set([1, 2, 3, 1, 0, 0, 0, 0]);
+core.floats(more, 8).set([5, 2, 7, 3, 4, 5, 6, 2]);
+core.exports.average(sum, more, 2);
+expect([...core.floats(sum, 8)].join() === '4,2,6,4,4,5,6,2', 'pictures are averaged by samples');
+
 // colours: those of `croupier render`, to one step; the ends and the middle of the scale of factors
 core.reset();
 const values = Float32Array.from({ length: 1024 }, (_, i) => (i / 400) ** 3);

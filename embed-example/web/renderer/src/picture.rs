@@ -9,9 +9,16 @@ use croupier::{Budget, Plan, Session, SessionBuilder, SessionState, Settings, Sh
 
 /// Effects of the kernels that are compiled in; other scenes are refused.
 pub(crate) type Kernels = Custom<{ SURFACES.with(LIGHTS).0 }>;
-const SURFACES: Effects =
-    Effects::DIFFUSE.with(Effects::ROUGH_CONDUCTOR).with(Effects::ROUGH_PLASTIC).with(Effects::SMOOTH_NORMALS);
-const LIGHTS: Effects = Effects::AREA_LIGHTS.with(Effects::ENVIRONMENT).with(Effects::DELTA_LIGHTS);
+const SURFACES: Effects = Effects::DIFFUSE
+    .with(Effects::CONDUCTOR)
+    .with(Effects::DIELECTRIC)
+    .with(Effects::ROUGH_CONDUCTOR)
+    .with(Effects::ROUGH_PLASTIC)
+    .with(Effects::SMOOTH_NORMALS)
+    .with(Effects::TEXTURES)
+    .with(Effects::MULTIPLE_SCATTERING);
+const LIGHTS: Effects =
+    Effects::AREA_LIGHTS.with(Effects::ENVIRONMENT).with(Effects::CONSTANT).with(Effects::DELTA_LIGHTS);
 
 /// Number of [`Picture::numbers`].
 pub(crate) const NUMBERS: usize = 12;
