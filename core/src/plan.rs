@@ -79,8 +79,10 @@ impl Plan {
     /// | with [`Settings::adaptive`] | 40.1 | |
     /// | with an estimate of the pixels, denoised (strategies that learn, [`Settings::adaptive`]) | 20 | |
     ///
-    /// So `ears` with albedo, normal and depth takes 156, at 1920 x 1080 another 2 for the denoiser's window of rows, and 12
-    /// for the 24 MiB of statistics, which are the same for any picture.
+    /// So `classic` takes 80 without auxiliary values, `ears` 156 with albedo, normal and depth, and 244 with the standard set
+    /// ([`AovSet::STANDARD`](crate::unstable::film::AovSet::STANDARD), 17 planes and the cost), which the program asks for. At
+    /// 1920 x 1080 another 2 come to those of `ears` for the denoiser's window of rows, and 12 for the 24 MiB of
+    /// statistics, which are the same for any picture.
     ///
     /// The rest does not grow: statistics of the scene ([`Learning::cache_bytes`](crate::unstable::learn::Learning) in all), 2112
     /// bytes a column for a denoised estimate, and in each shard 200 bytes per slot of [`Settings::ring`] and, if the

@@ -212,8 +212,9 @@ fn steps_need_no_more_stack_than_stated() {
     assert!(session.cache().unwrap().leaves() > 6 && session.film().pixels().all(|p| p.samples > 0));
 }
 
-/// Bytes per pixel at 1920x1080, blocks of the session and of all shards. Killed by: another plane, a slot for pixels
-/// that a shard does not have.
+/// Bytes per pixel at 1920x1080, blocks of the session and of all shards, as the documentation of
+/// [`Plan::bytes_per_pixel`] and README state them. Killed by: another plane, a slot for pixels that a shard does not
+/// have.
 #[test]
 fn memory_per_pixel_is_as_stated() {
     let bytes = blob(&cornell([8, 8]));
@@ -230,11 +231,11 @@ fn memory_per_pixel_is_as_stated() {
         assert!(all >= stated && all <= stated + fixed + 40_000.0 + 4000.0 * f64::from(s.shards), "{all}, {stated}");
         all / pixels
     };
+    let hits = AovSet::of(&[Aov::Albedo, Aov::Normal, Aov::Depth]);
     for shards in [1, 16] {
         let of = |strategy: &str, aovs: AovSet| {
             per_pixel(Settings { size: [1920, 1080], shards, aovs, ..settings(&bytes, strategy) })
         };
-        let hits = AovSet::of(&[Aov::Albedo, Aov::Normal, Aov::Depth]);
         let [classic, ears, all] = [of("classic", AovSet::NONE), of("ears", hits), of("ears", AovSet::STANDARD)];
         // without what a picture of one pixel takes: 24 MiB of statistics, rings and ledgers
         let bytes_of = |size| {
@@ -247,6 +248,14 @@ fn memory_per_pixel_is_as_stated() {
              with standard AOVs {all:.1} bytes"
         );
         assert!(classic < 82.0 && ears < 172.0 && grows < 160.0, "{classic}, {ears} and {grows}");
+        // and the set that the program asks for
+        assert!(all < 244.0 + 2.2 + 12.2 + 2.0, "{all}");
+    }
+    for (strategy, aovs, stated) in
+        [("classic", AovSet::NONE, 80.0), ("ears", hits, 156.0), ("ears", AovSet::STANDARD, 244.0)]
+    {
+        let s = Settings { size: [1920, 1080], aovs, ..settings(&bytes, strategy) };
+        assert_eq!(Plan::new(&s).unwrap().bytes_per_pixel().iter().sum::<f64>(), stated, "{strategy}");
     }
     // pictures of one row or column cost what their pixels do, besides the fixed part of each shard
     let fixed =

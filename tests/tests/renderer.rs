@@ -1,8 +1,11 @@
 //! The renderer that owns what it needs: stored in a struct, edited between frames, stepped by threads that stay.
 
+use croupier::unstable::bsdf::NoBsdf;
+use croupier::unstable::extension::{Extension, TextureSamples8};
 use croupier::unstable::profile::Full;
 use croupier::unstable::scene::blob::{Camera, Material};
-use croupier::{Budget, Scene, SessionError, Settings, StepResult};
+use croupier::unstable::simd::Vec3x8;
+use croupier::{Budget, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::renderer::{Keep, Renderer, RendererError};
 use croupier_tests::runner::{render, settings};
@@ -44,6 +47,55 @@ impl Viewport {
     fn film(&self) -> Vec<u8> {
         self.renderer.with_film(|film| film.pixels().flat_map(|p| bytemuck::bytes_of(&p).to_vec()).collect())
     }
+}
+
+/// A grey world, by textures of the host's own.
+#[derive(Clone, Copy)]
+struct Grey(f32);
+
+impl Extension for Grey {
+    type Bsdf = NoBsdf;
+    const TEXTURES: bool = true;
+
+    fn reflectance(&self, _at: &TextureSamples8, _reflectance: Vec3x8) -> Vec3x8 {
+        Vec3x8::splat(self.0, self.0, self.0)
+    }
+}
+
+/// A renderer with an extension, also after an edit, draws what a session with it draws. Killed by: steps, a build or an edit
+/// without the extension; a number of it that is lost.
+#[test]
+fn extensions_are_in_every_step() {
+    let bytes = blob(&everything([24, 16]));
+    let s = settings(&bytes, "ears");
+    let film = |r: &Renderer<Full, Grey>| -> Vec<u8> {
+        for _ in 0..2 {
+            r.begin_iteration(2);
+            while r.step(0, Budget { rays: 100 }).unwrap() == StepResult::More {}
+            r.end_iteration().unwrap();
+        }
+        r.with_film(|film| film.pixels().flat_map(|p| bytemuck::bytes_of(&p).to_vec()).collect())
+    };
+    let with = |grey| Renderer::<Full, Grey>::with_extension(bytes.clone(), &s, Grey(grey)).unwrap();
+    let r = with(0.5);
+    let first = film(&r);
+    let camera = r.with_scene(|scene| *scene.camera);
+    r.edit(Keep::Nothing, |scene| scene.camera(camera)).unwrap();
+    assert!(film(&r) == first, "after an edit");
+    assert!(film(&with(0.25)) != first, "another number");
+
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    let plan = Plan::new(&s.with_scene(&scene)).unwrap();
+    let [mut shared, mut block] = [plan.session(), plan.shard()].map(|l| AlignedBytes::zeroed(l.size));
+    let mut session = Session::builder(scene).extension(Grey(0.5)).build(&plan, shared.as_mut()).unwrap();
+    let mut shard = Shard::new(&plan, 0, block.as_mut()).unwrap();
+    for _ in 0..2 {
+        session.begin_iteration(2);
+        while shard.step(&session, Budget { rays: 1000 }) == StepResult::More {}
+        session.end_iteration([&shard]).unwrap();
+    }
+    let wanted: Vec<u8> = session.film().pixels().flat_map(|p| bytemuck::bytes_of(&p).to_vec()).collect();
+    assert!(first == wanted, "a session with it");
 }
 
 /// After any edits, without statistics kept, the picture is the one that a new session makes of the same scene. Killed

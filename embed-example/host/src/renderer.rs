@@ -26,6 +26,9 @@
 
 use crate::blob::AlignedBytes;
 use croupier::unstable::Iteration;
+use croupier::unstable::accel::WideBvh;
+use croupier::unstable::extension::Extension;
+use croupier::unstable::light::PowerSelector;
 use croupier::unstable::profile::{Full, Profile};
 use croupier::{
     Budget, Counters, EditError, EditableScene, Film, Plan, Scene, SceneEdit, SceneError, Session, SessionBuilder,
@@ -130,15 +133,20 @@ struct Shared {
 /// Closures given to [`Self::edit`], [`Self::with_film`], [`Self::with_scene`] and [`Self::with_unfinished`] run while the
 /// renderer is locked: one that calls the same renderer may wait for itself for ever. They read or change what they are
 /// given, and return what is needed afterwards.
-pub struct Renderer<P: Profile = Full> {
+///
+/// # Extensions
+/// What the host computes in place of the core ([`Extension`]) is a value that [`Self::with_extension`] takes and that each
+/// step copies: a unit struct, or one with plain numbers or `&'static` references.
+pub struct Renderer<P: Profile = Full, X: Extension + Copy = ()> {
     plan: Plan,
+    extension: X,
     shared: RwLock<Shared>,
     /// One for each unit of parallel work; `None` while an iteration ends.
     shards: Vec<Mutex<Option<OwnedShard>>>,
     profile: PhantomData<fn() -> P>,
 }
 
-impl<P: Profile> fmt::Debug for Renderer<P> {
+impl<P: Profile, X: Extension + Copy> fmt::Debug for Renderer<P, X> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Renderer").field("settings", self.plan.settings()).finish_non_exhaustive()
     }
@@ -158,9 +166,11 @@ fn own<T>(lock: &Mutex<T>) -> MutexGuard<'_, T> {
     lock.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Kernels of `P`, the scene's own tree, lights by power.
-fn builder<P: Profile>(scene: Scene<'_>) -> SessionBuilder<'_, P> {
-    Session::builder(scene).profile::<P>()
+/// The parts of a session: kernels of `P`, the scene's own tree, lights by power, `X`.
+type Builder<'s, P, X> = SessionBuilder<'s, P, WideBvh<'s>, PowerSelector<'s>, X>;
+
+fn builder<P: Profile, X: Extension>(scene: Scene<'_>, extension: X) -> Builder<'_, P, X> {
+    Session::builder(scene).profile::<P>().extension(extension)
 }
 
 impl<P: Profile> Renderer<P> {
@@ -170,13 +180,23 @@ impl<P: Profile> Renderer<P> {
     /// A blob that is not valid or calls for effects outside the profile, settings that cannot be used, not enough
     /// memory.
     pub fn new(blob: AlignedBytes, settings: &Settings) -> Result<Self, RendererError> {
+        Self::with_extension(blob, settings, ())
+    }
+}
+
+impl<P: Profile, X: Extension + Copy> Renderer<P, X> {
+    /// As [`Renderer::new`], with ray sources, points, textures, a scattering model or factors of roulette of the host's own.
+    ///
+    /// # Errors
+    /// As of [`Renderer::new`].
+    pub fn with_extension(blob: AlignedBytes, settings: &Settings, extension: X) -> Result<Self, RendererError> {
         let scene = EditableScene::new(blob)?;
         let plan = Plan::new(&settings.with_scene(&scene.scene()))?;
         let shards = plan.settings().shards;
         let needed = (0..shards).fold(plan.session().size, |sum, shard| sum.saturating_add(plan.shard_of(shard).size));
         let block = |size| AlignedBytes::try_zeroed(size).ok_or(RendererError::Memory { needed });
         let state = OwnedState::try_new(MutBorrow::new(block(plan.session().size)?), |owner| {
-            let session = builder::<P>(scene.scene()).build(&plan, owner.borrow_mut().as_mut());
+            let session = builder::<P, X>(scene.scene(), extension).build(&plan, owner.borrow_mut().as_mut());
             session.map(Session::into_state)
         })?;
         let shard = |index| {
@@ -186,6 +206,7 @@ impl<P: Profile> Renderer<P> {
         };
         Ok(Self {
             plan,
+            extension,
             shared: RwLock::new(Shared { scene, state, shards: Vec::with_capacity(shards as usize) }),
             shards: (0..shards).map(shard).collect::<Result<_, RendererError>>()?,
             profile: PhantomData,
@@ -198,8 +219,8 @@ impl<P: Profile> Renderer<P> {
     }
 
     /// Changes the scene and begins a new picture of it; an iteration that is under way is abandoned. What the edits of
-    /// `change` take does not depend on the size of the scene, see [`EditableScene::edit`]. `change` must not call this
-    /// renderer ([Deadlocks](Self#deadlocks)).
+    /// `change` take does not depend on the size of the scene, but for moves of instances, see [`EditableScene::edit`] and
+    /// [`SceneEdit::transform`]. `change` must not call this renderer ([Deadlocks](Self#deadlocks)).
     ///
     /// # Errors
     /// The error of `change`; the edits that it made before stay.
@@ -210,7 +231,7 @@ impl<P: Profile> Renderer<P> {
     ) -> Result<T, RendererError> {
         let Shared { scene, state, .. } = &mut *write(&self.shared);
         let changed = change(&mut scene.edit());
-        let to = builder::<P>(scene.scene());
+        let to = builder::<P, X>(scene.scene(), self.extension);
         state.with_dependent_mut(|_, state| state.change_scene(&to, keep == Keep::Statistics))?;
         Ok(changed?)
     }
@@ -228,7 +249,7 @@ impl<P: Profile> Renderer<P> {
         let shards = self.plan.settings().shards;
         let slot = self.shards.get(shard as usize).ok_or(ShardError::Index { index: shard, shards })?;
         let shared = read(&self.shared);
-        let view = builder::<P>(shared.scene.scene()).view(shared.state.borrow_dependent())?;
+        let view = builder::<P, X>(shared.scene.scene(), self.extension).view(shared.state.borrow_dependent())?;
         let mut own = own(slot);
         // it is away only while an iteration ends, which the lock above excludes
         let step = |owned: &mut OwnedShard| owned.with_dependent_mut(|_, shard| shard.step(&view, budget));
@@ -285,7 +306,10 @@ impl<P: Profile> Renderer<P> {
     /// not call this renderer ([Deadlocks](Self#deadlocks)).
     pub fn with_unfinished(&self, shard: u32, show: impl FnMut(usize, [f64; 3], u32)) {
         let shared = read(&self.shared);
-        let Ok(view) = builder::<P>(shared.scene.scene()).view(shared.state.borrow_dependent()) else { return };
+        let Ok(view) = builder::<P, X>(shared.scene.scene(), self.extension).view(shared.state.borrow_dependent())
+        else {
+            return;
+        };
         if let Some(own) = self.shards.get(shard as usize).map(own)
             && let Some(owned) = own.as_ref().filter(|s| s.borrow_dependent().has_joined(&view))
         {
