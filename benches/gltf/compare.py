@@ -8,7 +8,7 @@
 FOLDER gets scenes and pictures. bpy is Blender as a module, and mitsuba is only asked to read EXR. Cycles renders with a
 box filter, without clamping, filter glossy, denoising or limits that shorten paths. For each scene it prints the ratio
 croupier / Cycles of the picture's mean, and of blocks that are not nearly black: lowest, quartiles, highest, and what noise
-of both would make of ratios that are 1.
+of both would make of ratios that are 1. With all scenes the table goes to benches/results/gltf.md as well.
 
 Scenes, all lit by an emissive square: `instances` has diffuse meshes in 40 nested, scaled, sheared and mirrored nodes;
 `metal_rough` a base colour and a metallic-roughness texture; `normals` a normal map besides; `mask` leaves of alphaMode MASK.
@@ -25,6 +25,8 @@ import struct
 import subprocess
 import sys
 import zlib
+from datetime import datetime, timezone
+from importlib.metadata import version
 from pathlib import Path
 
 SIZE = (320, 240)
@@ -239,11 +241,41 @@ def blocks(image):
     return image[:rows * BLOCK, :columns * BLOCK].reshape(rows, BLOCK, columns, BLOCK, 3).mean(axis=(1, 3, 4))
 
 
+def write(rows, command):
+    """The table with its circumstances, as the other benchmarks write theirs."""
+    root = Path(__file__).resolve().parents[2]
+
+    def said(*words):
+        return subprocess.run(words, cwd=root, check=True, capture_output=True, text=True).stdout.strip()
+
+    commit = said("git", "rev-parse", "--short=12", "HEAD")
+    changed = " with changes" if said("git", "status", "--porcelain", "--untracked-files=no") else ""
+    models = [line.split(":", 1)[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")]
+    header = {
+        "date": datetime.now(timezone.utc).date().isoformat(),
+        "commit": commit + changed,
+        "command": command,
+        "machine": f"{models[0] if models else 'unknown'}, {len(models)} cores",
+        "pictures": f"{SIZE[0]} x {SIZE[1]} pixels, two of {SAMPLES} samples per pixel by each program",
+        "blocks": f"{BLOCK} x {BLOCK} pixels, those that are not nearly black",
+        "ratios": "croupier over Cycles",
+        **{name: version(name) for name in ("bpy", "mitsuba", "numpy")},
+    }
+    titles = ["scene", "mean", "lowest block", "first quartile", "median", "third quartile", "highest block", "noise", "blocks"]
+    lines = ["# Results of `gltf`", "", "Generated, do not edit; explained in [README.md](../README.md).", ""]
+    lines += [f"- {key}: {value}" for key, value in header.items()] + ["", "## Blocks", ""]
+    lines += ["| " + " | ".join(row) + " |" for row in [titles, ["---"] * len(titles), *rows]]
+    path = root / "benches/results/gltf.md"
+    path.write_text("\n".join(lines).replace("|  ", "| ").replace("| ---", "|---").replace("--- |", "---|") + "\n")
+    print(f"wrote {path.relative_to(root)}")
+
+
 def main():
     import numpy as np
 
     program, folder = sys.argv[1], Path(sys.argv[2] if len(sys.argv) > 2 else "target/gltf")
     folder.mkdir(parents=True, exist_ok=True)
+    table = []
     for name in sys.argv[3:] or SCENES:
         scene = folder / f"{name}.gltf"
         SCENES[name]().write(scene)
@@ -266,6 +298,10 @@ def main():
         low, q1, middle, q3, high = np.quantile(ratio, [0, 0.25, 0.5, 0.75, 1])
         print(f"{name:12} mean {a.mean() / b.mean():.4f}  blocks {low:.4f} [{q1:.4f} {middle:.4f} {q3:.4f}] {high:.4f}"
               f"  noise {noise:.4f}  ({lit.sum()} of {lit.size} blocks)", flush=True)
+        numbers = [a.mean() / b.mean(), low, q1, middle, q3, high, noise]
+        table.append([name, *(f"{x:.4f}" for x in numbers), f"{lit.sum()} of {lit.size}"])
+    if not sys.argv[3:]:
+        write(table, "python benches/gltf/compare.py target/release/croupier")
 
 
 if __name__ == "__main__":

@@ -178,3 +178,38 @@ fn mtl_keys_become_fields() {
         "the mapping of before"
     );
 }
+
+/// `map_d`, alone and with colours. Killed by: an alpha that is the colour's, or the mean; glass in place of holes; a red that
+/// counts beside an alpha; a texture for every material; `d` that is multiplied; texels of one size read with another's.
+#[test]
+fn mtl_opacity_maps_cut_holes() {
+    let grey = |mask: &str| format!("Kd 0.5 0.25 1\nd 0\nillum 4\nmap_d {mask}");
+    for (mask, alpha) in [("a.png", 40), ("-imfchan m b.png", 50)] {
+        let scene = load_mtl(&grey(mask));
+        let m = &scene.materials[0];
+        let Model::Diffuse { reflectance: Reflectance::Texture(t) } = m.model else { panic!("{m:?}") };
+        let texture = &scene.textures[t as usize];
+        assert!(m.cutout);
+        assert_eq!((&texture.texels[..], texture.encoding), (&[[188, 137, 255, alpha]][..], Encoding::Srgb));
+    }
+    let scene = load_mtl("map_Kd b.png\nmap_d a.png\nnewmtl n\nmap_Kd b.png\nmap_d a.png\nPc 1");
+    let Model::Diffuse { reflectance: Reflectance::Texture(t) } = scene.materials[0].model else { panic!() };
+    assert_eq!(scene.textures[t as usize].texels, [[50, 60, 70, 40]]);
+    let scene = load_mtl("map_Kd b.png\nmap_d a.png\nPc 1\nd 0.25");
+    let Model::Principled(p) = scene.materials[0].model else { panic!() };
+    assert!(scene.materials[0].cutout && p.opacity == 1.0 && p.transmission == 0.0);
+    assert_eq!(scene.textures[p.base_texture.unwrap().texture as usize].texels, [[50, 60, 70, 40]]);
+    // a hole map of another size: four columns for one of the colour
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\nusemtl n\nf 1 2 3\n");
+    write("a.mtl", "newmtl m\nmap_Kd b.png\nmap_d wide.png\nnewmtl n\nmap_Kd b.png\nmap_d wide.png\n");
+    write_png(&folder.path().join("b.png"), [50, 60, 70, 255]);
+    let mut encoder = png::Encoder::new(fs::File::create(folder.path().join("wide.png")).unwrap(), 4, 1);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.write_header().unwrap().write_image_data(&[0, 100, 200, 255]).unwrap();
+    let (scene, report) = load(&folder.path().join("a.obj")).unwrap();
+    let texture = scene.textures.last().unwrap();
+    assert_eq!((texture.width, texture.height, scene.textures.len()), (4, 1, 3), "{:?}", report.notes);
+    assert_eq!(texture.texels, [0, 100, 200, 255].map(|a| [50, 60, 70, a]));
+}

@@ -1,4 +1,5 @@
-// Estimated error over time, both axes logarithmic: one curve for each strategy, the present one with its way to the target.
+// Estimated error over time, both axes logarithmic: one curve for each strategy, the present one with its way to the
+// target.
 
 const [LEFT, RIGHT, TOP, BOTTOM] = [34, 4, 6, 18];
 
@@ -25,7 +26,8 @@ export function draw(svg, curves, target) {
     const at = x(10 ** d).toFixed(1);
     parts.push(`<line class="grid" x1="${at}" x2="${at}" y1="${TOP}" y2="${height - BOTTOM}"/>`);
     const anchor = d === x0 ? 'start' : d === x1 ? 'end' : 'middle';
-    parts.push(`<text x="${at}" y="${height - 4}" text-anchor="${anchor}">${d < 0 ? +(10 ** d).toFixed(3) : 10 ** d} s</text>`);
+    const label = `${+(10 ** d).toFixed(3)} s`;
+    parts.push(`<text x="${at}" y="${height - 4}" text-anchor="${anchor}">${label}</text>`);
   }
   for (let d = y0; d <= y1; d++) {
     const at = y(10 ** d).toFixed(1);

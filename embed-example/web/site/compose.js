@@ -1,5 +1,5 @@
-// Scenes from triangles: the composer, a module of its own, makes the blob with its tree. Pages that show baked scenes only
-// need neither.
+// Scenes from triangles: the composer, a module of its own, makes the blob with its tree. Pages that show baked scenes
+// only need neither.
 
 import { Memory } from './croupier.js';
 

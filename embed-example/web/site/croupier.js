@@ -1,4 +1,5 @@
-// The renderer's module as objects: memory, scenes, pictures. Nothing here knows the page; workers and tests use it as well.
+// The renderer's module as objects: memory, scenes, pictures. Nothing here knows the page; workers and tests use it as
+// well.
 //
 // Modules have no allocator: this file hands out their memory from `__heap_base` upwards.
 
@@ -164,7 +165,7 @@ export class Painter {
   }
 }
 
-/** 64-bit FNV-1a over the bytes of the mean R, G and B of every pixel, as all examples of embedding hash their picture. */
+/** 64-bit FNV-1a over the bytes of the mean R, G and B of every pixel, as all examples of embedding hash pictures. */
 export function hash(shown) {
   const bytes = new Uint8Array(shown.buffer, shown.byteOffset, shown.byteLength);
   // two 32-bit halves: BigInt is slow
@@ -183,7 +184,8 @@ export function hash(shown) {
 /** Settings and iterations of the picture that every host renders; its hash is in embed-example/hashes.txt. */
 export const REFERENCE = {
   settings: {
-    rrs: 'ears', ring: 64, ledger: 256, 'cache-bytes': 65536, 'split-budget': 64, 'pixel-estimator': 'blocks', shards: 1,
+    rrs: 'ears', ring: 64, ledger: 256, 'cache-bytes': 65536, 'split-budget': 64, 'pixel-estimator': 'blocks',
+    shards: 1,
   },
   iterations: [2, 2, 4],
 };

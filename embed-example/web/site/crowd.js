@@ -1,5 +1,6 @@
-// Workers that render the same view, each with a seed of its own. Sessions do not share memory, so they share nothing that
-// is learned either; pictures of different seeds are independent, and their mean by samples is a picture of all of them.
+// Workers that render the same view, each with a seed of its own. Sessions do not share memory, so they share nothing
+// that is learned either; pictures of different seeds are independent, and their mean by samples is a picture of all
+// of them.
 
 export class Crowd {
   /** @param {(text: string) => void} problem called with messages of workers */
@@ -68,8 +69,8 @@ export class Crowd {
   }
 
   /**
-   * Result of the averaged picture, null if nothing is new: the error of a mean of independent pictures with shares w is
-   * the sum of w^2 times theirs, and the interval's half widths add up as squares of w^2 times theirs.
+   * Result of the averaged picture, null if nothing is new: the error of a mean of independent pictures with shares w
+   * is the sum of w^2 times theirs, and the interval's half widths add up as squares of w^2 times theirs.
    */
   takeResult() {
     const all = this.results.filter(Boolean);

@@ -3,7 +3,7 @@
 import { Picture, Scene } from './croupier.js';
 
 /** Most samples per pixel of an iteration: error, factors and statistics are renewed after each. */
-const LARGEST_ITERATION = 8;
+const LARGEST_ITERATION = 4;
 
 /** An instance of the module with a scene and a picture of it. The clock is here, not in the module. */
 export class Engine {

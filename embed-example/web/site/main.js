@@ -1,4 +1,5 @@
-// The page: canvas, controls, and where rays are traced. Frames and workers share `Engine`; `Crowd` speaks to the workers.
+// The page: canvas, controls, and where rays are traced. Frames and workers share `Engine`; `Crowd` speaks to the
+// workers.
 
 import { Core, PLANE, Painter, renderReference } from './croupier.js';
 import { Engine } from './engine.js';
@@ -38,7 +39,7 @@ let module, preview, fine, painter, crowd, composer;
 let curves = {};
 let previewPixels = 9000;
 
-// --- what is rendered -------------------------------------------------------------------------------------------------
+// --- what is rendered ---
 
 function plane() {
   if (state.plane === 'factors') return PLANE.factor1 + state.depth - 1;
@@ -46,7 +47,8 @@ function plane() {
 }
 
 function settings(size, seed, more) {
-  return { size: size.join('x'), rrs: state.rrs, seed, aovs: 'albedo,normal,factors', 'cache-bytes': 12 << 20, ...more };
+  const own = { size: size.join('x'), rrs: state.rrs, seed };
+  return { ...own, aovs: 'albedo,normal,factors', 'cache-bytes': 12 << 20, ...more };
 }
 
 /** The picture's size for the stage: the same shape, at most so many pixels. */
@@ -190,7 +192,7 @@ function put(canvas, image) {
   canvas.getContext('2d').putImageData(image, 0, 0);
 }
 
-// --- what is said -----------------------------------------------------------------------------------------------------
+// --- what is said ---
 
 let lastFrame = 0, frameTime = 16.7, metered = 0;
 
@@ -267,7 +269,7 @@ function describe() {
       : 'Workers render the same view with seeds of their own and learn alone; the page averages their pictures.';
 }
 
-// --- what is asked for ------------------------------------------------------------------------------------------------
+// --- what is asked for ---
 
 function setScene(scene, blob, about, gain = 1) {
   Object.assign(state, { scene, blob, about, gain });
@@ -347,6 +349,7 @@ function listen() {
   const hide = () => $('hint').classList.add('gone');
   attach($('stage'), () => state.orbit, () => { hide(); turned(); });
   $('stage').addEventListener('dblclick', () => { state.orbit?.home(); turned(); });
+  if (matchMedia('(pointer: coarse)').matches) $('hint').textContent = 'Drag to orbit, pinch to zoom.';
   setTimeout(hide, 9000);
 
   addEventListener('dragover', (e) => { e.preventDefault(); document.body.classList.add('dragging'); });
@@ -373,7 +376,7 @@ function listen() {
     const same = found === expected;
     $('checked').className = `note ${same ? 'same' : 'different'}`;
     $('checked').textContent = same
-      ? `A picture of 64 × 64 pixels after three iterations of EARS has the hash ${found}, as on x86-64 and every other host.`
+      ? `A picture of 64 × 64 pixels after three iterations of EARS has the hash ${found} here, as on every host.`
       : `Hash ${found}; the native library has ${expected}.`;
   });
 }

@@ -58,7 +58,7 @@ export class Orbit {
   }
 }
 
-/** Listens to mouse, touch and wheel on an element; `moved` is called after each change of the orbit that `current` gives. */
+/** Listens to mouse, touch and wheel on an element; calls `moved` after each change of the orbit of `current`. */
 export function attach(element, current, moved) {
   const pointers = new Map();
   const spread = () => {

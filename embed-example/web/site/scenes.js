@@ -111,8 +111,8 @@ export function knot(composer) {
   let lowest = Infinity;
   for (let i = 0; i < 4000; i++) lowest = Math.min(lowest, tube(i / 4000, (i * 0.618) % 1)[1]);
   surface(mesh, copper(0.16), (u, v) => tube(u, v).map((x, k) => (k === 1 ? x - lowest : x)), 320, 28);
-  ball(mesh, glazed([0.03, 0.24, 0.27], 0.08), [-1.15, 0.34, 0.75], 0.34);
-  ball(mesh, gold(0.09), [1.12, 0.26, 0.85], 0.26);
+  ball(mesh, glazed([0.03, 0.24, 0.27], 0.08), [-1.02, 0.32, 0.85], 0.32);
+  ball(mesh, gold(0.09), [1.08, 0.26, 0.85], 0.26);
   ball(mesh, glazed([0.6, 0.1, 0.06], 0.08), [0.42, 0.16, 1.3], 0.16);
   ball(mesh, glazed([0.72, 0.66, 0.55], 0.08), [-0.45, 0.12, 1.42], 0.12);
   return compose(composer, mesh, VIEW);

@@ -1,7 +1,7 @@
 //! Files that are wrong, and what they are told.
 
-use super::document::{Document, FLOAT, U8, U16};
 use super::try_load;
+use croupier_tests::gltf::{Document, FLOAT, U8, U16};
 use croupier_tests::stats::SplitMix;
 use serde_json::{Value, json};
 
@@ -15,7 +15,7 @@ fn everything() -> Document {
     let position = document.accessor(U16, 3, true, &[0.0, 0.0, 0.0, 9e3, 0.0, 0.0, 0.0, 9e3, 1.0, 9e3, 9e3, 9e3]);
     let indices = document.accessor(U8, 1, false, &[0.0, 1.0, 2.0, 2.0, 1.0, 3.0]);
     let sparse_indices = document.view(&[3]);
-    let sparse_values = document.view(&super::document::encode(U16, &[1.0, 2.0, 3.0]));
+    let sparse_values = document.view(&croupier_tests::gltf::encode(U16, &[1.0, 2.0, 3.0]));
     document.json["accessors"][position]["sparse"] = json!({"count": 1,
         "indices": {"bufferView": sparse_indices, "componentType": U8}, "values": {"bufferView": sparse_values}});
     let joints = document.accessor(U8, 4, false, &[0.0; 16]);

@@ -1,9 +1,9 @@
 //! Accessors and primitives.
 
-use super::document::{Document, FLOAT, I8, I16, U8, U16, U32, base64};
 use super::{corners, loaded, positions, rounded, try_load};
 use croupier_host::description::*;
 use croupier_host::load::{LoadOptions, load_with};
+use croupier_tests::gltf::{Document, FLOAT, I8, I16, U8, U16, U32, base64};
 use croupier_tests::loading::plain_look;
 use serde_json::{Value, json};
 
@@ -107,8 +107,8 @@ fn sparse_accessors() {
             let mut document = Document::default();
             let position = document.floats(&POINTS[..3]);
             // unordered, which is not allowed but harmless
-            let indices = document.view(&super::document::encode(index_type, &[2.0, 1.0]));
-            let values = document.view(&super::document::encode(FLOAT, &[0.0, 7.0, 0.0, 5.0, 0.0, 0.0]));
+            let indices = document.view(&croupier_tests::gltf::encode(index_type, &[2.0, 1.0]));
+            let values = document.view(&croupier_tests::gltf::encode(FLOAT, &[0.0, 7.0, 0.0, 5.0, 0.0, 0.0]));
             let accessor = &mut document.json["accessors"][position];
             accessor["sparse"] = json!({"count": 2, "indices": {"bufferView": indices, "componentType": index_type,
                 "byteOffset": 0}, "values": {"bufferView": values, "byteOffset": 0}});

@@ -1,7 +1,6 @@
 //! glTF files: geometry, nodes, materials, lights, cameras, containers, and what broken ones are told.
 
 mod broken;
-mod document;
 mod geometry;
 mod materials;
 mod nodes;
@@ -10,8 +9,8 @@ use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::description::*;
 use croupier_host::load::{LoadOptions, LoadReport};
 use croupier_host::look::Look;
+use croupier_tests::gltf::Document;
 use croupier_tests::loading::{corners, positions, try_load, try_load_with};
-use document::Document;
 
 /// As [`try_load`], with the light that the file has or gets.
 fn try_load_lit(name: &str, bytes: &[u8]) -> Result<(SceneDescription, LoadReport), String> {

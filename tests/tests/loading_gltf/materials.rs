@@ -1,9 +1,9 @@
 //! Parameters of materials and their textures.
 
-use super::document::{Document, FLOAT, png};
 use super::{loaded, try_load};
 use croupier_host::description::*;
 use croupier_host::load::{LoadOptions, load_with};
+use croupier_tests::gltf::{Document, FLOAT, png};
 use croupier_tests::loading::{jpeg, plain_look, try_load_with};
 use serde_json::{Value, json};
 
@@ -242,7 +242,7 @@ fn volumes() {
     let solid = |faces: &[[f64; 3]], volume: Value| {
         let mut document = Document::default();
         let position = document.floats(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
-        let indices = document.accessor(super::document::U8, 1, false, faces.as_flattened());
+        let indices = document.accessor(croupier_tests::gltf::U8, 1, false, faces.as_flattened());
         let extensions =
             json!({"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": volume});
         let material = document.push("materials", json!({"name": "amber", "extensions": extensions}));
@@ -283,7 +283,7 @@ fn volumes_of_colors_and_instances() {
     let position = document.floats(&points);
     let color = document.floats(&points.map(|[r, g, b]| [r, g, b, 1.0]));
     let mut part = |faces: &[[f64; 3]], color: Option<usize>| {
-        let indices = document.accessor(super::document::U8, 1, false, faces.as_flattened());
+        let indices = document.accessor(croupier_tests::gltf::U8, 1, false, faces.as_flattened());
         let mut attributes = json!({"POSITION": position});
         if let Some(color) = color {
             attributes["COLOR_0"] = json!(color);
@@ -324,7 +324,7 @@ fn images() {
         std::fs::write(folder.path().join("a.gltf"), document.embedded()).unwrap();
         croupier_host::load::load(&folder.path().join("a.gltf")).map_err(|e| e.to_string())
     };
-    let base64 = format!("data:image/png;base64,{}", super::document::base64(&png(1, 1, &[[9, 8, 7, 255]])));
+    let base64 = format!("data:image/png;base64,{}", croupier_tests::gltf::base64(&png(1, 1, &[[9, 8, 7, 255]])));
     for uri in ["a%20b.png", base64.as_str()] {
         let (scene, _) = load(json!({ "uri": uri }), json!({"source": 0})).unwrap();
         assert_eq!(scene.textures[0].texels, [[9, 8, 7, 255]]);

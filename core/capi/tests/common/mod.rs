@@ -1,7 +1,6 @@
 //! A host in Rust that sees the library as C does.
 #![allow(dead_code, clippy::allow_attributes, reason = "each test uses a part of it")]
 
-use croupier_capi::croupier_status::CROUPIER_OK;
 use croupier_capi::*;
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
@@ -12,7 +11,6 @@ use std::ptr;
 /// Calls a function of the library.
 macro_rules! c {
     ($name:ident($($argument:expr),* $(,)?)) => {{
-        $(let _ = &$argument;)*
         // SAFETY: the tests' pointers are those that the documentation asks for, or null or misaligned, which is checked.
         unsafe { $name($($argument),*) }
     }};
@@ -25,7 +23,7 @@ macro_rules! ok {
         let mut message = $crate::common::message();
         // SAFETY: as of `c`.
         let status = unsafe { $name($($argument,)* &raw mut message) };
-        assert_eq!(status, CROUPIER_OK, "{}: {}", stringify!($name), $crate::common::text(&message));
+        assert_eq!(status, croupier_capi::croupier_status::CROUPIER_OK, "{}: {}", stringify!($name), $crate::common::text(&message));
     }};
 }
 pub(crate) use ok;

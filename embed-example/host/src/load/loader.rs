@@ -60,6 +60,8 @@ pub(super) struct Loader {
     textures: HashMap<(PathBuf, Decoding), Option<u32>>,
     /// Textures that were made of two others, by their indices: roughness and metalness of MTL materials.
     pub(super) combined: HashMap<[Option<u32>; 2], u32>,
+    /// Textures with holes, by those of the colour, that colour without one, and those of the holes.
+    pub(super) cut_outs: HashMap<(Option<u32>, [u8; 3], u32), u32>,
     /// Bytes of decoded images so far, and of textures that were made of them.
     decoded: u64,
 }
@@ -80,6 +82,7 @@ impl Loader {
             folder: folder.into(),
             textures: HashMap::new(),
             combined: HashMap::new(),
+            cut_outs: HashMap::new(),
             decoded: 0,
         }
     }

@@ -13,12 +13,13 @@
 //! | `Ke`, `map_Ke` | emission; the texture multiplies `Ke`, 1 if that is black or not stated |
 //! | opacity below 0.5, or `illum` 4, 6, 7 or 9 | transmission 1; thin-walled with `Ni` 1 |
 //! | `d`, `Tr` from 0.5 | opacity |
+//! | `map_d` | alpha of the base colour's texture, in place of the two rows above |
 //!
 //! `aniso` and `anisor` are ignored.
 
 use super::budget::fits;
 use super::loader::Loader;
-use super::mtl::Definition;
+use super::mtl::{Definition, nearest};
 use crate::description::{Encoding, Material, Model, Principled, SceneDescription, Texture, TextureRef};
 
 /// Textures of a definition, by their key: indices in the scene.
@@ -31,6 +32,8 @@ pub(super) struct Maps {
     pub combined: Option<u32>,
     pub emission: Option<u32>,
     pub normal: Option<u32>,
+    /// The alpha of `base` is the opacity.
+    pub cut_out: bool,
 }
 
 /// Numbers that make a material a principled one, as textures of any of [`MAPS`](super::mtl::MAPS) do.
@@ -54,14 +57,8 @@ pub(super) fn combine(loader: &mut Loader, scene: &mut SceneDescription, maps: &
     let Some(larger) = larger else { return Ok(None) };
     let [width, height] = [larger.width, larger.height];
     fits(width.into(), height.into(), 4, loader.free())?;
-    // the nearest texel of a smaller one
-    let red = |t: Option<&Texture>, x: u32, y: u32| {
-        t.map_or(255, |t| {
-            let column = u64::from(x) * u64::from(t.width) / u64::from(width);
-            let row = u64::from(y) * u64::from(t.height) / u64::from(height);
-            t.texels.get((row * u64::from(t.width) + column) as usize).map_or(255, |t| t[0])
-        })
-    };
+    let red =
+        |t: Option<&Texture>, x: u32, y: u32| t.map_or(255, |t| nearest(t, x, y, width, height).map_or(255, |t| t[0]));
     let texel = |i: u32| [255, red(rough, i % width, i / width), red(metal, i % width, i / width), 255];
     let texture = Texture {
         name: larger.name.clone(),
@@ -86,7 +83,7 @@ pub(super) fn map(definition: &Definition, maps: Maps) -> (Material, Option<[f32
     let texture = |index: Option<u32>| index.map(TextureRef::new);
     let from_ns = m.shininess.map(|n| (2.0 / (n.max(0.0) + 2.0)).sqrt().sqrt());
     let opacity = m.dissolve.or(parameter("Tr").map(|t| 1.0 - t)).unwrap_or(1.0);
-    let clear = matches!(m.illumination_model, Some(4 | 6 | 7 | 9)) || opacity < 0.5;
+    let clear = !maps.cut_out && (matches!(m.illumination_model, Some(4 | 6 | 7 | 9)) || opacity < 0.5);
     let thin = m.optical_density.is_some_and(|n| (n - 1.0).abs() <= 1e-3);
     let default = Principled::default();
     let given = m.emissive.filter(|c| c.iter().any(|x| *x > 1e-3)).map(|c| c.map(|x| x.max(0.0)));
@@ -106,8 +103,8 @@ pub(super) fn map(definition: &Definition, maps: Maps) -> (Material, Option<[f32
         sheen_roughness: 0.5,
         emission_texture: texture(maps.emission),
         normal_texture: texture(maps.normal),
-        opacity: if clear { 1.0 } else { share(opacity) },
+        opacity: if clear || maps.cut_out { 1.0 } else { share(opacity) },
         ..default
     };
-    (Material::new(&m.name, Model::Principled(p)), radiance)
+    (Material { cutout: maps.cut_out, ..Material::new(&m.name, Model::Principled(p)) }, radiance)
 }

@@ -488,11 +488,13 @@ pub(super) fn load_bare(loader: &mut Loader, path: &Path) -> Result<SceneDescrip
                     }
                     None => None,
                 };
+                let holes = opacity(loader, &mut scene, definition, texture, file)?;
+                let (texture, cut_out) = (holes.or(texture), holes.is_some());
                 let (material, radiance) = if mtl_principled::applies(definition) {
-                    let maps = Maps { base: texture, ..maps(loader, &mut scene, definition, file)? };
+                    let maps = Maps { base: texture, cut_out, ..maps(loader, &mut scene, definition, file)? };
                     mtl_principled::map(definition, maps)
                 } else {
-                    let mapped = mtl::map(definition, texture);
+                    let mapped = mtl::map(definition, texture, cut_out);
                     loader.report.notes.extend(mapped.notes);
                     (mapped.material, mapped.radiance)
                 };
@@ -523,6 +525,26 @@ fn libraries(folder: &Path, names: &str) -> Vec<PathBuf> {
     let whole = folder.join(names);
     let several = || names.split_ascii_whitespace().map(|n| folder.join(n)).collect::<Vec<_>>();
     if whole.exists() || !several().iter().any(|f| f.exists()) { vec![whole] } else { several() }
+}
+
+/// The texture of the colour with the holes of `map_d`; `None` without those.
+fn opacity(
+    loader: &mut Loader,
+    scene: &mut SceneDescription,
+    definition: &mtl::Definition,
+    base: Option<u32>,
+    file: &Path,
+) -> Result<Option<u32>, LoadError> {
+    let Some((texture, line)) = &definition.opacity else { return Ok(None) };
+    let name = excerpt(&definition.material.name);
+    let referrer = format!("{}:{line} (material `{name}`)", text::path(file));
+    let decoding = Decoding { encoding: Encoding::Linear, ..Decoding::default() };
+    let Some(mask) = loader.texture_as(scene, &mtl::sibling(file, texture), &referrer, decoding)? else {
+        return Ok(None);
+    };
+    let made = mtl::cut_out(loader, scene, definition, base, mask);
+    let failed = |what| LoadError::file(file, format!("material `{name}`: colour and holes as one texture: {what}"));
+    made.map(Some).map_err(failed)
 }
 
 /// The textures of a definition besides that of its colour.

@@ -2,8 +2,8 @@
 //! Croupier. A module without imports and without an allocator: the page (`site/compose.js`) lays out its memory above
 //! `__heap_base` and passes addresses.
 //!
-//! This file is the boundary, with all of the unsafe code. Every address is that of as many bytes of the module's memory as
-//! the function says, at a multiple of 64 where nothing else is said, and nothing else lies there.
+//! This file is the boundary, with all of the unsafe code. Every address is that of as many bytes of the module's
+//! memory as the function says, at a multiple of 64 where nothing else is said, and nothing else lies there.
 //!
 //! The functions return the length of a message that they have written, 0 if all went well.
 #![no_std]
@@ -81,8 +81,8 @@ pub unsafe extern "C" fn compose_sizes(parts: *const Parts, sizes: *mut [usize; 
     unsafe { answer(found, message) }
 }
 
-/// Composes a scene's blob in the first of two blocks of the [`compose_sizes`] of the same parts, and writes its length. The
-/// second block holds nothing of use afterwards.
+/// Composes a scene's blob in the first of two blocks of the [`compose_sizes`] of the same parts, and writes its
+/// length. The second block holds nothing of use afterwards.
 ///
 /// # Safety
 /// See above; `length` has a word.

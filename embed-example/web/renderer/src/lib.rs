@@ -1,22 +1,24 @@
 //! Croupier for a web page: a module without imports, without an allocator and without variables of its own. The page
-//! (`site/croupier.js`) grows the memory, decides what lies where above `__heap_base`, and passes addresses; the clock, the
-//! size of steps and the threads (workers with an instance of their own) are the page's, too.
+//! (`site/croupier.js`) grows the memory, decides what lies where above `__heap_base`, and passes addresses; the
+//! clock, the size of steps and the threads (workers with an instance of their own) are the page's, too.
 //!
 //! ```text
-//! scene_open -> picture_sizes -> picture_open -> picture_begin -> picture_step ... -> picture_finish ... -> picture_begin
-//!                                                     |
-//!                  scene_look -> picture_restart -----+      picture_show -> tone_map or false_colors -> ImageData
+//! scene_open -> picture_sizes -> picture_open -> picture_begin -> picture_step ... -> picture_finish ...
+//!                                                |     ^                                      |
+//!                  scene_look -> picture_restart +     +--------------------------------------+
+//!
+//! picture_show -> tone_map or false_colors -> ImageData
 //! ```
 //!
 //! This file is the boundary, with all of the unsafe code. What every function asks of the page:
 //!
 //! * an address is that of as many bytes of the module's memory as the function says, at a multiple of 64, and nothing
 //!   else lies there;
-//! * scenes and pictures lie where [`scene_open`] and [`picture_open`] were told to put them; they are valid until their
-//!   own bytes, or those of the blob and the blocks that they were made of, are used for something else.
+//! * scenes and pictures lie where [`scene_open`] and [`picture_open`] were told to put them; they are valid until
+//!   their own bytes, or those of the blob and the blocks that they were made of, are used for something else.
 //!
-//! The functions that can be refused return 0 if all went well, else a [`Refused`] as a number: messages with names and
-//! numbers would take 35 KB of the module. The composer, which sees what users bring, has them.
+//! The functions that can be refused return 0 if all went well, else a [`Refused`] as a number: messages are in the page,
+//! which keeps the module small. The composer, which sees what users bring, names objects and numbers.
 #![no_std]
 
 mod color;
@@ -64,8 +66,8 @@ pub unsafe extern "C" fn scene_open(scene: *mut OpenScene, blob: *mut u8, length
     status(opened)
 }
 
-/// Writes the camera's record, 17 words (`Camera` in `core/src/scene/blob.rs`), and behind it the scene's box: smallest and
-/// largest coordinates.
+/// Writes the camera's record, 17 words (`Camera` in `core/src/scene/blob.rs`), and behind it the scene's box:
+/// smallest and largest coordinates.
 ///
 /// # Safety
 /// See above; `out` has 23 words.
@@ -108,8 +110,8 @@ pub unsafe extern "C" fn picture_sizes(
     status(planned)
 }
 
-/// Puts a picture of the scene at `picture`, [`control_bytes`]`(1)` bytes, with blocks of the [`picture_sizes`] of the same
-/// settings.
+/// Puts a picture of the scene at `picture`, [`control_bytes`]`(1)` bytes, with blocks of the [`picture_sizes`] of the
+/// same settings.
 ///
 /// # Safety
 /// See above. The picture keeps both blocks.
@@ -170,7 +172,8 @@ pub unsafe extern "C" fn picture_step(picture: *mut Picture<'static>, scene: *co
     u32::from(picture.step(scene, rays))
 }
 
-/// Merges and learns, about as long as so many rays take: 0 if there is more to do, 1 when the next iteration can begin.
+/// Merges and learns, about as long as so many rays take: 0 if there is more to do, 1 when the next iteration can
+/// begin.
 ///
 /// # Safety
 /// See above.
@@ -181,8 +184,8 @@ pub unsafe extern "C" fn picture_finish(picture: *mut Picture<'static>, rays: u3
     u32::from(picture.finish(rays))
 }
 
-/// Writes four floats for each pixel, row by row: a colour or a value, and the number of samples that it is of. 1 if there
-/// is such a [`Plane`].
+/// Writes four floats for each pixel, row by row: a colour or a value, and the number of samples that it is of. 1 if
+/// there is such a [`Plane`].
 ///
 /// # Safety
 /// See above; `out` has room for `pixels`.

@@ -187,8 +187,33 @@ fn camera(asset: &Asset<'_>, index: Index<gltf_json::Camera>, world: DMat4, at: 
     }
 }
 
+/// Factor from the intensities that the generator of a file writes to watts. Blender writes watts times 683 lumens, and
+/// emission without them; its exporter before 3.4 writes the power of point and spot lights in watts, as it is.
+fn radiometric(loader: &mut Loader, asset: &Asset<'_>, light: &Light) -> f32 {
+    let generator = asset.root.asset.generator.as_deref().unwrap_or_default();
+    if !generator.contains("Blender") {
+        return 1.0;
+    }
+    let version = generator.rsplit_once('v').map(|(_, v)| v.splitn(3, '.').map_while(|n| n.parse::<u32>().ok()));
+    let version: Vec<u32> = version.into_iter().flatten().take(2).collect();
+    let (factor, what) = match (version.as_slice() < &[3, 4] && !version.is_empty(), &light.type_) {
+        (false, _) => {
+            (1.0 / LUMENS_PER_WATT, "lights were divided by 683 lumens per watt, with which Blender writes them")
+        }
+        (true, Checked::Valid(LightType::Directional)) => return 1.0,
+        (true, _) => (
+            0.25 / std::f32::consts::PI,
+            "lights were taken as watts in all directions, as Blender before 3.4 writes them",
+        ),
+    };
+    if loader.report.notes.iter().all(|n| n != what) {
+        loader.note(what.into());
+    }
+    factor
+}
+
 /// A light. Candela and lux are taken as radiometric numbers, as emission in candela per square metre is, and as viewers
-/// do, so that all of them fit together; Blender writes watts times 683 lumens and emission without, which is undone.
+/// do, so that all of them fit together; what Blender writes is undone ([`radiometric`]).
 fn emitter(
     loader: &mut Loader,
     asset: &Asset<'_>,
@@ -196,12 +221,7 @@ fn emitter(
     world: DMat4,
     at: &str,
 ) -> Result<Option<Emitter>, LoadError> {
-    let generator = asset.root.asset.generator.as_deref().unwrap_or_default();
-    let blender = generator.contains("Blender");
-    if blender && loader.report.notes.iter().all(|n| !n.contains("683")) {
-        loader.note("lights were divided by 683 lumens per watt, with which Blender writes them".into());
-    }
-    let scale = light.intensity.max(0.0) / if blender { LUMENS_PER_WATT } else { 1.0 };
+    let scale = light.intensity.max(0.0) * radiometric(loader, asset, light);
     let intensity = light.color.map(|x| x.max(0.0) * scale);
     if intensity == [0.0; 3] {
         return Ok(None);

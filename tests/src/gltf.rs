@@ -1,27 +1,27 @@
-//! glTF documents made by tests: JSON, and one buffer that grows.
+//! glTF documents made in code: JSON, and one buffer that grows.
 
 use serde_json::{Value, json};
 
 /// Component types of accessors.
-pub(crate) const FLOAT: u32 = 5126;
+pub const FLOAT: u32 = 5126;
 /// Unsigned bytes.
-pub(crate) const U8: u32 = 5121;
+pub const U8: u32 = 5121;
 /// Signed bytes.
-pub(crate) const I8: u32 = 5120;
+pub const I8: u32 = 5120;
 /// Unsigned shorts.
-pub(crate) const U16: u32 = 5123;
+pub const U16: u32 = 5123;
 /// Signed shorts.
-pub(crate) const I16: u32 = 5122;
+pub const I16: u32 = 5122;
 /// Unsigned integers.
-pub(crate) const U32: u32 = 5125;
+pub const U32: u32 = 5125;
 
 /// A document and its buffer.
 #[derive(Clone, Debug)]
-pub(crate) struct Document {
+pub struct Document {
     /// JSON, without `buffers`.
-    pub(crate) json: Value,
+    pub json: Value,
     /// The buffer.
-    pub(crate) bytes: Vec<u8>,
+    pub bytes: Vec<u8>,
 }
 
 impl Default for Document {
@@ -32,7 +32,7 @@ impl Default for Document {
 }
 
 /// Components as bytes.
-pub(crate) fn encode(component: u32, values: &[f64]) -> Vec<u8> {
+pub fn encode(component: u32, values: &[f64]) -> Vec<u8> {
     let bytes = |x: f64| match component {
         FLOAT => (x as f32).to_le_bytes().to_vec(),
         U8 => vec![x as u8],
@@ -47,7 +47,7 @@ pub(crate) fn encode(component: u32, values: &[f64]) -> Vec<u8> {
 
 impl Document {
     /// Adds an element to a list of the document, which may not be there yet; returns its index.
-    pub(crate) fn push(&mut self, list: &str, value: Value) -> usize {
+    pub fn push(&mut self, list: &str, value: Value) -> usize {
         let list = &mut self.json[list];
         if list.is_null() {
             *list = json!([]);
@@ -58,7 +58,7 @@ impl Document {
     }
 
     /// A buffer view of these bytes.
-    pub(crate) fn view(&mut self, bytes: &[u8]) -> usize {
+    pub fn view(&mut self, bytes: &[u8]) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0xab);
         let offset = self.bytes.len();
         self.bytes.extend_from_slice(bytes);
@@ -66,7 +66,7 @@ impl Document {
     }
 
     /// An accessor of packed elements of `width` components.
-    pub(crate) fn accessor(&mut self, component: u32, width: usize, normalized: bool, values: &[f64]) -> usize {
+    pub fn accessor(&mut self, component: u32, width: usize, normalized: bool, values: &[f64]) -> usize {
         let kind = ["", "SCALAR", "VEC2", "VEC3", "VEC4"].get(width).copied().unwrap_or("MAT4");
         let view = self.view(&encode(component, values));
         let count = values.len() / width;
@@ -76,24 +76,24 @@ impl Document {
     }
 
     /// An accessor of floats.
-    pub(crate) fn floats<const N: usize>(&mut self, values: &[[f64; N]]) -> usize {
+    pub fn floats<const N: usize>(&mut self, values: &[[f64; N]]) -> usize {
         self.accessor(FLOAT, N, false, values.as_flattened())
     }
 
     /// A node of the scene.
-    pub(crate) fn node(&mut self, node: Value) -> usize {
+    pub fn node(&mut self, node: Value) -> usize {
         let index = self.push("nodes", node);
         self.json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(index));
         index
     }
 
     /// A mesh of one primitive; returns its index.
-    pub(crate) fn mesh(&mut self, primitive: Value) -> usize {
+    pub fn mesh(&mut self, primitive: Value) -> usize {
         self.push("meshes", json!({"primitives": [primitive]}))
     }
 
     /// A triangle (0, 0, 0), (1, 0, 0), (0, 1, 0) with texture coordinates, normals and perhaps a material: its mesh.
-    pub(crate) fn triangle(&mut self, material: Option<usize>) -> usize {
+    pub fn triangle(&mut self, material: Option<usize>) -> usize {
         let position = self.floats(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
         let normal = self.floats(&[[0.0, 0.0, 1.0]; 3]);
         let uv = self.floats(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
@@ -105,7 +105,7 @@ impl Document {
     }
 
     /// A document of that triangle with a material.
-    pub(crate) fn of_material(material: Value) -> Self {
+    pub fn of_material(material: Value) -> Self {
         let mut document = Self::default();
         let material = document.push("materials", material);
         let mesh = document.triangle(Some(material));
@@ -114,7 +114,7 @@ impl Document {
     }
 
     /// The bytes of a PNG of RGBA texels as an image and a texture; returns the texture's index.
-    pub(crate) fn texture(&mut self, width: u32, height: u32, texels: &[[u8; 4]]) -> usize {
+    pub fn texture(&mut self, width: u32, height: u32, texels: &[[u8; 4]]) -> usize {
         let view = self.view(&png(width, height, texels));
         let image = self.push("images", json!({"bufferView": view, "mimeType": "image/png"}));
         self.push("textures", json!({"source": image}))
@@ -129,17 +129,17 @@ impl Document {
     }
 
     /// As `.gltf` whose buffer has a URI.
-    pub(crate) fn gltf(&self, uri: &str) -> Vec<u8> {
+    pub fn gltf(&self, uri: &str) -> Vec<u8> {
         self.with_buffer(json!({"byteLength": self.bytes.len(), "uri": uri}))
     }
 
     /// As `.gltf` with the buffer inside.
-    pub(crate) fn embedded(&self) -> Vec<u8> {
+    pub fn embedded(&self) -> Vec<u8> {
         self.gltf(&format!("data:application/octet-stream;base64,{}", base64(&self.bytes)))
     }
 
     /// As `.glb`.
-    pub(crate) fn glb(&self) -> Vec<u8> {
+    pub fn glb(&self) -> Vec<u8> {
         let mut json = self.with_buffer(json!({"byteLength": self.bytes.len()}));
         json.resize(json.len().next_multiple_of(4), b' ');
         let mut binary = self.bytes.clone();
@@ -152,7 +152,7 @@ impl Document {
 }
 
 /// RFC 4648, without line breaks.
-pub(crate) fn base64(bytes: &[u8]) -> String {
+pub fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let group = |b: &[u8]| {
         let n = (0..3).fold(0u32, |n, i| n << 8 | u32::from(b.get(i).copied().unwrap_or(0)));
@@ -163,7 +163,7 @@ pub(crate) fn base64(bytes: &[u8]) -> String {
 }
 
 /// A PNG of RGBA texels.
-pub(crate) fn png(width: u32, height: u32, texels: &[[u8; 4]]) -> Vec<u8> {
+pub fn png(width: u32, height: u32, texels: &[[u8; 4]]) -> Vec<u8> {
     let mut file = Vec::new();
     let mut encoder = png::Encoder::new(&mut file, width, height);
     encoder.set_color(png::ColorType::Rgba);
