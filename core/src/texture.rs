@@ -160,7 +160,7 @@ fn interpolated<const ANY_WRAP: bool>(
 /// `i` in -1..=size by the wrapping `mode`: a mirrored or clamped texture has its edge again beyond the edge.
 #[inline(always)]
 fn neighbour(i: i32, size: u32, mode: u32) -> u32 {
-    if mode == TEXTURE_REPEAT { wrap(i, size) } else { i.clamp(0, size.saturating_sub(1) as i32) as u32 }
+    if mode == TEXTURE_REPEAT { wrap(i, size) } else { (i.max(0) as u32).min(size.saturating_sub(1)) }
 }
 
 /// `i` in -1..=size brought into 0..size; anything else to some texel.

@@ -17,7 +17,8 @@ pub(crate) fn film_index(size: [u32; 2], [x, y]: [u32; 2]) -> usize {
 /// Column and row of the pixel with a film index.
 #[inline]
 pub(crate) fn pixel_at(size: [u32; 2], film: u32) -> [u32; 2] {
-    [film % size[0], film / size[0]]
+    let columns = size[0].max(1);
+    [film % columns, film / columns]
 }
 
 /// Division of a picture into square blocks.
@@ -33,6 +34,7 @@ impl BlockGrid {
     /// Blocks of `side` pixels, at least 1, of a picture with `size` columns and rows.
     #[inline]
     pub(crate) fn new(size: [u32; 2], side: u32) -> Self {
+        let side = side.max(1);
         let [columns, rows] = size.map(|n| n.div_ceil(side));
         Self { size, side, columns, rows }
     }
@@ -52,14 +54,15 @@ impl BlockGrid {
     /// Number of the block around the pixel with a film index.
     #[inline]
     pub(crate) fn of_pixel(self, film: u32) -> u32 {
-        let [x, y] = pixel_at(self.size, film);
-        y / self.side * self.columns + x / self.side
+        let ([x, y], side) = (pixel_at(self.size, film), self.side.max(1));
+        y / side * self.columns + x / side
     }
 
     /// First column and row of a block.
     #[inline]
     fn start(self, block: u32) -> [u32; 2] {
-        [block % self.columns * self.side, block / self.columns * self.side]
+        let columns = self.columns.max(1);
+        [block % columns * self.side, block / columns * self.side]
     }
 
     /// First column and row of a block, and those behind its last.
@@ -122,7 +125,7 @@ impl Tiles {
     /// First column of tiles at or after `from`, in row `y` of tiles, that belongs to `shard`; it may be beyond the row.
     /// Column x belongs to shard (x + y skew) mod shards.
     fn next_in_row(&self, shard: u32, from: u32, y: u32) -> u64 {
-        let shards = u64::from(self.shards);
+        let shards = u64::from(self.shards.max(1));
         let owner = (u64::from(from) + u64::from(y) * u64::from(self.skew.max(1))) % shards;
         u64::from(from) + (u64::from(shard) + shards - owner) % shards
     }
@@ -181,7 +184,8 @@ impl Tiles {
 
     /// First column and row of a tile.
     pub(crate) fn start(&self, tile: u32) -> [u32; 2] {
-        [tile % self.columns * TILE, tile / self.columns * TILE]
+        let columns = self.columns.max(1);
+        [tile % columns * TILE, tile / columns * TILE]
     }
 
     /// Column and row of slot `slot` (Morton order) of the tile that starts at `[x, y]`, if inside the picture.

@@ -53,7 +53,8 @@ pub struct croupier_arrays {
     pub camera: *const croupier_camera,
     /// Positions of vertices, world space, each coordinate up to 1e9 as a magnitude.
     pub positions: *const [f32; 3],
-    /// Normals of vertices, of any length, or null: all triangles are flat. Triangles with a vertex whose normal is 0 are flat.
+    /// Normals of vertices, of any length, or null: all triangles are flat. Triangles with a vertex whose normal is 0
+    /// are flat.
     pub normals: *const [f32; 3],
     /// Texture coordinates of vertices, v upwards, or null.
     pub uvs: *const [f32; 2],
@@ -65,8 +66,8 @@ pub struct croupier_arrays {
     pub triangle_materials: *const u32,
     /// Number of triangles.
     pub triangle_count: usize,
-    /// Materials, see croupier_material_init. fdr of plastics may be 0, and the table of rough ones CROUPIER_NONE: they are
-    /// computed then.
+    /// Materials, see croupier_material_init. fdr of plastics may be 0, and the table of rough ones CROUPIER_NONE:
+    /// they are computed then.
     pub materials: *const croupier_material,
     /// Radiance that the triangles of each material emit from their front, or null: none emit.
     pub emission: *const [f32; 3],
@@ -92,8 +93,8 @@ pub struct croupier_arrays {
     pub media: *const croupier_medium,
     /// Number of media.
     pub medium_count: usize,
-    /// Lights that are no triangles, see croupier_light_from_source. In the scene they follow those of the triangles: first those
-    /// without a shape, then the environment, then those with one.
+    /// Lights that are no triangles, see croupier_light_from_source. In the scene they follow those of the triangles:
+    /// first those without a shape, then the environment, then those with one.
     pub lights: *const croupier_light,
     /// Number of these lights.
     pub light_count: usize,
@@ -216,8 +217,9 @@ unsafe fn parts<'a>(arrays: *const croupier_arrays) -> Result<SceneParts<'a>, Fa
     })
 }
 
-/// Bytes that croupier_scene_compose needs: of the blob (what always suffices; most take a third of it), and of intermediate
-/// results. CROUPIER_COMPOSE, with the record and the number that are wrong in the message, if the arrays make no scene.
+/// Bytes that croupier_scene_compose needs: of the blob (what always suffices; most take a third of it), and of
+/// intermediate results. CROUPIER_COMPOSE, with the record and the number that are wrong in the message, if the arrays
+/// make no scene.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_scene_compose_size(
     arrays: *const croupier_arrays,
@@ -235,10 +237,10 @@ pub unsafe extern "C" fn croupier_scene_compose_size(
     })
 }
 
-/// Builds a scene of arrays: its tree of triangles, its tables, everything that baking does. blob and scratch start at multiples
-/// of CROUPIER_ALIGN and overlap neither each other nor an array. *length becomes the blob's own length: blob and length are
-/// what croupier_scene_init takes. scratch is the program's again. Takes a time that grows with the triangles times their
-/// logarithm. CROUPIER_COMPOSE as of croupier_scene_compose_size.
+/// Builds a scene of arrays: its tree of triangles, its tables, everything that baking does. blob and scratch start at
+/// multiples of CROUPIER_ALIGN and overlap neither each other nor an array. *length becomes the blob's own length:
+/// blob and length are what croupier_scene_init takes. scratch is the program's again. Takes a time that grows with
+/// the triangles times their logarithm. CROUPIER_COMPOSE as of croupier_scene_compose_size.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_scene_compose(
     arrays: *const croupier_arrays,
@@ -276,8 +278,8 @@ pub unsafe extern "C" fn croupier_scene_compose(
     })
 }
 
-/// Fills in a material: its kind (croupier_material_kind), and what no material of the kind has. CROUPIER_RANGE if there is no
-/// such kind.
+/// Fills in a material: its kind (croupier_material_kind), and what no material of the kind has. CROUPIER_RANGE if
+/// there is no such kind.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_material_init(
     material: *mut croupier_material,
@@ -306,8 +308,8 @@ pub struct croupier_view {
     pub target: [f64; 3],
     /// Upwards, not parallel to the axis.
     pub up: [f64; 3],
-    /// Perspective: full vertical field of view, degrees, above 0.001 and below 179.9. Orthographic: height of the picture, world
-    /// units. Panoramic: not read.
+    /// Perspective: full vertical field of view, degrees, above 0.001 and below 179.9. Orthographic: height of the
+    /// picture, world units. Panoramic: not read.
     pub extent: f64,
     /// Columns, 1 to 65536.
     pub width: u32,
@@ -329,8 +331,8 @@ unsafe impl Versioned for croupier_view {
     }
 }
 
-/// The camera of a view, for croupier_arrays and croupier_scene_set_camera. CROUPIER_RANGE, with the number in the message, if
-/// there is none.
+/// The camera of a view, for croupier_arrays and croupier_scene_set_camera. CROUPIER_RANGE, with the number in the
+/// message, if there is none.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_camera_from_view(
     view: *const croupier_view,

@@ -1,5 +1,5 @@
-//! Edits of scenes between frames. Each call is a round of its own: what edits have in common (the table that chooses among
-//! lights, boxes around instances) is brought up to date before it returns.
+//! Edits of scenes between frames. Each call is a round of its own: what edits have in common (the table that chooses
+//! among lights, boxes around instances) is brought up to date before it returns.
 
 use crate::fault::{CoreError, Failure, Fault, answer, croupier_message, promised};
 use crate::memory::{array, array_mut, output, read_struct};
@@ -45,8 +45,9 @@ unsafe fn record<R: Pod, T: Pod>(record: *const R, about: &'static str) -> Resul
     Ok(bytemuck::cast(*record))
 }
 
-/// Replaces the camera. CROUPIER_EDIT, with the number that is wrong in the message, if it breaks a rule of scenes; the scene
-/// is as before then. As after every edit, sessions of the scene need croupier_session_change_scene before they step again.
+/// Replaces the camera. CROUPIER_EDIT, with the number that is wrong in the message, if it breaks a rule of scenes;
+/// the scene is as before then. As after every edit, sessions of the scene need croupier_session_change_scene before
+/// they step again.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_scene_set_camera(
     scene: *mut croupier_scene,
@@ -59,8 +60,8 @@ pub unsafe extern "C" fn croupier_scene_set_camera(
     })
 }
 
-/// Replaces light index: emission, and what else its kind lets change (croupier_light). CROUPIER_EDIT_FIXED if another member
-/// differs from croupier_scene_light. Takes a pass over the lights.
+/// Replaces light index: emission, and what else its kind lets change (croupier_light). CROUPIER_EDIT_FIXED if another
+/// member differs from croupier_scene_light. Takes a pass over the lights.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_scene_set_light(
     scene: *mut croupier_scene,
@@ -74,8 +75,8 @@ pub unsafe extern "C" fn croupier_scene_set_light(
     })
 }
 
-/// Gives all emitting triangles of a material this radiance, linear Rec. 709; *changed, which may be null, becomes their
-/// number. Takes a pass over the lights.
+/// Gives all emitting triangles of a material this radiance, linear Rec. 709; *changed, which may be null, becomes
+/// their number. Takes a pass over the lights.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_scene_set_emission(
     scene: *mut croupier_scene,
@@ -95,8 +96,8 @@ pub unsafe extern "C" fn croupier_scene_set_emission(
     })
 }
 
-/// Replaces the environment's rotation and radiance or scale. CROUPIER_RANGE if there is none, CROUPIER_EDIT_FIXED if another
-/// member differs.
+/// Replaces the environment's rotation and radiance or scale. CROUPIER_RANGE if there is none, CROUPIER_EDIT_FIXED if
+/// another member differs.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_scene_set_environment(
     scene: *mut croupier_scene,
@@ -152,9 +153,9 @@ pub struct croupier_transform {
     pub to_world: [[[f32; 4]; 3]; 2],
 }
 
-/// Moves count instances in one round, whose boxes and lights are brought up to date once. *done, which may be null, becomes
-/// the number of those that were moved: all of them, or those before the one that is refused (CROUPIER_EDIT; the message
-/// has its index).
+/// Moves count instances in one round, whose boxes and lights are brought up to date once. *done, which may be null,
+/// becomes the number of those that were moved: all of them, or those before the one that is refused (CROUPIER_EDIT;
+/// the message has its index).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_scene_set_transforms(
     scene: *mut croupier_scene,
@@ -209,9 +210,10 @@ pub unsafe extern "C" fn croupier_scene_rebuild_size(
     })
 }
 
-/// Builds the world's tree anew over its instances as they are, which makes rays faster after far moves. scratch starts
-/// at a multiple of 4 and is the program's again when the call returns. CROUPIER_SIZE if it is too small, CROUPIER_RANGE in a
-/// scene without instances, CROUPIER_EDIT_FIXED if the blob has too little room; the tree is as it was then.
+/// Builds the world's tree anew over its instances as they are, which makes rays faster after far moves. scratch
+/// starts at a multiple of 4 and is the program's again when the call returns. CROUPIER_SIZE if it is too small,
+/// CROUPIER_RANGE in a scene without instances, CROUPIER_EDIT_FIXED if the blob has too little room; the tree is as it
+/// was then.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_scene_rebuild(
     scene: *mut croupier_scene,
@@ -226,8 +228,8 @@ pub unsafe extern "C" fn croupier_scene_rebuild(
     })
 }
 
-/// Makes the bytes of an edited scene a blob again, to be stored: until then their hash is that of the bytes before. Takes a
-/// pass over all bytes. The identity of the scene changes.
+/// Makes the bytes of an edited scene a blob again, to be stored: until then their hash is that of the bytes before.
+/// Takes a pass over all bytes. The identity of the scene changes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_scene_seal(
     scene: *mut croupier_scene,

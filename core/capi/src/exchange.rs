@@ -1,5 +1,5 @@
-//! Finished shards as bytes, for renders on many machines: every process begins the same iterations, steps some of the shards,
-//! sends these to all others and ends the iteration with all of them.
+//! Finished shards as bytes, for renders on many machines: every process begins the same iterations, steps some of the
+//! shards, sends these to all others and ends the iteration with all of them.
 
 use crate::fault::{CoreError, Failure, Fault, answer, croupier_message, promised};
 use crate::memory::{array, array_mut, output};
@@ -21,7 +21,8 @@ impl CoreError for SavedShardError {
     }
 }
 
-/// Most bytes that croupier_shard_save writes of shard index, in any iteration. CROUPIER_RANGE if the plan has fewer shards.
+/// Most bytes that croupier_shard_save writes of shard index, in any iteration. CROUPIER_RANGE if the plan has fewer
+/// shards.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_plan_saved_shard_size(
     plan: *const croupier_plan,
@@ -40,9 +41,9 @@ pub unsafe extern "C" fn croupier_plan_saved_shard_size(
     })
 }
 
-/// Writes what the end of an iteration reads of a finished shard, for croupier_shard_load of another process; *written becomes
-/// the number of bytes. Equal sums give equal bytes. CROUPIER_UNFINISHED if the shard has not finished an iteration,
-/// CROUPIER_SIZE if there is too little room; nothing is written then.
+/// Writes what the end of an iteration reads of a finished shard, for croupier_shard_load of another process; *written
+/// becomes the number of bytes. Equal sums give equal bytes. CROUPIER_UNFINISHED if the shard has not finished an
+/// iteration, CROUPIER_SIZE if there is too little room; nothing is written then.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_shard_save(
     shard: *const croupier_shard,
@@ -61,10 +62,10 @@ pub unsafe extern "C" fn croupier_shard_save(
     })
 }
 
-/// Takes the place of the shard that croupier_shard_save has written: joins the iteration of the session with its sums,
-/// finished. Sessions of several processes that begin the same iterations and end each with all shards have the same picture
-/// and the same statistics to the bit. CROUPIER_PLAN or CROUPIER_SAVED, with the reason in the message, if the bytes are of
-/// another scene, plan, shard, iteration or version, or damaged; the shard is as before then.
+/// Takes the place of the shard that croupier_shard_save has written: joins the iteration of the session with its
+/// sums, finished. Sessions of several processes that begin the same iterations and end each with all shards have the
+/// same picture and the same statistics to the bit. CROUPIER_PLAN or CROUPIER_SAVED, with the reason in the message,
+/// if the bytes are of another scene, plan, shard, iteration or version, or damaged; the shard is as before then.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_shard_load(
     shard: *mut croupier_shard,
@@ -87,9 +88,9 @@ pub unsafe extern "C" fn croupier_shard_load(
     })
 }
 
-/// Goes on as if so many iterations, of so many camera samples per pixel in all, had been before: for one picture in parts
-/// that are rendered apart and added afterwards. Parts with other numbers of iterations and disjoint ranges of samples are
-/// independent. CROUPIER_ITERATION if one has begun since the picture did.
+/// Goes on as if so many iterations, of so many camera samples per pixel in all, had been before: for one picture in
+/// parts that are rendered apart and added afterwards. Parts with other numbers of iterations and disjoint ranges of
+/// samples are independent. CROUPIER_ITERATION if one has begun since the picture did.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_skip(
     session: *mut croupier_session,

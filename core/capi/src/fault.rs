@@ -1,11 +1,13 @@
 //! What goes wrong, and how it becomes a status and a message.
 //!
-//! Faults of the boundary are [`Fault`]s, which are written without the formatting of the standard library: entry points
-//! that know no other faults contain no panics, which is checked by linking. Errors of the core come as [`Failure`]s.
+//! Faults of the boundary are [`Fault`]s, which are written without the formatting of the standard library: entry
+//! points that know no other faults contain no panics, which is checked by linking. Errors of the core come as
+//! [`Failure`]s.
 
 use crate::status::croupier_status;
 use core::ffi::c_char;
 use core::fmt::{self, Write};
+use core::hint::black_box;
 
 /// Text about a failure, for people: what was wrong with which object, with numbers.
 #[derive(Clone, Copy)]
@@ -120,14 +122,16 @@ pub(crate) struct Text<'a> {
 impl<'a> Text<'a> {
     /// Clears a buffer; texts that are longer are cut off, and end with a zero byte in any case.
     pub(crate) fn new(buffer: &'a mut [c_char]) -> Self {
-        buffer.iter_mut().for_each(|c| *c = 0);
+        // byte by byte: `croupier_check_processor` runs where wide registers are not there
+        buffer.iter_mut().for_each(|c| *c = black_box(0));
         let room = buffer.len().saturating_sub(1);
         Self { rest: buffer.get_mut(..room).unwrap_or_default().iter_mut() }
     }
 
     pub(crate) fn put(&mut self, text: &str) {
-        for (c, byte) in self.rest.by_ref().zip(text.bytes()) {
-            *c = byte as c_char;
+        // the text first: a zip that ends takes one more of what it asks first
+        for (byte, c) in text.bytes().zip(self.rest.by_ref()) {
+            *c = black_box(byte as c_char);
         }
     }
 

@@ -1,5 +1,5 @@
-//! The kernels that a session can have: the built-in parts, or those of a host, each compiled once. A session that has no
-//! callbacks refers to the first alone, so that a program which starts no other is linked without them.
+//! The kernels that a session can have: the built-in parts, or those of a host, each compiled once. A session that has
+//! no callbacks refers to the first alone, so that a program which starts no other is linked without them.
 
 use crate::parts::*;
 use croupier::unstable::accel::{Intersector, WideBvh};

@@ -35,8 +35,8 @@ pub unsafe extern "C" fn croupier_session_statistics_size(
     })
 }
 
-/// Writes what was learned of the scene, for another run, another machine, another scene of the same bounds. The bytes are
-/// the same on every machine. CROUPIER_SIZE if there is too little room.
+/// Writes what was learned of the scene, for another run, another machine, another scene of the same bounds. The bytes
+/// are the same on every machine. CROUPIER_SIZE if there is too little room.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_save_statistics(
     session: *const croupier_session,
@@ -52,9 +52,10 @@ pub unsafe extern "C" fn croupier_session_save_statistics(
     })
 }
 
-/// Replaces (merge is 0) what was learned of the scene by saved bytes, or adds them. Whatever is loaded changes efficiency
-/// only. The bytes are checked first; CROUPIER_SAVED, with the reason in the message, if they are damaged or of another scene
-/// or objective, CROUPIER_ABSENT while an iteration runs or if the strategy learns nothing of the scene.
+/// Replaces (merge is 0) what was learned of the scene by saved bytes, or adds them. Whatever is loaded changes
+/// efficiency only. The bytes are checked first; CROUPIER_SAVED, with the reason in the message, if they are damaged
+/// or of another scene or objective, CROUPIER_ABSENT while an iteration runs or if the strategy learns nothing of the
+/// scene.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_load_statistics(
     session: *mut croupier_session,
@@ -76,9 +77,9 @@ pub unsafe extern "C" fn croupier_session_load_statistics(
     })
 }
 
-/// The estimate of the pixels that the strategy works with (denoised, or means of blocks): red, green and blue of each, row by
-/// row. count is three times the number of pixels, or the answer is CROUPIER_SIZE. CROUPIER_ABSENT if the settings need none,
-/// and before the end of the first iteration.
+/// The estimate of the pixels that the strategy works with (denoised, or means of blocks): red, green and blue of
+/// each, row by row. count is three times the number of pixels, or the answer is CROUPIER_SIZE. CROUPIER_ABSENT if the
+/// settings need none, and before the end of the first iteration.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_estimate(
     session: *const croupier_session,
@@ -101,9 +102,9 @@ pub unsafe extern "C" fn croupier_session_estimate(
     })
 }
 
-/// Replaces the built-in estimate of the pixels by the host's (such as that of another denoiser), for good: red, green and
-/// blue of each pixel, row by row. It changes efficiency only. CROUPIER_SIZE if count is not three times the number of pixels,
-/// the settings have no estimate per pixel, or an iteration runs.
+/// Replaces the built-in estimate of the pixels by the host's (such as that of another denoiser), for good: red, green
+/// and blue of each pixel, row by row. It changes efficiency only. CROUPIER_SIZE if count is not three times the
+/// number of pixels, the settings have no estimate per pixel, or an iteration runs.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_give_estimate(
     session: *mut croupier_session,

@@ -1,7 +1,8 @@
 //! The C interface of croupier. The header is `include/croupier.h`, the manual `docs/C.md`.
 //!
-//! The functions are what C sees: each checks its pointers, takes the locks of its objects, calls the crate `croupier`, and
-//! turns what that says into a status and a message. All memory is the caller's; there are no globals, no threads, no panics.
+//! The functions are what C sees: each checks its pointers, takes the locks of its objects, calls the crate
+//! `croupier`, and turns what that says into a status and a message. All memory is the caller's; there are no globals,
+//! no threads, no panics.
 //!
 //! # The caller's promise
 //!
@@ -12,8 +13,8 @@
 //! behind a pointer from C count as initialised. SAFETY comments call this *the caller's promise*.
 //!
 //! What a caller can break without breaking the promise is answered with a status: null and misaligned pointers, too
-//! little memory, handles of other objects, of moved, destroyed or suspended ones, calls that would race with one another,
-//! shards of other plans, numbers out of range.
+//! little memory, handles of other objects, of moved, destroyed or suspended ones, calls that would race with one
+//! another, shards of other plans, numbers out of range.
 //!
 //! | file | holds |
 //! |---|---|
@@ -31,24 +32,42 @@
 #![expect(non_camel_case_types, reason = "types have the names that C sees")]
 #![expect(clippy::missing_safety_doc, reason = "one promise for all functions: see the documentation of the crate")]
 
-mod compose;
-mod edit;
-mod exchange;
-mod fault;
-mod guarded;
-mod kernels;
-mod learned;
-mod memory;
-mod parts;
-mod picture;
-mod plan;
-mod records;
-mod scene;
-mod session;
-mod settings;
-mod shard;
-mod status;
+// in the order of the header
 mod version;
+
+mod status;
+
+mod fault;
+
+mod guarded;
+
+mod memory;
+
+mod records;
+
+mod scene;
+
+mod edit;
+
+mod compose;
+
+mod settings;
+
+mod plan;
+
+mod session;
+
+mod shard;
+
+mod picture;
+
+mod learned;
+
+mod exchange;
+
+mod parts;
+
+mod kernels;
 
 pub use compose::*;
 pub use edit::*;

@@ -198,7 +198,8 @@ pub(crate) unsafe fn read_struct<T: Versioned>(pointer: *const T) -> Result<T, F
     Ok(value)
 }
 
-/// Writes a struct of any version; its `struct_size` stays the caller's, and so do members that this version does not know.
+/// Writes a struct of any version; its `struct_size` stays the caller's, and so do members that this version does not
+/// know.
 ///
 /// # Safety
 /// As of [`read_struct`].

@@ -110,9 +110,9 @@ pub struct croupier_source_points8 {
     pub scale: [[f32; 8]; 3],
 }
 
-/// Closest hits of the lanes in active (bit i is lane i). hits holds no hits when it is called; returns the lanes that hit.
-/// Lanes with numbers that cannot be (t outside the ray, no such triangle) count as no hit. May be called on several threads
-/// at a time, with the same user.
+/// Closest hits of the lanes in active (bit i is lane i). hits holds no hits when it is called; returns the lanes that
+/// hit. Lanes with numbers that cannot be (t outside the ray, no such triangle) count as no hit. May be called on
+/// several threads at a time, with the same user.
 pub type croupier_closest = Option<
     unsafe extern "C" fn(user: *mut c_void, rays: *const croupier_rays8, active: u32, hits: *mut croupier_hits8) -> u32,
 >;
@@ -121,7 +121,8 @@ pub type croupier_closest = Option<
 pub type croupier_occluded =
     Option<unsafe extern "C" fn(user: *mut c_void, rays: *const croupier_rays8, active: u32) -> u32>;
 
-/// What is where the hits of the lanes in own are, each of one of the host's own surfaces. Threads as of croupier_closest.
+/// What is where the hits of the lanes in own are, each of one of the host's own surfaces. Threads as of
+/// croupier_closest.
 pub type croupier_surface = Option<
     unsafe extern "C" fn(
         user: *mut c_void,
@@ -154,9 +155,9 @@ pub type croupier_points = Option<
     ) -> u32,
 >;
 
-/// What a host computes in place of the library. Members that are null are the library's own part. Callbacks must return:
-/// no longjmp and no C++ exception may leave them. They may read the scene (croupier_scene_closest); calls that change an
-/// object that is in use answer CROUPIER_BUSY.
+/// What a host computes in place of the library. Members that are null are the library's own part. Callbacks must
+/// return: no longjmp and no C++ exception may leave them. They may read the scene (croupier_scene_closest); calls
+/// that change an object that is in use answer CROUPIER_BUSY.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct croupier_parts {

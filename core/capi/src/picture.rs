@@ -66,7 +66,8 @@ pub enum croupier_aov {
     CROUPIER_AOV_DEPTH = 2,
     /// Share of the camera samples that hit, 0 to 1.
     CROUPIER_AOV_ALPHA = 3,
-    /// Sums of the factors of roulette at vertices of depth 1, 2, 3 and above, and numbers of these vertices: eight planes.
+    /// Sums of the factors of roulette at vertices of depth 1, 2, 3 and above, and numbers of these vertices: eight
+    /// planes.
     CROUPIER_AOV_FACTORS = 4,
     /// Number of paths: the camera sample and what splitting added.
     CROUPIER_AOV_PATHS = 5,
@@ -109,7 +110,8 @@ pub struct croupier_error_estimate {
     pub struct_size: u32,
     /// 0.
     pub reserved: u32,
-    /// Mean over pixels and channels of variance / (mean^2 + 0.01), without the worst 0.01 % of the pixels, times independence.
+    /// Mean over pixels and channels of variance / (mean^2 + 0.01), without the worst 0.01 % of the pixels, times
+    /// independence.
     pub rel_mse: f64,
     /// Lower end of its 95 % confidence interval.
     pub low: f64,
@@ -289,8 +291,8 @@ pub unsafe extern "C" fn croupier_session_pixels(
     })
 }
 
-/// Mean radiance of all pixels: red, green and blue of each, row by row from the top left. count is the number of floats, three
-/// times the number of pixels, or the answer is CROUPIER_SIZE.
+/// Mean radiance of all pixels: red, green and blue of each, row by row from the top left. count is the number of
+/// floats, three times the number of pixels, or the answer is CROUPIER_SIZE.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_rgb(
     session: *const croupier_session,
@@ -319,9 +321,9 @@ pub extern "C" fn croupier_aov_channels(aov: u32) -> u32 {
     aov_of(aov).map_or(0, |aov| aov.channels().len() as u32)
 }
 
-/// Plane channel of an auxiliary value (croupier_aov), a float per pixel, row by row from the top left. count is the number of
-/// pixels, or the answer is CROUPIER_SIZE. CROUPIER_ABSENT if the settings do not ask for it, and before the end of the
-/// first iteration; CROUPIER_RANGE if it has no such channel.
+/// Plane channel of an auxiliary value (croupier_aov), a float per pixel, row by row from the top left. count is the
+/// number of pixels, or the answer is CROUPIER_SIZE. CROUPIER_ABSENT if the settings do not ask for it, and before the
+/// end of the first iteration; CROUPIER_RANGE if it has no such channel.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_plane(
     session: *const croupier_session,
@@ -399,9 +401,10 @@ pub unsafe extern "C" fn croupier_session_counters(
     })
 }
 
-/// Pixels of a shard in the iteration under way, for previews: writes red, green and blue of the mean of each pixel that has
-/// finished camera samples where croupier_session_rgb has them, and leaves the others as they are. count is three times the
-/// number of pixels of the picture, or the answer is CROUPIER_SIZE. Means are biased while samples of a pixel are in flight.
+/// Pixels of a shard in the iteration under way, for previews: writes red, green and blue of the mean of each pixel
+/// that has finished camera samples where croupier_session_rgb has them, and leaves the others as they are. count is
+/// three times the number of pixels of the picture, or the answer is CROUPIER_SIZE. Means are biased while samples of
+/// a pixel are in flight.
 /// *written, which may be null, becomes the number of pixels; 0 if the shard has not stepped in this iteration.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_shard_unfinished(
@@ -442,8 +445,8 @@ pub unsafe extern "C" fn croupier_shard_unfinished(
     })
 }
 
-/// Closest hits of eight rays with the scene's triangles: picking, visibility, and the built-in part of an intersector of the
-/// host's own. Lanes of active count (bit i is lane i); *hit becomes the lanes that hit.
+/// Closest hits of eight rays with the scene's triangles: picking, visibility, and the built-in part of an intersector
+/// of the host's own. Lanes of active count (bit i is lane i); *hit becomes the lanes that hit.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_scene_closest(
     scene: *const croupier_scene,

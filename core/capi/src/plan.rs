@@ -20,7 +20,8 @@ pub struct croupier_plan {
     pub opaque: [u64; 128],
 }
 
-/// Sizes of a plan's blocks of memory. Each block starts at a multiple of CROUPIER_ALIGN bytes and may hold anything before.
+/// Sizes of a plan's blocks of memory. Each block starts at a multiple of CROUPIER_ALIGN bytes and may hold anything
+/// before.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct croupier_sizes {
@@ -87,8 +88,8 @@ fn identity(settings: &Settings) -> u64 {
     hash.0
 }
 
-/// Makes a plan of memory that may hold anything: checks the settings and measures the blocks. CROUPIER_SETTINGS if they
-/// cannot be used, with the reason in the message.
+/// Makes a plan of memory that may hold anything: checks the settings and measures the blocks. CROUPIER_SETTINGS if
+/// they cannot be used, with the reason in the message.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_plan_init(
     plan: *mut croupier_plan,

@@ -81,11 +81,11 @@ pub enum croupier_camera_kind {
     CROUPIER_PANORAMIC = 2,
 }
 
-/// The camera of a scene. A pixel sample is a point (x, y) in [0, width) x [0, height), y down; with X = 2 x / width - 1
-/// and Y = 2 y / height - 1 the ray of a perspective camera looks along forward + right X + down Y, from origin or a point of
-/// the lens; that of an orthographic one begins at origin + right X + down Y and runs along forward; a panoramic one
-/// looks from origin to longitude pi X (0 is forward, positive towards right) and latitude pi/2 Y (positive towards down).
-/// Pictures of another shape than width x height keep the height of the view.
+/// The camera of a scene. A pixel sample is a point (x, y) in [0, width) x [0, height), y down; with X = 2 x / width -
+/// 1 and Y = 2 y / height - 1 the ray of a perspective camera looks along forward + right X + down Y, from origin or a
+/// point of the lens; that of an orthographic one begins at origin + right X + down Y and runs along forward; a
+/// panoramic one looks from origin to longitude pi X (0 is forward, positive towards right) and latitude pi/2 Y
+/// (positive towards down). Pictures of another shape than width x height keep the height of the view.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct croupier_camera {
@@ -142,8 +142,8 @@ pub enum croupier_light_kind {
 pub struct croupier_light {
     /// croupier_light_kind; cannot change.
     pub kind: u32,
-    /// Area: index of the triangle; cannot change. Sphere, rectangle, disk: 1 if it emits to both sides, plus 2 if camera
-    /// rays do not see it.
+    /// Area: index of the triangle; cannot change. Sphere, rectangle, disk: 1 if it emits to both sides, plus 2 if
+    /// camera rays do not see it.
     pub triangle: u32,
     /// Area: area of the triangle, world units squared; cannot change.
     pub area: f32,
@@ -151,11 +151,11 @@ pub struct croupier_light {
     pub instance: u32,
     /// Point, spot: position. Sphere, rectangle, disk: middle. Directional, sun: unit direction towards the light.
     pub vector: [f32; 3],
-    /// Area, sphere, rectangle, disk: radiance. Point: intensity. Spot: intensity on the axis. Directional, sun: irradiance on
-    /// a facing surface. Up to 1e18.
+    /// Area, sphere, rectangle, disk: radiance. Point: intensity. Spot: intensity on the axis. Directional, sun:
+    /// irradiance on a facing surface. Up to 1e18.
     pub emission: [f32; 3],
-    /// Spot: unit axis, 1 - cos of the outer and of the inner half angle, 0. Sun: 1 - cos of its angular radius, then 0.
-    /// Sphere: radius, then 0. Rectangle: two halves of edges. Disk: unit normal, radius, 0, 0. Others: 0.
+    /// Spot: unit axis, 1 - cos of the outer and of the inner half angle, 0. Sun: 1 - cos of its angular radius, then
+    /// 0. Sphere: radius, then 0. Rectangle: two halves of edges. Disk: unit normal, radius, 0, 0. Others: 0.
     pub params: [f32; 6],
 }
 
@@ -193,19 +193,20 @@ pub enum croupier_material_kind {
 pub struct croupier_material {
     /// croupier_material_kind.
     pub kind: u32,
-    /// 1 if both sides behave like the front, plus 2 if the texture's alpha is the share of light that meets the surface,
-    /// plus 4 if rough models give back what single scattering between microfacets loses.
+    /// 1 if both sides behave like the front, plus 2 if the texture's alpha is the share of light that meets the
+    /// surface, plus 4 if rough models give back what single scattering between microfacets loses.
     pub flags: u32,
     /// Index of the texture that replaces reflectance, or CROUPIER_NONE.
     pub texture: u32,
     /// First entry of its tables. The library's: ignored when a material is set.
     pub table: u32,
-    /// Diffuse albedo, or scale of the specular reflection, 0 to 1; base colour of a principled material. Linear Rec. 709.
+    /// Diffuse albedo, or scale of the specular reflection, 0 to 1; base colour of a principled material. Linear Rec.
+    /// 709.
     pub reflectance: [f32; 3],
     /// GGX width, 1e-4 to 1.
     pub alpha: f32,
-    /// Conductors: real refractive index by channel. Dielectrics and plastics: eta[0] is the index behind the front side
-    /// over that before it.
+    /// Conductors: real refractive index by channel. Dielectrics and plastics: the first is the index behind the front
+    /// side over that before it.
     pub eta: [f32; 3],
     /// Plastics: reflectance of the interface from inside for diffuse light, which baking derives.
     pub fdr: f32,
@@ -225,8 +226,8 @@ pub struct croupier_texture {
     pub width: u32,
     /// Rows, at least 1.
     pub height: u32,
-    /// Of textures of principled materials: 1 if red, green and blue are numbers and not sRGB, plus 2 (clamped) or 4 (mirrored)
-    /// along u, plus 8 or 16 along v. Others have 0.
+    /// Of textures of principled materials: 1 if red, green and blue are numbers and not sRGB, plus 2 (clamped) or 4
+    /// (mirrored) along u, plus 8 or 16 along v. Others have 0.
     pub flags: u32,
 }
 
@@ -278,8 +279,8 @@ pub struct croupier_layer {
     pub nodes: [f32; 4],
 }
 
-/// What a principled material has besides croupier_material. Numbers without a range are from 0 to 1. The last four members
-/// are derived by baking from the roughnesses, the coat and the sheen: keep them with those.
+/// What a principled material has besides croupier_material. Numbers without a range are from 0 to 1. The last four
+/// members are derived by baking from the roughnesses, the coat and the sheen: keep them with those.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct croupier_principled {
@@ -309,13 +310,15 @@ pub struct croupier_principled {
     pub eta: f32,
     /// Factor on the tangential part of mapped normals, up to 1000.
     pub normal_scale: f32,
-    /// 1 if what light passes is a sheet and not a solid, plus 2 if the alpha of the base texture multiplies the opacity.
+    /// 1 if what light passes is a sheet and not a solid, plus 2 if the alpha of the base texture multiplies the
+    /// opacity.
     pub flags: u32,
     /// First entry of the rows of reflection among the scene's tables.
     pub reflection: u32,
     /// First entry of the rows of energy among the scene's tables, or CROUPIER_NONE.
     pub energy: u32,
-    /// Textures: base colour and opacity; metal (blue) and roughness (green); transmission (red); coat (red); normal; emission.
+    /// Textures: base colour and opacity; metal (blue) and roughness (green); transmission (red); coat (red); normal;
+    /// emission.
     pub textures: [croupier_texture_use; 6],
     /// Albedo of the coat at full strength.
     pub coat_layer: croupier_layer,

@@ -10,8 +10,8 @@ use core::ffi::{c_char, c_void};
 use core::ptr;
 use croupier::{EditableScene, Scene, SceneError};
 
-/// A scene: a baked blob in the program's memory. Calls that read it may run on several threads at a time, steps of shards
-/// included; an edit needs it for itself.
+/// A scene: a baked blob in the program's memory. Calls that read it may run on several threads at a time, steps of
+/// shards included; an edit needs it for itself.
 pub struct croupier_scene {
     _opaque: [u8; 0],
 }
@@ -63,10 +63,11 @@ pub(crate) unsafe fn scene_at<'a>(scene: *const croupier_scene) -> Result<&'a Gu
     promised!(Guarded::at(scene.cast()))
 }
 
-/// Makes a scene object in memory (CROUPIER_SCENE_BYTES bytes at a multiple of CROUPIER_ALIGN) for a baked blob, which is
-/// checked in one pass and then read in place. The blob starts at a multiple of 4, of 64 for full speed; it is the
-/// scene's until croupier_scene_destroy, and edits change it. *scene becomes the handle, which is the address of the memory;
-/// null after a failure. CROUPIER_SCENE, with the object and the number that are wrong in the message, if the blob is none.
+/// Makes a scene object in memory (CROUPIER_SCENE_BYTES bytes at a multiple of CROUPIER_ALIGN) for a baked blob, which
+/// is checked in one pass and then read in place. The blob starts at a multiple of 4, of 64 for full speed; it is the
+/// scene's until croupier_scene_destroy, and edits change it. *scene becomes the handle, which is the address of the
+/// memory; null after a failure. CROUPIER_SCENE, with the object and the number that are wrong in the message, if the
+/// blob is none.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_scene_init(
     memory: *mut c_void,
@@ -193,8 +194,8 @@ pub unsafe extern "C" fn croupier_scene_material(
     })
 }
 
-/// What principled material index has besides croupier_scene_material. CROUPIER_RANGE if there is none, or it is of another
-/// kind.
+/// What principled material index has besides croupier_scene_material. CROUPIER_RANGE if there is none, or it is of
+/// another kind.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_scene_principled(
     scene: *const croupier_scene,
@@ -253,7 +254,8 @@ pub unsafe extern "C" fn croupier_scene_material_name(
     })
 }
 
-/// Name of object index as CROUPIER_AOV_OBJECT shows it, empty if it has none. Texts as of croupier_scene_material_name.
+/// Name of object index as CROUPIER_AOV_OBJECT shows it, empty if it has none. Texts as of
+/// croupier_scene_material_name.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_scene_object_name(
     scene: *const croupier_scene,

@@ -14,8 +14,8 @@ use core::{ptr, slice};
 use croupier::unstable::ResumeError;
 use croupier::{Budget, MemoryError, SessionError, StepResult};
 
-/// A session: the picture so far and what was learned, in the program's memory. Calls that take a const pointer to it may run
-/// on several threads at a time; the others need it for themselves, or answer CROUPIER_BUSY.
+/// A session: the picture so far and what was learned, in the program's memory. Calls that take a const pointer to it
+/// may run on several threads at a time; the others need it for themselves, or answer CROUPIER_BUSY.
 pub struct croupier_session {
     _opaque: [u8; 0],
 }
@@ -140,9 +140,9 @@ unsafe fn start(s: &Start, kernel: &'static Kernel, parts: croupier_parts) -> Re
     Ok(())
 }
 
-/// Makes a session of a scene in memory: as many bytes as croupier_plan_sizes says, at a multiple of CROUPIER_ALIGN. The scene
-/// stays where it is, and exists, as long as the session is used; the plan may go. *session becomes the handle, which is
-/// the address of the memory; null after a failure.
+/// Makes a session of a scene in memory: as many bytes as croupier_plan_sizes says, at a multiple of CROUPIER_ALIGN.
+/// The scene stays where it is, and exists, as long as the session is used; the plan may go. *session becomes the
+/// handle, which is the address of the memory; null after a failure.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_init(
     memory: *mut c_void,
@@ -158,8 +158,8 @@ pub unsafe extern "C" fn croupier_session_init(
     })
 }
 
-/// croupier_session_init with parts of the host's own, which are copied. CROUPIER_RANGE if parts are there that do not go
-/// together.
+/// croupier_session_init with parts of the host's own, which are copied. CROUPIER_RANGE if parts are there that do not
+/// go together.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_init_with(
     memory: *mut c_void,
@@ -177,9 +177,9 @@ pub unsafe extern "C" fn croupier_session_init_with(
     })
 }
 
-/// Goes on with the session that croupier_session_suspend has left in memory, which may have been copied elsewhere or stored
-/// since, with the bits that it would have had without the break. The plan must be equal; with another scene the picture
-/// begins anew, with what was learned. CROUPIER_NOT_SUSPENDED if the memory holds no such session.
+/// Goes on with the session that croupier_session_suspend has left in memory, which may have been copied elsewhere or
+/// stored since, with the bits that it would have had without the break. The plan must be equal; with another scene
+/// the picture begins anew, with what was learned. CROUPIER_NOT_SUSPENDED if the memory holds no such session.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_resume(
     memory: *mut c_void,
@@ -229,7 +229,8 @@ pub unsafe extern "C" fn croupier_session_suspend(
     })
 }
 
-/// Ends a session: its memory is the program's again. CROUPIER_BUSY, and the session goes on, while another call uses it.
+/// Ends a session: its memory is the program's again. CROUPIER_BUSY, and the session goes on, while another call uses
+/// it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_destroy(
     session: *mut croupier_session,
@@ -241,7 +242,8 @@ pub unsafe extern "C" fn croupier_session_destroy(
     })
 }
 
-/// Begins a round of samples camera samples per pixel. One that is under way is abandoned. Shards notice at their next step.
+/// Begins a round of samples camera samples per pixel. One that is under way is abandoned. Shards notice at their next
+/// step.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_begin_iteration(
     session: *mut croupier_session,
@@ -254,10 +256,10 @@ pub unsafe extern "C" fn croupier_session_begin_iteration(
     })
 }
 
-/// Goes on with the end of the iteration: merges what the shards gathered, estimates the error, learns. All shards of the plan
-/// in order, each finished; the same ones until *more is 0, when the next iteration can begin. units is a budget: work in the
-/// time of a ray, some 300 instructions each. With the same bits whatever the budgets. CROUPIER_SHARDS, CROUPIER_UNFINISHED,
-/// CROUPIER_PLAN, CROUPIER_ITERATION: the picture is as before then.
+/// Goes on with the end of the iteration: merges what the shards gathered, estimates the error, learns. All shards of
+/// the plan in order, each finished; the same ones until *more is 0, when the next iteration can begin. units is a
+/// budget: work in the time of a ray, some 300 instructions each. With the same bits whatever the budgets.
+/// CROUPIER_SHARDS, CROUPIER_UNFINISHED, CROUPIER_PLAN, CROUPIER_ITERATION: the picture is as before then.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_finish_iteration(
     session: *mut croupier_session,
@@ -279,8 +281,8 @@ pub unsafe extern "C" fn croupier_session_finish_iteration(
     })
 }
 
-/// Forgets the picture and begins again with iteration 1; an iteration that is under way is abandoned. If keep is 0, what was
-/// learned is forgotten too, and the pictures that follow are those of a new session to the bit.
+/// Forgets the picture and begins again with iteration 1; an iteration that is under way is abandoned. If keep is 0,
+/// what was learned is forgotten too, and the pictures that follow are those of a new session to the bit.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_restart(
     session: *mut croupier_session,
@@ -293,9 +295,9 @@ pub unsafe extern "C" fn croupier_session_restart(
     })
 }
 
-/// Goes over to a scene that was edited, or to another one, and begins a new picture of it as croupier_session_restart does.
-/// Sizes and path length stay those of the plan. CROUPIER_EFFECTS if the library lacks what the scene needs; the session is
-/// as before then.
+/// Goes over to a scene that was edited, or to another one, and begins a new picture of it as croupier_session_restart
+/// does. Sizes and path length stay those of the plan. CROUPIER_EFFECTS if the library lacks what the scene needs; the
+/// session is as before then.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_change_scene(
     session: *mut croupier_session,

@@ -101,8 +101,8 @@ unsafe fn change<E>(
     Ok(())
 }
 
-/// Makes settings of memory that may hold anything: the default ones, with size and depth of the scene. scene may be null;
-/// then croupier_settings_set_size and croupier_settings_set of "max-depth" have to follow.
+/// Makes settings of memory that may hold anything: the default ones, with size and depth of the scene. scene may be
+/// null; then croupier_settings_set_size and croupier_settings_set of "max-depth" have to follow.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_settings_init(
     settings: *mut croupier_settings,
@@ -136,8 +136,8 @@ pub unsafe extern "C" fn croupier_settings_set(
     })
 }
 
-/// Text of a setting, which croupier_settings_set reads back. Writes at most size bytes, the last one 0; length, which may be
-/// null, becomes the length of the whole text without it. CROUPIER_RANGE if no setting has the name.
+/// Text of a setting, which croupier_settings_set reads back. Writes at most size bytes, the last one 0; length, which
+/// may be null, becomes the length of the whole text without it. CROUPIER_RANGE if no setting has the name.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_settings_get(
     settings: *const croupier_settings,
@@ -191,7 +191,8 @@ pub unsafe extern "C" fn croupier_settings_help(
     })
 }
 
-/// Sets columns and rows of the picture, pixels; at least 1 x 1 and at most 2^31 pixels, which croupier_plan_init checks.
+/// Sets columns and rows of the picture, pixels; at least 1 x 1 and at most 2^31 pixels, which croupier_plan_init
+/// checks.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_settings_set_size(
     settings: *mut croupier_settings,

@@ -159,9 +159,9 @@ unsafe fn start(s: &Start) -> Result<(), Failure<ShardError>> {
     Ok(())
 }
 
-/// Makes shard index of a plan in memory: as many bytes as croupier_plan_shard_size says, at a multiple of CROUPIER_ALIGN. It
-/// serves one session; make it anew for another one. *shard becomes the handle, which is the address of the memory; null
-/// after a failure. CROUPIER_RANGE if the plan has fewer shards.
+/// Makes shard index of a plan in memory: as many bytes as croupier_plan_shard_size says, at a multiple of
+/// CROUPIER_ALIGN. It serves one session; make it anew for another one. *shard becomes the handle, which is the
+/// address of the memory; null after a failure. CROUPIER_RANGE if the plan has fewer shards.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_shard_init(
     memory: *mut c_void,
@@ -176,8 +176,8 @@ pub unsafe extern "C" fn croupier_shard_init(
     })
 }
 
-/// Takes up the shard that croupier_shard_suspend has left in memory, which may have been copied elsewhere or stored since.
-/// CROUPIER_NOT_SUSPENDED if the memory holds no shard of an equal plan with this index, suspended.
+/// Takes up the shard that croupier_shard_suspend has left in memory, which may have been copied elsewhere or stored
+/// since. CROUPIER_NOT_SUSPENDED if the memory holds no shard of an equal plan with this index, suspended.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_shard_resume(
     memory: *mut c_void,
@@ -218,11 +218,12 @@ pub unsafe extern "C" fn croupier_shard_destroy(
     })
 }
 
-/// Works until about rays rays (exceeded by less than one packet of 16) are traced or the shard has finished the iteration;
+/// Works until about rays rays (exceeded by less than one packet of 16) are traced or the shard has finished the
+/// iteration;
 /// *more becomes 1 or 0. Many small steps and one big step give the same bits. Different shards may step on different threads
 /// at a time, with the same session; a program cancels by not calling again. CROUPIER_PLAN if session and shard are of
-/// different plans, CROUPIER_SCENE_CHANGED if the scene was edited since the session was told, CROUPIER_ITERATION if none has
-/// begun; *more is 0 then.
+/// different plans, CROUPIER_SCENE_CHANGED if the scene was edited since the session was told, CROUPIER_ITERATION if
+/// none has begun; *more is 0 then.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_shard_step(
     shard: *mut croupier_shard,
@@ -254,8 +255,8 @@ pub unsafe extern "C" fn croupier_shard_step(
     })
 }
 
-/// Starts no further camera samples in the iteration of the shard's last step: stepping on finishes those in flight, so that
-/// the iteration can end early and the picture stays unbiased.
+/// Starts no further camera samples in the iteration of the shard's last step: stepping on finishes those in flight,
+/// so that the iteration can end early and the picture stays unbiased.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_shard_stop(
     shard: *mut croupier_shard,

@@ -137,8 +137,8 @@ impl croupier_status {
     ];
 }
 
-/// What a status means, in a few English words that end with a zero byte. Never null, whatever the number. The text is the
-/// library's and stays.
+/// What a status means, in a few English words that end with a zero byte. Never null, whatever the number. The text is
+/// the library's and stays.
 #[unsafe(no_mangle)]
 pub extern "C" fn croupier_status_text(status: i32) -> *const c_char {
     text(status).as_ptr().cast()

@@ -1,5 +1,5 @@
-//! A host that lies: wrong sizes, misaligned memory, null, stale and foreign handles, calls at the wrong time. Every lie that
-//! can be seen is answered with a status and a message, and honest calls go on afterwards.
+//! A host that lies: wrong sizes, misaligned memory, null, stale and foreign handles, calls at the wrong time. Every
+//! lie that can be seen is answered with a status and a message, and honest calls go on afterwards.
 
 mod common;
 
@@ -121,8 +121,8 @@ fn structs_of_other_versions() {
     fails!(CROUPIER_STRUCT_SIZE, croupier_scene_set_camera(own.handle, &camera));
 }
 
-/// Killed by: a mark that is not looked at, an object that is taken for one of another type, a copy that is taken for the
-/// object.
+/// Killed by: a mark that is not looked at, an object that is taken for one of another type, a copy that is taken for
+/// the object.
 #[test]
 fn stale_and_foreign_handles() {
     let mut own = OwnScene::new(&common::baked());
@@ -361,8 +361,8 @@ fn absurd_values() {
     }
 }
 
-/// A thousand sessions, one after the other, in the same two blocks. Killed by: state that stays behind outside the blocks or
-/// in them.
+/// A thousand sessions, one after the other, in the same two blocks. Killed by: state that stays behind outside the
+/// blocks or in them.
 #[test]
 fn a_thousand_sessions_in_one_block() {
     let own = OwnScene::new(&common::baked());

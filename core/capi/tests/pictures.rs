@@ -134,7 +134,8 @@ unsafe extern "C" fn everything(_: *mut c_void, _: *const croupier_rays8, _: u32
     u32::MAX
 }
 
-/// An intersector that finds what cannot be: the picture is black, not undefined. Killed by: hits that are not looked at.
+/// An intersector that finds what cannot be: the picture is black, not undefined. Killed by: hits that are not looked
+/// at.
 #[test]
 fn nonsense_of_an_intersector_is_no_hit() {
     let scene = OwnScene::new(&common::baked());
@@ -145,7 +146,7 @@ fn nonsense_of_an_intersector_is_no_hit() {
     assert!(render.rgb().iter().all(|x| *x == 0.0));
 }
 
-/// Points of one triangle in place of a camera: irradiance over pi. Killed by: a kernel without them.
+/// Points of eight triangles in place of a camera: irradiance over pi. Killed by: a kernel without them.
 #[test]
 fn camera_samples_begin_at_points() {
     unsafe extern "C" fn points(
@@ -156,15 +157,15 @@ fn camera_samples_begin_at_points() {
     ) -> u32 {
         // SAFETY: the library's promise.
         let points = unsafe { &mut *points };
-        (points.triangle, points.u, points.v) = ([0; 8], [0.3; 8], [0.3; 8]);
-        active & 0x0f
+        (points.triangle, points.u, points.v) = ([0, 4, 8, 12, 16, 20, 24, 28], [0.3; 8], [0.3; 8]);
+        active
     }
     let scene = OwnScene::new(&common::baked());
     let own = croupier_parts { points: Some(points), ..parts(ptr::null_mut()) };
     let render = Render::new(scene.handle, &plan(&settings(scene.handle, 1)), Some(&own));
     render.render(1000, u64::MAX);
     let lit = render.rgb().iter().filter(|x| **x > 0.0).count();
-    assert!(lit > render.pixels && lit < 2 * render.pixels, "{lit} of {}", 3 * render.pixels);
+    assert!(lit > render.pixels / 2, "{lit} of {}", 3 * render.pixels);
 }
 
 /// Parts that do not go together are refused. Killed by: a pair that is used half.
@@ -210,8 +211,8 @@ fn suspended_blocks_go_on_elsewhere() {
     assert_eq!(render.hash(), expected("A"));
 }
 
-/// Two processes that render half of the shards each have the picture of one. Killed by: a shard that is taken for another one,
-/// sums that are left out.
+/// Two processes that render half of the shards each have the picture of one. Killed by: a shard that is taken for
+/// another one, sums that are left out.
 #[test]
 fn processes_exchange_shards() {
     let scene = OwnScene::new(&common::baked());
@@ -220,14 +221,18 @@ fn processes_exchange_shards() {
     let mut longest = 0;
     ok!(croupier_plan_saved_shard_size(&plan, 0, &raw mut longest));
     fails!(CROUPIER_RANGE, croupier_plan_saved_shard_size(&plan, 8, &raw mut longest));
-    let (mut bytes, mut written) = (vec![0u8; longest], 0);
+    let (mut bytes, mut written, mut has_more) = (vec![0u8; longest], 0, 0);
     for samples in [2, 2, 4] {
         both.iter().for_each(|r| r.begin(samples));
         for i in 0..8 {
             let [from, to] = if i % 2 == 0 { [0, 1] } else { [1, 0] };
             let (shard, other) = (both[from].shards[i], both[to].shards[i]);
             let (p, n) = (bytes.as_mut_ptr().cast(), bytes.len());
-            fails!(CROUPIER_UNFINISHED, croupier_shard_save(shard, p, n, &raw mut written));
+            if samples == 2 && from == 0 && i == 0 {
+                // one that has just begun
+                ok!(croupier_shard_step(shard, both[from].session, 1, &raw mut has_more));
+                fails!(CROUPIER_UNFINISHED, croupier_shard_save(shard, p, n, &raw mut written));
+            }
             let mut more = 1;
             while more != 0 {
                 ok!(croupier_shard_step(shard, both[from].session, 1000, &raw mut more));
@@ -252,8 +257,8 @@ fn processes_exchange_shards() {
     assert_ne!(apart.render(1000, u64::MAX), expected("B"));
 }
 
-/// Statistics and estimate go out and come in. Killed by: bytes of another session that are not checked, a load that does
-/// nothing.
+/// Statistics and estimate go out and come in. Killed by: bytes of another session that are not checked, a load that
+/// does nothing.
 #[test]
 fn statistics_are_saved_and_loaded() {
     let scene = OwnScene::new(&common::baked());
@@ -311,12 +316,13 @@ fn what_sessions_show() {
     render.finish(u64::MAX);
     assert_eq!(rgb, render.rgb(), "of one iteration");
     ok!(croupier_session_plane(render.session, 2, 0, p, n));
-    assert!(plane.iter().all(|z| (4.0..9.0).contains(z)), "distances in the box");
+    assert!(plane.iter().all(|z| (0.0..9.0).contains(z)), "distances in the box");
+    assert!(plane.iter().filter(|z| **z > 5.0).count() > n / 2);
     fails!(CROUPIER_ABSENT, croupier_session_plane(render.session, 1, 0, p, n));
     fails!(CROUPIER_RANGE, croupier_session_plane(render.session, 2, 1, p, n));
     fails!(CROUPIER_RANGE, croupier_session_plane(render.session, 15, 0, p, n));
     fails!(CROUPIER_SIZE, croupier_session_plane(render.session, 2, 0, p, n + 1));
-    assert_eq!((0..16).map(croupier_aov_channels).sum::<u32>(), 37);
+    assert_eq!((0..16).map(|aov| croupier_aov_channels(aov)).sum::<u32>(), 38);
 
     let empty = croupier_pixel { mean: [0.0; 3], standard_error: [0.0; 3], samples: 0, rays: 0 };
     let mut pixels = vec![empty; n];
@@ -324,7 +330,7 @@ fn what_sessions_show() {
     fails!(CROUPIER_RANGE, croupier_session_pixels(render.session, 1, n, pixels.as_mut_ptr()));
     fails!(CROUPIER_RANGE, croupier_session_pixels(render.session, usize::MAX, 2, pixels.as_mut_ptr()));
     assert!(pixels.iter().zip(render.rgb()[3..].chunks(3)).all(|(p, rgb)| p.mean == rgb));
-    assert!(pixels[..n - 1].iter().all(|p| p.samples == 2 && p.rays > 2));
+    assert!(pixels[..n - 1].iter().all(|p| p.samples == 2 && p.rays >= 2) && pixels.iter().any(|p| p.rays > 2));
     assert!(pixels.iter().any(|p| p.standard_error.iter().all(|e| *e > 0.0)));
 
     let mut counters = croupier_counters { struct_size: 312, ..bytemuck::Zeroable::zeroed() };

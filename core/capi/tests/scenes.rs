@@ -60,8 +60,8 @@ impl Arrays {
     }
 }
 
-/// A scene that C composes of the box's arrays gives the picture of the baked box. Killed by: an array that is left out or
-/// read with another stride.
+/// A scene that C composes of the box's arrays gives the picture of the baked box. Killed by: an array that is left
+/// out or read with another stride.
 #[test]
 fn composed_scenes_render() {
     let own = Arrays::of(&common::baked());
@@ -78,11 +78,7 @@ fn composed_scenes_render() {
     assert!(length <= n);
     let scene = OwnScene::new(&blob.bytes()[..length]);
     let hash = Render::new(scene.handle, &plan(&settings(scene.handle, 1)), None).render(1000, u64::MAX);
-    // light and geometry are the same; the order in which lights are chosen from the table may differ from the baker's
-    let baked = OwnScene::new(&common::baked());
-    let other = Render::new(baked.handle, &plan(&settings(baked.handle, 1)), None);
-    assert_eq!(other.render(1000, u64::MAX), expected("A"));
-    assert_eq!(hash, expected("A"), "if only this fails: compare the means instead");
+    assert_eq!(hash, expected("A"));
 }
 
 /// Arrays that make no scene. Killed by: an index or a number that is not looked at.
@@ -154,8 +150,8 @@ fn views_and_light_sources_become_records() {
     fails!(CROUPIER_RANGE, croupier_material_init(&raw mut material, 50));
 }
 
-/// Edits change the picture, and taken back give the old one to the bit. Killed by: an edit that reaches another record, an
-/// identity that does not follow.
+/// Edits change the picture, and taken back give the old one to the bit. Killed by: an edit that reaches another
+/// record, an identity that does not follow.
 #[test]
 fn edits_change_the_picture() {
     let own = OwnScene::new(&common::baked());

@@ -95,7 +95,7 @@ pub(super) fn load_pixels(plane: &[f32], (at, lanes): (usize, usize)) -> F32x8 {
 #[inline(always)]
 pub(super) fn store_pixels(plane: &mut [f32], (at, lanes): (usize, usize), x: F32x8) {
     if let (Some(to), Some(from)) = (plane.get_mut(at..at + lanes), x.to_array().get(..lanes)) {
-        to.copy_from_slice(from);
+        to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
     }
 }
 

@@ -83,9 +83,10 @@ pub(super) fn load_row<S: NoisySource>(noisy: &S, grid: Grid, y: usize, work: &m
         return;
     }
     for (block, planes) in [(&mut *signal, SIGNAL), (&mut *features, FEATURES)] {
-        for plane in block.chunks_exact_mut(s).take(planes) {
-            plane[..MARGIN].fill(0.0);
-            plane[MARGIN + grid.padded..].fill(0.0);
+        for plane in block.chunks_exact_mut(s.max(1)).take(planes) {
+            for margin in [0..MARGIN, MARGIN + grid.padded..s] {
+                plane.get_mut(margin).unwrap_or(&mut []).fill(0.0);
+            }
         }
     }
     for margin in [0..MARGIN, MARGIN + grid.padded..s] {

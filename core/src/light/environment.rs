@@ -67,7 +67,7 @@ fn map_position(e: &Environment, d: Vec3x8) -> MapPosition {
     let c = d.x.atan2(-d.z) * (1.0 / TAU) * e.width as f32 - 0.5;
     let left = c.floor();
     let width = e.width.clamp(1, i32::MAX as u32) as i32;
-    let wrap = |i: i32| i.rem_euclid(width) as u32;
+    let wrap = |i: i32| i.checked_rem_euclid(width).unwrap_or(0) as u32;
     MapPosition {
         column: left.to_i32().to_array().map(wrap),
         row: row.to_i32().to_array().map(|j| j as u32),

@@ -228,7 +228,9 @@ impl<'m> Bookkeeping<'m> {
     /// `lanes` samples of a waiting vertex are drawn; `drained` if they are its last.
     #[inline(always)]
     pub(super) fn draw(&mut self, v: &PathVertex, lanes: u32, drained: bool) {
-        self.roots.get(v.root()).open += lanes - u32::from(drained);
+        if let Some(root) = self.roots.find(v.root()) {
+            root.open += lanes - u32::from(drained);
+        }
         self.ledger.draw(v.record(), lanes, drained);
     }
 
@@ -265,7 +267,8 @@ impl<'m> Bookkeeping<'m> {
         let root = path.root.to_array();
         let (r, g, b) = (radiance.x.to_array(), radiance.y.to_array(), radiance.z.to_array());
         for i in good.lanes() {
-            let sum = &mut self.roots.get(root[i]).radiance;
+            let Some(root) = self.roots.find(root[i]) else { continue };
+            let sum = &mut root.radiance;
             sum[0] += f64::from(r[i]);
             sum[1] += f64::from(g[i]);
             sum[2] += f64::from(b[i]);
@@ -326,7 +329,9 @@ impl<'m> Bookkeeping<'m> {
     pub(super) fn charge(&mut self, mask: Mask8, path: &Path8, cost: f32) {
         let root = path.root.to_array();
         for i in mask.lanes() {
-            self.roots.get(root[i]).rays += 1;
+            if let Some(root) = self.roots.find(root[i]) {
+                root.rays += 1;
+            }
         }
         let logged = mask.and_not(path.record.eq(U32x8::splat(NO_RECORD)));
         if logged.any() {

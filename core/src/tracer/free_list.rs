@@ -47,13 +47,15 @@ impl<'m> FreeList<'m> {
     #[inline(always)]
     pub(crate) fn take(&mut self) -> Option<u32> {
         self.len = self.len.checked_sub(1)?;
-        Some(self.slots[self.len])
+        self.slots.get(self.len).copied()
     }
 
     /// Gives back a slot that was taken.
     #[inline(always)]
     pub(crate) fn give(&mut self, slot: u32) {
-        self.slots[self.len] = slot;
-        self.len += 1;
+        if let Some(place) = self.slots.get_mut(self.len) {
+            *place = slot;
+            self.len += 1;
+        }
     }
 }

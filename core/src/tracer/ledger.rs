@@ -105,7 +105,8 @@ impl<'m> Ledger<'m> {
     pub(crate) fn open(&mut self, parent: u32, with_nee: bool) -> u32 {
         let Some(slot) = self.free.take() else { return NO_RECORD };
         let open = if with_nee { 1 | WITH_NEE } else { 1 };
-        self.records[slot as usize] = LedgerRecord { parent, open, ..Zeroable::zeroed() };
+        let Some(record) = self.records.get_mut(slot as usize) else { return NO_RECORD };
+        *record = LedgerRecord { parent, open, ..Zeroable::zeroed() };
         slot
     }
 

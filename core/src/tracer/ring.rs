@@ -66,6 +66,8 @@ pub(crate) struct Ring<'m> {
     pending: [u32; Queue::COUNT],
     /// Bits of the queues in which vertices wait.
     occupied: u32,
+    /// What a number without a slot stands for: there is none, unless others have written into the block.
+    nobody: PathVertex,
 }
 
 const _: () = assert!(Queue::COUNT <= u32::BITS as usize);
@@ -90,7 +92,8 @@ impl<'m> Ring<'m> {
     pub(crate) fn carve(c: &mut Carver<'m>, capacity: usize) -> Result<Self, MemoryError> {
         let (slots, next) = (c.take_unset(capacity)?, c.take_unset(capacity)?);
         let (last, pending) = ([NONE; Queue::COUNT], [0; Queue::COUNT]);
-        Ok(Self { slots, next, free: NONE, free_len: 0, last, pending, occupied: 0 })
+        let nobody = Zeroable::zeroed();
+        Ok(Self { slots, next, free: NONE, free_len: 0, last, pending, occupied: 0, nobody })
     }
 
     /// All but slots and links, for [`Self::resume`].
@@ -136,7 +139,7 @@ impl<'m> Ring<'m> {
     pub(crate) fn fullest(&self) -> Option<(Queue, u32)> {
         let mut best = None;
         for queue in Queue::of_bits(self.occupied) {
-            let n = self.pending[queue.index()];
+            let n = self.pending.get(queue.index()).copied().unwrap_or(0);
             if best.is_none_or(|(_, most)| n > most) {
                 best = Some((queue, n));
             }
@@ -151,42 +154,47 @@ impl<'m> Ring<'m> {
             return;
         }
         let slot = self.free;
-        self.free = self.next[slot as usize];
+        let at = slot as usize;
+        let (Some(next), Some(place)) = (self.next.get(at).copied(), self.slots.get_mut(at)) else { return };
+        *place = v;
+        self.free = next;
         self.free_len -= 1;
-        self.slots[slot as usize] = v;
         self.wait(class, slot);
     }
 
     /// Puts a vertex into the queue of its next samples.
     fn wait(&mut self, class: PacketClass, slot: u32) {
-        let v = &self.slots[slot as usize];
+        let Some(v) = self.slots.get(slot as usize) else { return };
         let with_nee = v.with_nee() > 0;
         let n = if with_nee { v.with_nee() } else { v.count() };
         let q = class.queue(with_nee).index();
-        let last = self.last[q];
-        if last == NONE {
-            self.next[slot as usize] = slot;
-            self.last[q] = slot;
-        } else {
-            self.next[slot as usize] = self.next[last as usize];
-            self.next[last as usize] = slot;
+        let (Some(last), Some(pending)) = (self.last.get_mut(q), self.pending.get_mut(q)) else { return };
+        let mut first = slot;
+        if *last == NONE {
+            *last = slot;
+        } else if let Some(link) = self.next.get_mut(*last as usize) {
+            first = core::mem::replace(link, slot);
             if !NEWEST_FIRST {
-                self.last[q] = slot;
+                *last = slot;
             }
         }
-        self.pending[q] += n;
+        if let Some(link) = self.next.get_mut(slot as usize) {
+            *link = first;
+        }
+        *pending += n;
         self.occupied |= 1 << q;
     }
 
     /// Takes the first vertex out of a queue that has one.
     fn leave(&mut self, q: usize) {
-        let last = self.last[q] as usize;
-        let first = self.next[last] as usize;
-        if first == last {
-            self.last[q] = NONE;
+        let Some(last) = self.last.get_mut(q) else { return };
+        let link = |slot: u32| self.next.get(slot as usize).copied();
+        let Some(first) = link(*last) else { return };
+        if first == *last {
+            *last = NONE;
             self.occupied &= !(1 << q);
-        } else {
-            self.next[last] = self.next[first];
+        } else if let (Some(second), Some(link)) = (link(first), self.next.get_mut(*last as usize)) {
+            *link = second;
         }
     }
 
@@ -197,9 +205,10 @@ impl<'m> Ring<'m> {
         let q = queue.index();
         let (mut slot, mut sample) = ([0u32; 8], [0u32; 8]);
         let (mut lanes, mut room) = (0usize, self.free_len);
-        while lanes < 8 && self.last[q] != NONE {
-            let s = self.next[self.last[q] as usize];
-            let v = &mut self.slots[s as usize];
+        while lanes < 8 {
+            let Some(&last) = self.last.get(q).filter(|last| **last != NONE) else { break };
+            let Some(&s) = self.next.get(last as usize) else { break };
+            let Some(v) = self.slots.get_mut(s as usize) else { break };
             let count = v.count();
             let left = if queue.with_nee() { v.with_nee() } else { count };
             let want = left.min((8 - lanes) as u32);
@@ -215,18 +224,20 @@ impl<'m> Ring<'m> {
             let first = v.take(m);
             let drained = m == count;
             for k in 0..m {
-                slot[lanes] = s;
-                sample[lanes] = first.wrapping_add(k);
+                let (Some(slot), Some(sample)) = (slot.get_mut(lanes), sample.get_mut(lanes)) else { break };
+                (*slot, *sample) = (s, first.wrapping_add(k));
                 lanes += 1;
             }
             room = room + usize::from(drained) - m as usize;
-            self.pending[q] -= m;
+            let Some(pending) = self.pending.get_mut(q) else { break };
+            *pending -= m;
             taken(v, m, drained);
             if m == left {
                 self.leave(q);
             }
             if drained {
-                self.next[s as usize] = self.free;
+                let Some(link) = self.next.get_mut(s as usize) else { break };
+                *link = self.free;
                 self.free = s;
                 self.free_len += 1;
             } else if m == left {
@@ -237,14 +248,14 @@ impl<'m> Ring<'m> {
             return None;
         }
         let first = slot[0];
-        slot[lanes..].fill(first);
+        slot.iter_mut().skip(lanes).for_each(|s| *s = first);
         Some(Taken8 { slots: slot, sample: U32x8::new(sample), lanes, queue })
     }
 
     /// The records of samples that were just taken: before anything else is stored.
     #[inline(always)]
     pub(crate) fn records(&self, taken: &Taken8) -> [&PathVertex; 8] {
-        taken.slots.map(|s| &self.slots[s as usize])
+        taken.slots.map(|s| self.slots.get(s as usize).unwrap_or(&self.nobody))
     }
 }
 

@@ -83,6 +83,8 @@ const _: () = assert!(ROW + 8 <= size_of::<CameraSample>() / 4);
 pub(crate) struct Roots<'m> {
     slots: &'m mut [CameraSample],
     free: FreeList<'m>,
+    /// What a number without a slot stands for: there is none, unless others have written into the block.
+    nobody: CameraSample,
 }
 
 impl<'m> Roots<'m> {
@@ -92,7 +94,7 @@ impl<'m> Roots<'m> {
 
     pub(crate) fn carve(c: &mut Carver<'m>, capacity: usize) -> Result<Self, MemoryError> {
         let slots = c.take_unset(capacity)?;
-        Ok(Self { slots, free: FreeList::carve(c, capacity)? })
+        Ok(Self { slots, free: FreeList::carve(c, capacity)?, nobody: Zeroable::zeroed() })
     }
 
     /// How many slots are free, for [`Self::resume`].
@@ -113,7 +115,7 @@ impl<'m> Roots<'m> {
     /// A new root with one open lane. `None` cannot happen while roots outnumber vertices by two packets.
     pub(crate) fn open(&mut self, target: PixelTarget) -> Option<u32> {
         let slot = self.free.take()?;
-        self.slots[slot as usize] = CameraSample { target, open: 1, ..Zeroable::zeroed() };
+        *self.slots.get_mut(slot as usize)? = CameraSample { target, open: 1, ..Zeroable::zeroed() };
         Some(slot)
     }
 
@@ -140,13 +142,20 @@ impl<'m> Roots<'m> {
         F32x8::from_fn(|i| self.slots.get(slots[i] as usize).map_or(0.0, |root| root.time))
     }
 
+    /// The root in a slot.
+    #[inline(always)]
+    pub(crate) fn find(&mut self, slot: u32) -> Option<&mut CameraSample> {
+        self.slots.get_mut(slot as usize)
+    }
+
+    /// The root in a slot, or nobody's.
     pub(crate) fn get(&mut self, slot: u32) -> &mut CameraSample {
-        &mut self.slots[slot as usize]
+        self.slots.get_mut(slot as usize).unwrap_or(&mut self.nobody)
     }
 
     /// Closes one vertex or lane; the finished root if it was the last.
     pub(crate) fn close(&mut self, slot: u32) -> Option<CameraSample> {
-        let root = &mut self.slots[slot as usize];
+        let root = self.slots.get_mut(slot as usize)?;
         root.open -= 1;
         if root.open > 0 {
             return None;

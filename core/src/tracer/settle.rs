@@ -21,7 +21,7 @@ pub(crate) fn settle(book: &mut Bookkeeping<'_>, ring: &mut Ring<'_>, a: &Arriva
         let extra = d.n[i] - 1;
         book.counters.splits += u64::from(extra);
         book.counters.light_samples_skipped += u64::from(d.n[i] - d.with_nee[i]);
-        let r = book.roots.get(root[i]);
+        let Some(r) = book.roots.find(root[i]) else { continue };
         r.splits = r.splits.saturating_add(extra);
         // the lane's share of `open` passes to the waiting vertex
         ring.push(class, records[i]);

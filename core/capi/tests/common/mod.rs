@@ -1,5 +1,5 @@
 //! A host in Rust that sees the library as C does.
-#![allow(dead_code, clippy::allow_attributes, reason = "each test uses a part of it")]
+#![allow(dead_code, unused_macros, unused_imports, clippy::allow_attributes, reason = "each test uses a part of it")]
 
 use croupier_capi::*;
 use croupier_host::bake::{BakeOptions, bake};
@@ -42,62 +42,62 @@ macro_rules! fails {
 }
 pub(crate) use fails;
 
-pub fn message() -> croupier_message {
+pub(crate) fn message() -> croupier_message {
     croupier_message { text: [1; 256] }
 }
 
-pub fn text(message: &croupier_message) -> String {
+pub(crate) fn text(message: &croupier_message) -> String {
     let bytes: Vec<u8> = message.text.iter().map(|c| *c as u8).collect();
     CStr::from_bytes_until_nul(&bytes).expect("a zero byte").to_string_lossy().into_owned()
 }
 
 /// A library's own text.
-pub fn static_text(text: *const c_char) -> String {
+pub(crate) fn static_text(text: *const c_char) -> String {
     // SAFETY: the library's texts end with a zero byte and stay.
     unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }
 
 /// Memory at a multiple of 64 bytes that holds rubbish.
-pub struct Block(AlignedBytes);
+pub(crate) struct Block(AlignedBytes);
 
 impl Block {
-    pub fn new(bytes: usize) -> Self {
+    pub(crate) fn new(bytes: usize) -> Self {
         Self::of(&vec![0xa5; bytes])
     }
 
-    pub fn of(bytes: &[u8]) -> Self {
+    pub(crate) fn of(bytes: &[u8]) -> Self {
         let mut block = AlignedBytes::zeroed(bytes.len());
         block.as_mut().copy_from_slice(bytes);
         Self(block)
     }
 
-    pub fn pointer(&mut self) -> *mut c_void {
+    pub(crate) fn pointer(&mut self) -> *mut c_void {
         self.0.as_mut().as_mut_ptr().cast()
     }
 
-    pub fn len(&mut self) -> usize {
+    pub(crate) fn len(&mut self) -> usize {
         self.0.as_mut().len()
     }
 
-    pub fn bytes(&mut self) -> &mut [u8] {
+    pub(crate) fn bytes(&mut self) -> &mut [u8] {
         self.0.as_mut()
     }
 }
 
 /// The baked box of the examples.
-pub fn baked() -> AlignedBytes {
+pub(crate) fn baked() -> AlignedBytes {
     bake(&builtin::cornell_blocks(), &BakeOptions::default(), |_, _| {}).expect("a scene").bytes
 }
 
 /// A scene with its memory.
-pub struct OwnScene {
-    pub object: Block,
-    pub blob: Block,
-    pub handle: *mut croupier_scene,
+pub(crate) struct OwnScene {
+    pub(crate) object: Block,
+    pub(crate) blob: Block,
+    pub(crate) handle: *mut croupier_scene,
 }
 
 impl OwnScene {
-    pub fn new(blob: &[u8]) -> Self {
+    pub(crate) fn new(blob: &[u8]) -> Self {
         let (mut object, mut blob) = (Block::new(CROUPIER_SCENE_BYTES), Block::of(blob));
         let mut handle = ptr::null_mut();
         ok!(croupier_scene_init(object.pointer(), object.len(), blob.pointer(), blob.len(), &raw mut handle));
@@ -105,18 +105,18 @@ impl OwnScene {
     }
 
     /// Address of the blob.
-    pub fn blob_at(&self) -> *mut c_void {
+    pub(crate) fn blob_at(&self) -> *mut c_void {
         self.blob.0.as_ptr().cast_mut().cast()
     }
 }
 
-pub fn set(settings: &mut croupier_settings, name: &str, value: &str) {
+pub(crate) fn set(settings: &mut croupier_settings, name: &str, value: &str) {
     let (name, value) = (CString::new(name).expect("a name"), CString::new(value).expect("a value"));
     ok!(croupier_settings_set(settings, name.as_ptr(), value.as_ptr()));
 }
 
 /// Settings of the examples.
-pub fn settings(scene: *const croupier_scene, shards: u32) -> croupier_settings {
+pub(crate) fn settings(scene: *const croupier_scene, shards: u32) -> croupier_settings {
     let mut settings = croupier_settings { opaque: [7; 64] };
     ok!(croupier_settings_init(&raw mut settings, scene));
     for (name, value) in [
@@ -133,28 +133,28 @@ pub fn settings(scene: *const croupier_scene, shards: u32) -> croupier_settings 
     settings
 }
 
-pub fn plan(settings: &croupier_settings) -> croupier_plan {
+pub(crate) fn plan(settings: &croupier_settings) -> croupier_plan {
     let mut plan = croupier_plan { opaque: [7; 128] };
     ok!(croupier_plan_init(&raw mut plan, settings));
     plan
 }
 
-pub fn sizes(plan: &croupier_plan) -> croupier_sizes {
+pub(crate) fn sizes(plan: &croupier_plan) -> croupier_sizes {
     let mut sizes = croupier_sizes { struct_size: 40, width: 0, height: 0, shards: 0, session: 0, shard: 0, stack: 0 };
     ok!(croupier_plan_sizes(plan, &raw mut sizes));
     sizes
 }
 
 /// A session with its shards and their memory.
-pub struct Render {
-    pub session: *mut croupier_session,
-    pub shards: Vec<*mut croupier_shard>,
-    pub memory: Vec<Block>,
-    pub pixels: usize,
+pub(crate) struct Render {
+    pub(crate) session: *mut croupier_session,
+    pub(crate) shards: Vec<*mut croupier_shard>,
+    pub(crate) memory: Vec<Block>,
+    pub(crate) pixels: usize,
 }
 
 impl Render {
-    pub fn new(scene: *const croupier_scene, plan: &croupier_plan, parts: Option<&croupier_parts>) -> Self {
+    pub(crate) fn new(scene: *const croupier_scene, plan: &croupier_plan, parts: Option<&croupier_parts>) -> Self {
         let sizes = sizes(plan);
         let mut memory = vec![Block::new(sizes.session as usize)];
         let mut session = ptr::null_mut();
@@ -178,11 +178,11 @@ impl Render {
         Self { session, shards, memory, pixels: (sizes.width * sizes.height) as usize }
     }
 
-    pub fn begin(&self, samples: u32) {
+    pub(crate) fn begin(&self, samples: u32) {
         ok!(croupier_session_begin_iteration(self.session, samples));
     }
 
-    pub fn step_all(&self, rays: u64) {
+    pub(crate) fn step_all(&self, rays: u64) {
         for shard in &self.shards {
             let mut more = 1;
             while more != 0 {
@@ -191,7 +191,7 @@ impl Render {
         }
     }
 
-    pub fn finish(&self, units: u64) {
+    pub(crate) fn finish(&self, units: u64) {
         let mut more = 1;
         while more != 0 {
             let (shards, count) = (self.shards.as_ptr(), self.shards.len());
@@ -200,7 +200,7 @@ impl Render {
     }
 
     /// The three iterations of the examples; the hash of the picture.
-    pub fn render(&self, rays: u64, units: u64) -> u64 {
+    pub(crate) fn render(&self, rays: u64, units: u64) -> u64 {
         for samples in [2, 2, 4] {
             self.begin(samples);
             self.step_all(rays);
@@ -209,20 +209,20 @@ impl Render {
         self.hash()
     }
 
-    pub fn rgb(&self) -> Vec<f32> {
+    pub(crate) fn rgb(&self) -> Vec<f32> {
         let mut rgb = vec![0.0; 3 * self.pixels];
         ok!(croupier_session_rgb(self.session, rgb.as_mut_ptr(), rgb.len()));
         rgb
     }
 
-    pub fn hash(&self) -> u64 {
+    pub(crate) fn hash(&self) -> u64 {
         let mix = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
         self.rgb().into_iter().flat_map(f32::to_le_bytes).fold(0xcbf2_9ce4_8422_2325, mix)
     }
 }
 
 /// Hash of a picture of the examples.
-pub fn expected(name: &str) -> u64 {
+pub(crate) fn expected(name: &str) -> u64 {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../embed-example/hashes.txt");
     let text = std::fs::read_to_string(file).expect("the hashes");
     let line = text.lines().find_map(|l| l.strip_prefix(name)).expect("the picture");
