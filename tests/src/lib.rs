@@ -7,6 +7,7 @@ pub mod bsdf;
 pub mod cache;
 pub mod documents;
 pub mod embedding;
+pub mod exchange;
 pub mod furnace;
 pub mod geometry;
 pub mod gltf;
