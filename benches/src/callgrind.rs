@@ -1,5 +1,5 @@
-//! Instructions counted by callgrind in the two parts of a render ([`serial`]): the running program calls itself under
-//! valgrind.
+//! Instructions counted by callgrind, in the two parts of a render ([`serial`]) or in single calls: the running program
+//! calls itself under valgrind.
 
 use crate::serial;
 use croupier_host::bake::{BakeOptions, bake};
@@ -8,6 +8,7 @@ use croupier_host::description::SceneDescription;
 use croupier_host::{builtin, load};
 use serde_json::Value;
 use std::error::Error;
+use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -105,6 +106,46 @@ pub fn count(folder: &Folder, label: &str, args: &[&str]) -> Result<Counted, Box
         return Err(format!("callgrind counted {instructions:?} in {functions:?}, and {total:?} in all").into());
     }
     Ok(Counted { rays, instructions })
+}
+
+/// Makes a call that [`each_call`] counts. Not generic, so that the functions that callgrind looks for have one name.
+#[inline(never)]
+pub fn bench_collect(call: &mut dyn FnMut()) {
+    // callgrind writes no profile where it does not collect, so the end of the call is in another function
+    bench_one_call(call);
+    // no call in place of the return
+    black_box(());
+}
+
+/// What callgrind writes a profile after.
+#[inline(never)]
+fn bench_one_call(call: &mut dyn FnMut()) {
+    call();
+    black_box(());
+}
+
+/// Runs this program with `args` under callgrind; it must print a line for each call of [`bench_collect`]. The lines, each
+/// with the instructions of its call.
+pub fn each_call(folder: &Folder, args: &[&str]) -> Result<Vec<(String, u64)>, Box<dyn Error>> {
+    let out = folder.path().join("calls.out");
+    let mut valgrind = Command::new("valgrind");
+    valgrind.args(["--tool=callgrind", "--quiet", "--collect-atstart=no", "--dump-line=no"]);
+    valgrind.args(["--toggle-collect=*bench_collect*", "--dump-after=*bench_one_call*"]);
+    valgrind.arg(format!("--callgrind-out-file={}", out.display()));
+    let output = valgrind.arg(std::env::current_exe()?).args(args).output()?;
+    if !output.status.success() {
+        return Err(String::from_utf8_lossy(&output.stderr).into());
+    }
+    let mut calls = Vec::new();
+    for (line, number) in String::from_utf8(output.stdout)?.lines().zip(1..) {
+        let path = folder.path().join(format!("calls.out.{number}"));
+        let profile = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        std::fs::remove_file(&path)?;
+        let total = profile.lines().find_map(|l| l.strip_prefix("totals: ")?.trim().parse::<u64>().ok());
+        let n = total.filter(|&n| n > 0).ok_or("callgrind counted nothing in a call")?;
+        calls.push((line.to_owned(), n));
+    }
+    Ok(calls)
 }
 
 /// Instructions in all calls of a function, with all that it calls. A profile has three lines for the calls from one

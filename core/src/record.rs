@@ -178,7 +178,7 @@ mod tests {
     use super::*;
     use crate::Strategy;
     use std::collections::HashMap;
-    use std::string::{String, ToString};
+    use std::string::String;
 
     /// Killed by: an option of a strategy, or a value of a setting, that is left out of the hash.
     #[test]
@@ -240,7 +240,7 @@ mod tests {
             other(name, text);
         }
         for setting in Settings::TABLE {
-            let tried = seen.values().any(|text| text.split(' ').next() == Some(&setting.name.to_string()));
+            let tried = seen.values().any(|text| text.split(' ').next() == Some(setting.name));
             assert!(tried, "no other value of {} was tried", setting.name);
         }
     }

@@ -2,8 +2,8 @@
 //! The script that runs everything compares them with what the Cortex-M7 programs print. With `--level`: the instruction
 //! set of this build.
 
-use croupier_firmware::{BETWEEN_TICKS, Renderer, SESSION_BYTES, SHARD_BYTES, Sensor, box_bytes};
-use croupier_host::blob::AlignedBytes;
+// An example of the firmware's package as well, for processors that the other packages are not built for.
+use croupier_firmware::{Aligned, BETWEEN_TICKS, Renderer, SESSION_BYTES, SHARD_BYTES, Sensor, box_bytes};
 
 fn main() {
     let asked = |option: &str| std::env::args().any(|a| a == option);
@@ -11,8 +11,8 @@ fn main() {
         let v3 = cfg!(all(target_feature = "avx2", target_feature = "fma"));
         println!("{}{}", std::env::consts::ARCH.replace('_', "-"), if v3 { "-v3" } else { "" });
     } else if asked("--picture") {
-        let (mut session, mut shard) = (AlignedBytes::zeroed(SESSION_BYTES), AlignedBytes::zeroed(SHARD_BYTES));
-        let mut renderer = Renderer::new(box_bytes(), session.as_mut(), shard.as_mut()).unwrap();
+        let (mut session, mut shard) = (Box::new(Aligned([0; SESSION_BYTES])), Box::new(Aligned([0; SHARD_BYTES])));
+        let mut renderer = Renderer::new(box_bytes(), &mut session.0, &mut shard.0).unwrap();
         let mut sensor = Sensor::default();
         while renderer.work(BETWEEN_TICKS).unwrap() {
             sensor.serve(renderer.rays(), 0);

@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use std::error::Error;
 use std::hint::black_box;
 use std::path::Path;
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 
 #[derive(Parser)]
 #[command(about = "The longest call of a frame loop, counted by callgrind")]
@@ -63,25 +63,9 @@ impl Calls {
     fn make<T>(&mut self, kind: &str, call: impl FnOnce() -> T) -> T {
         self.0.push(kind.into());
         let (mut call, mut result) = (Some(call), None);
-        bench_collect(&mut || result = call.take().map(|c| c()));
+        callgrind::bench_collect(&mut || result = call.take().map(|c| c()));
         result.expect("the call was made")
     }
-}
-
-/// What callgrind collects in; it writes no profile where it does not collect, so the end of the call is in another
-/// function. Not generic, so that both have one name.
-#[inline(never)]
-fn bench_collect(call: &mut dyn FnMut()) {
-    bench_one_call(call);
-    // no call in place of the return
-    black_box(());
-}
-
-/// What callgrind writes a profile after.
-#[inline(never)]
-fn bench_one_call(call: &mut dyn FnMut()) {
-    call();
-    black_box(());
 }
 
 /// Whole paths, in pieces of both sizes in turn.
@@ -183,23 +167,8 @@ type Longest = BTreeMap<String, (u64, u64)>;
 
 /// Runs this program with `args` under callgrind.
 fn count(folder: &Folder, args: &[&str], longest: &mut Longest) -> Result<(), Box<dyn Error>> {
-    let out = folder.path().join("calls.out");
-    let mut valgrind = Command::new("valgrind");
-    valgrind.args(["--tool=callgrind", "--quiet", "--collect-atstart=no", "--dump-line=no"]);
-    valgrind.args(["--toggle-collect=*bench_collect*", "--dump-after=*bench_one_call*"]);
-    valgrind.arg(format!("--callgrind-out-file={}", out.display()));
-    let output = valgrind.arg(std::env::current_exe()?).args(args).output()?;
-    if !output.status.success() {
-        return Err(String::from_utf8_lossy(&output.stderr).into());
-    }
-    let kinds = String::from_utf8(output.stdout)?;
-    for (kind, number) in kinds.lines().zip(1..) {
-        let path = folder.path().join(format!("calls.out.{number}"));
-        let profile = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-        std::fs::remove_file(&path)?;
-        let total = profile.lines().find_map(|l| l.strip_prefix("totals: ")?.trim().parse::<u64>().ok());
-        let n = total.filter(|&n| n > 0).ok_or("callgrind counted nothing in a call")?;
-        let (calls, most) = longest.entry(kind.into()).or_default();
+    for (kind, n) in callgrind::each_call(folder, args)? {
+        let (calls, most) = longest.entry(kind).or_default();
         (*calls, *most) = (*calls + 1, n.max(*most));
     }
     Ok(())
