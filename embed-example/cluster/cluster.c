@@ -8,8 +8,8 @@
  * Every process has a whole session, and a handle for every shard. In each iteration it renders the shards that are its
  * own, sends them to all others, loads theirs, and ends the iteration alone: all have the same picture and have learned the
  * same, to the bit. So any process can stand in for any other, and nobody has to agree on who is still there: whoever
- * misses a shard for too long takes its owner for dead, deals its shards out again, and in the end renders them itself.
- * Being wrong about that costs time, never the picture. What MPI makes of dead processes is in docs/CLUSTER.md.
+ * misses a shard for too long takes its owner for dead, divides its shards among the others, and in the end renders them
+ * itself. Being wrong about that costs time, never the picture. What MPI makes of dead processes is in docs/CLUSTER.md.
  */
 #define _POSIX_C_SOURCE 200112L
 #include <croupier.h>

@@ -71,7 +71,7 @@ fn samples_have_sources() {
         let section = sources.split("\n== ").find(|s| s.starts_with(&format!("{package} "))).unwrap_or("");
         assert!(section.split_whitespace().any(|w| w == own), "{name} has no source");
         let mesh = ["obj", "ply", "stl", "gltf", "glb"]
-            .contains(&&*file.extension().unwrap().to_ascii_lowercase().to_str().unwrap());
+            .contains(&file.extension().unwrap().to_ascii_lowercase().to_str().unwrap());
         let tested = FILES.iter().any(|(n, _)| *n == name) || REFUSED.iter().any(|(n, _)| *n == name);
         assert!(!mesh || tested, "{name} is not tested");
         bytes += file.metadata().unwrap().len();

@@ -217,7 +217,7 @@ fn forged_bytes_never_panic() {
             let mut forged = bytes.to_vec();
             for _ in 0..1 + rng.word() % 3 {
                 // mostly the header, where it matters
-                let end = if rng.word() % 2 == 0 { HEADER } else { forged.len() };
+                let end = if rng.word().is_multiple_of(2) { HEADER } else { forged.len() };
                 let at = rng.word() as usize % end;
                 forged[at] = [0, 1, 0x7f, 0xff, rng.word() as u8][rng.word() as usize % 5];
             }

@@ -285,6 +285,9 @@ pub fn write(
     })
 }
 
+/// Pixels, planes and statistics of the scene.
+type Body = (Vec<SavedPixel>, Vec<f32>, Vec<u8>);
+
 /// A file whose head and texts are read and checked.
 #[derive(Debug)]
 struct Opened {
@@ -364,8 +367,8 @@ impl Opened {
         Ok(Self { path: path.into(), head, part, text, settings, names, rest })
     }
 
-    /// Pixels, planes and statistics of the scene.
-    fn body(&mut self) -> Result<(Vec<SavedPixel>, Vec<f32>, Vec<u8>), FileError> {
+    /// Reads what follows the texts, and checks it.
+    fn body(&mut self) -> Result<Body, FileError> {
         let h = &self.head;
         // all bounded by the length of the file
         let mut pixels = vec![SavedPixel::zeroed(); h.pixels as usize];
@@ -392,7 +395,7 @@ fn fit(a: &Opened, b: &Opened) -> Result<(), MergeError> {
     if a.head.scene != b.head.scene {
         return Err(MergeError::Scene(x, a.head.scene, y, b.head.scene));
     }
-    for (line, other) in a.text.lines().zip(b.text.lines()).filter(|(line, other)| line != other) {
+    if let Some((line, other)) = a.text.lines().zip(b.text.lines()).find(|(line, other)| line != other) {
         let [(name, value), (_, other)] = [line, other].map(|l| l.split_once('=').unwrap_or((l, "none")));
         return Err(MergeError::Setting(name.into(), x, value.into(), y, other.into()));
     }

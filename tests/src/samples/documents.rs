@@ -80,7 +80,7 @@ fn slab(document: &mut Document, middle: f64, width: f64) {
 
 /// Texels of a checkerboard of side `n` in two colours.
 fn checkers(n: u32, a: [u8; 4], b: [u8; 4]) -> Vec<[u8; 4]> {
-    (0..n * n).map(|i| if (i % n + i / n) % 2 == 0 { a } else { b }).collect()
+    (0..n * n).map(|i| if (i % n + i / n).is_multiple_of(2) { a } else { b }).collect()
 }
 
 /// A texture with a red corner at the top left and a green one at the top right.
