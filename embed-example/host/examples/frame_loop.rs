@@ -9,6 +9,7 @@
 //! takes less than 1 ms (`benches/results/frame.md`). An engine would look at its clock between two calls instead; the
 //! picture does not depend on how it is cut into calls. At the end the same scene is rendered offline, with a new
 //! renderer and in whole iterations: the bits are the same.
+#![forbid(unsafe_code)]
 
 use croupier::unstable::scene::blob::{Camera, Instance, LightKind, content_hash};
 use croupier::{Budget, Scene, SceneEdit, Settings, StepResult, Strategy};
