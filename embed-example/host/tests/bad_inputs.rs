@@ -3,36 +3,11 @@
 
 mod common;
 
+use common::inputs::{File, GREY, RENDER, V, gltf, json, obj, quotes_little, run, t};
 use common::{croupier, hdr, png, small_png, text};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-
-const V: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
-
-/// A file of a row: name and content.
-type File = (&'static str, Vec<u8>);
-
-fn t(name: &'static str, text: impl Into<String>) -> File {
-    (name, text.into().into_bytes())
-}
-
-/// An OBJ that a library belongs to.
-fn obj(mtl: &str) -> Vec<File> {
-    vec![t("a.obj", format!("mtllib a.mtl\n{V}usemtl m\nf 1 2 3\n")), t("a.mtl", mtl)]
-}
-
-fn json(geometry: &str, camera: &str, materials: &str) -> Vec<File> {
-    let camera = if camera.is_empty() {
-        r#""origin": [0,0,5], "target": [0,0,0], "up": [0,1,0], "vfov_deg": 30, "width": 8, "height": 8"#
-    } else {
-        camera
-    };
-    let text = format!(r#"{{"camera": {{{camera}}}, "materials": {{{materials}}}, "geometry": {geometry}}}"#);
-    vec![t("scene.json", text), t("a.obj", format!("{V}usemtl m\nf 1 2 3\n"))]
-}
-
-const GREY: &str = r#""m": {"type": "diffuse", "reflectance": [0.5,0.5,0.5]}"#;
 
 fn utf16(text: &str) -> Vec<u8> {
     text.encode_utf16().flat_map(u16::to_le_bytes).collect()
@@ -42,19 +17,6 @@ fn utf16(text: &str) -> Vec<u8> {
 fn sky() -> Vec<u8> {
     hdr(16, 16, |_, _| [64, 64, 64, 128])
 }
-
-fn run(files: &[File], arguments: &[&str]) -> (Option<i32>, String, tempfile::TempDir) {
-    let dir = tempfile::tempdir().unwrap();
-    files.iter().for_each(|(name, bytes)| {
-        let path = dir.path().join(name);
-        fs::create_dir_all(path.parent().unwrap()).unwrap();
-        fs::write(path, bytes).unwrap();
-    });
-    let out = croupier(dir.path(), arguments);
-    (out.status.code(), text(&out.stderr), dir)
-}
-
-const RENDER: [&str; 6] = ["--size", "8x8", "--spp", "1", "-o", "x.exr"];
 
 /// Name of the case, files, arguments, and what the last line must contain.
 type Refused = (&'static str, Vec<File>, Vec<&'static str>, Vec<&'static str>);
@@ -308,25 +270,12 @@ fn refused() {
         let last = error.lines().last().unwrap_or_default();
         assert!(last.starts_with("croupier: ") && !last.contains("note:"), "{name}: {error}");
         assert!(last.len() < 700 && last.chars().all(|c| !c.is_control()), "{name}: {} bytes: {error}", last.len());
+        quotes_little(&error);
         for part in parts {
             assert!(last.contains(part), "{name}: {last:?} does not say {part:?}");
         }
         assert!(!dir.path().join("x.exr").exists() && !dir.path().join("x.png").exists(), "{name}");
     }
-}
-
-/// A glTF triangle whose colours are the image.
-fn gltf(image: &str) -> Vec<File> {
-    let bytes = [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
-    let document = format!(
-        r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0]}}], "nodes": [{{"mesh": 0}}],
-        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}, "material": 0}}]}}],
-        "materials": [{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0}}}}}}],
-        "textures": [{{"source": 0}}], "images": [{{"uri": "{image}"}}],
-        "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}}],
-        "bufferViews": [{{"buffer": 0, "byteLength": 36}}], "buffers": [{{"byteLength": 36, "uri": "a.bin"}}]}}"#
-    );
-    vec![t("a.gltf", document), ("a.bin", bytes.concat())]
 }
 
 /// Name of the case, files, what notes say, and what the error of `--strict` says.
@@ -428,6 +377,7 @@ fn replaced_with_a_note() {
         let arguments = [&["render", scene], &RENDER[..]].concat();
         let (status, notes, dir) = run(&files, &arguments);
         assert_eq!(status, Some(0), "{name}: {notes}");
+        quotes_little(&notes);
         assert!(parts.iter().all(|p| notes.lines().any(|l| l.contains("note: ") && l.contains(p))), "{name}: {notes}");
         assert!(dir.path().join("x.exr").exists(), "{name}");
         let (status, error, _dir) = run(&files, &[&arguments[..], &["--strict"]].concat());

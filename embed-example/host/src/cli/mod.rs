@@ -24,6 +24,7 @@ mod until;
 mod values;
 
 use clap::{Parser, Subcommand};
+use croupier_host::text::{EXCERPT, excerpt};
 use std::process::ExitCode;
 use std::sync::LazyLock;
 
@@ -59,9 +60,28 @@ enum Command {
     Compare(compare::Args),
 }
 
+/// Says what is wrong with the arguments, or what was asked for; quotes long arguments in part.
+fn refuse(e: &clap::Error) -> ExitCode {
+    let given: Vec<String> = std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned()).collect();
+    let parts = given.iter().flat_map(|a| [Some(a.as_str()), a.split_once('=').map(|(_, value)| value)]).flatten();
+    let mut long: Vec<&str> = parts.filter(|a| a.len() > EXCERPT).collect();
+    // one may be a part of another
+    long.sort_by_key(|a| std::cmp::Reverse(a.len()));
+    if long.is_empty() {
+        // in colours, where a person reads it; nobody is there to be told of an error
+        let _ = e.print();
+    } else {
+        eprint!("{}", long.iter().fold(e.to_string(), |text, a| text.replace(a, &excerpt(a))));
+    }
+    ExitCode::from(u8::try_from(e.exit_code()).unwrap_or(2))
+}
+
 /// The whole program.
 pub(crate) fn run() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) => return refuse(&e),
+    };
     signals::install();
     let done = |()| ExitCode::SUCCESS;
     let outcome = match cli.command {

@@ -26,6 +26,7 @@ pub use axes::{Axes, Up};
 pub use sky::{Sun, daylight};
 
 use crate::description::{Camera, Emitter, Environment, Model, Projection, Reflectance, SceneDescription, Vertex};
+use crate::text::excerpt;
 use axes::{corners, cross, dot, sub};
 use room::Surroundings;
 use std::fmt;
@@ -92,10 +93,10 @@ impl fmt::Display for LookError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Camera { name, known } if known.is_empty() => {
-                write!(f, "there is no camera `{name}`: the scene has no named cameras")
+                write!(f, "there is no camera `{}`: the scene has no named cameras", excerpt(name))
             }
             Self::Camera { name, known } => {
-                write!(f, "there is no camera `{name}`, there are: {}", known.join(", "))
+                write!(f, "there is no camera `{}`, there are: {}", excerpt(name), excerpt(&known.join(", ")))
             }
             Self::FieldOfView => write!(f, "a field of view is for perspective cameras, the scene's is another"),
             Self::Direction([x, y, z]) => write!(f, "the camera at {x}, {y}, {z} looks at the place where it is"),

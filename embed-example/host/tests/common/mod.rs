@@ -1,6 +1,8 @@
 //! What tests of the program share.
 #![allow(dead_code, reason = "not every binary of tests needs all of it")]
 
+pub(crate) mod inputs;
+
 use std::path::Path;
 use std::process::{Command, Output};
 
