@@ -135,8 +135,8 @@ impl<'m> Shard<'m> {
     /// Takes up the shard that [`Self::suspend`] has left in the block, which may have moved since; the plan must be equal
     /// to the one it was made with. Takes a fixed, short time.
     ///
-    /// The bytes are checked as far as that takes no longer. If others have changed them since, the picture may be wrong
-    /// or a step may panic; memory stays safe.
+    /// The bytes are checked as far as that takes no longer. If others have changed them since, the picture may be wrong;
+    /// memory stays safe.
     ///
     /// # Errors
     /// A block that does not fit or holds no such shard, or one that was resumed and not suspended since.
