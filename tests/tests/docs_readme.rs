@@ -92,6 +92,18 @@ fn the_example_in_c_is_that_of_the_manual() {
     assert_eq!(example("README.md"), example("docs/C.md"));
 }
 
+/// The sizes of the firmware that README names are those that CI found. Killed by: a firmware that grew.
+#[test]
+fn sizes_of_the_firmware_are_those_of_ci() {
+    let sizes = document("embed-example/firmware/sizes.txt");
+    let bytes = |name: &str| {
+        let found = sizes.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' ')?.parse::<f64>().ok());
+        found.expect("a size") / 1024.0
+    };
+    let stated = format!("{:.0} KiB of flash and {:.0} KiB of RAM", bytes("flash"), bytes("ram"));
+    assert!(document("README.md").contains(&stated), "README does not say: {stated}");
+}
+
 /// Registry pages resolve no relative links, as no repository is named. Killed by: a link to a file in a package's README.
 #[test]
 fn links_of_packages_hold_on_registry_pages() {
