@@ -13,7 +13,14 @@ fn work(samples: u32, rays: u64, seconds: f64) -> Work {
 const TARGETS: [Target; 4] = [Target::Spp(1000), Target::Seconds(1e6), Target::Rays(1 << 50), Target::Error(1e-9)];
 
 fn bad_error() -> Option<ErrorEstimate> {
-    Some(ErrorEstimate { rel_mse: 1.0, low: 0.9, high: 1.1, rel_mse_all: 1.0, independence: 1.0 })
+    Some(ErrorEstimate {
+        rel_mse: 1.0,
+        low: 0.9,
+        high: 1.1,
+        rel_mse_all: 1.0,
+        independence: 1.0,
+        effective_pixels: 1000.0,
+    })
 }
 
 /// Killed by: planning by the mean cost of all samples, by samples alone, growth beyond doubling, no iteration at all

@@ -97,7 +97,8 @@ fn rendered(scene: Scene<'_>, strategy: &str, spp: u32, seed: u32, size: u32) ->
 }
 
 fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
-    let columns = "scene, samples per pixel, strategy, true relMSE, its standard error, stated / true, intervals that hold";
+    let columns =
+        "scene, samples per pixel, strategy, true relMSE, its standard error, stated / true, intervals that hold";
     let mut table = Table::new("", columns);
     for name in &args.names {
         let Some(bytes) = blob(name, args)? else { continue };

@@ -1,6 +1,5 @@
 //! relMSE: of one pixel, and as a film estimates its own.
 
-use super::pixel::PixelStats;
 use bytemuck::{Pod, Zeroable};
 
 /// Estimated relMSE of the picture against its own expectation.
@@ -13,8 +12,8 @@ use bytemuck::{Pod, Zeroable};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct ErrorEstimate {
-    /// Mean over pixels and channels of variance / (mean^2 + 0.01), without the worst 0.01 % of pixels, times
-    /// `independence`.
+    /// Mean over pixels and channels of variance / (expectation^2 + 0.01), without the worst 0.01 % of pixels, times
+    /// `independence`. The expectation is estimated from the pixel and those around it.
     pub rel_mse: f64,
     /// Lower end of the 95 % confidence interval of `rel_mse`.
     pub low: f64,
@@ -24,18 +23,25 @@ pub struct ErrorEstimate {
     pub rel_mse_all: f64,
     /// Variance of the pixels over that of independent samples, measured between iterations; 1 while there are too few.
     pub independence: f64,
+    /// How many pixels would cause the error if each caused as much: (sum q)^2 / sum q^2 over the pixels' contributions q. Few
+    /// if the error is that of few fireflies.
+    pub effective_pixels: f64,
+}
+
+/// Fewest effective pixels of an error that is told from samples.
+const RESOLVED: f64 = 64.0;
+
+impl ErrorEstimate {
+    /// Whether the samples tell the error. If few pixels cause most of what is found (heavy tails), more of their kind are
+    /// probably not found yet: `rel_mse` is a lower bound then, and the interval means nothing. Pictures of
+    /// less than some hundred pixels are never resolved.
+    pub fn is_resolved(&self) -> bool {
+        self.effective_pixels >= RESOLVED
+    }
 }
 
 /// Constant in the denominator of relMSE, added to the squared mean so that black pixels do not dominate.
 pub const REL_MSE_EPSILON: f64 = 1e-2;
-
-/// relMSE of one pixel: mean over channels of variance / (mean^2 + eps), where the squared mean is corrected for its
-/// own variance.
-pub(super) fn relative_error(p: &PixelStats) -> f64 {
-    let (m, v) = (p.mean(), p.variance_of_mean());
-    let share = |c: usize| v[c] / relative_denominator(m[c], v[c]);
-    (share(0) + share(1) + share(2)) / 3.0
-}
 
 /// Denominator of relMSE, of a mean and its variance.
 pub(super) fn relative_denominator(mean: f64, variance: f64) -> f64 {

@@ -30,8 +30,11 @@ impl Differences {
         }
         let (m, v) = (p.mean(), p.variance_of_mean());
         let (mut found, mut before, mut new) = (0.0, 0.0, 0.0);
+        let (a, b) = (p.weight, w * f64::from(o.samples));
+        let (a, b) = (a / (a + b), b / (a + b));
         for (c, [mean, variance]) in o.mean_and_variance().into_iter().enumerate() {
-            let denominator = relative_denominator(m[c], v[c]);
+            // of both together: the difference of two means does not depend on their weighted sum, but on each of them
+            let denominator = relative_denominator(a * m[c] + b * mean, a * a * v[c] + b * b * variance);
             found += (mean - m[c]) * (mean - m[c]) / denominator;
             before += v[c] / denominator;
             new += variance / denominator;

@@ -12,6 +12,7 @@
 //! | `independence` | correlation of an iteration's samples, measured |
 //! | `selection` | sums without the largest values |
 //! | `sqrt` | square root in f64 |
+//! | `surroundings` | what relMSE divides by |
 
 mod aov;
 mod coverage;
@@ -22,6 +23,7 @@ mod pixel;
 mod selection;
 mod short;
 mod sqrt;
+mod surroundings;
 
 pub use aov::{Aov, AovSet, PixelAov};
 pub(crate) use aov::{AovLayout, AovSums};
@@ -35,9 +37,9 @@ pub(crate) use sqrt::SqrtNewton;
 use crate::memory::{Carver, Measure, MemoryError};
 use aov::AovPlanes;
 use bytemuck::{Pod, Zeroable};
-use error::relative_error;
 use independence::{Differences, Independence};
 use pixel::PixelWeights;
+use surroundings::{Block, SIDE};
 
 /// What a film holds of each pixel besides its mean and error.
 #[derive(Clone, Copy, Debug)]
@@ -225,17 +227,52 @@ impl<'m> Film<'m> {
         s.filled = 1;
     }
 
-    /// Estimated error of the picture, as of the end of the last iteration. The interval is the normal one over the
-    /// pixels' contributions, which are independent; it is wide while few samples cause most of the error.
+    /// Estimated error of the picture, as of the end of the last iteration. Its interval holds the normal one over the pixels'
+    /// contributions, which are independent, and what depends on how expectations of pixels are estimated; see
+    /// [`ErrorEstimate::is_resolved`] for when it cannot be told.
     pub fn error_estimate(&self) -> ErrorEstimate {
         self.scalars.error
     }
 
-    /// Shows the errors of pixels from `at` on, `limit` at most, to the selection. Number shown.
-    pub(crate) fn show_errors(&self, at: usize, limit: usize, s: &mut Selection, counters: &mut [u32]) -> usize {
-        let end = at.saturating_add(limit).min(self.pixels.len());
-        (at..end).for_each(|i| s.show(relative_error(&self.pixel(i)), counters));
-        end.saturating_sub(at)
+    /// Blocks of pixels a row of blocks, and rows of blocks.
+    fn block_grid(&self) -> [u32; 2] {
+        self.size.map(|n| (n / SIDE).max(1))
+    }
+
+    /// Number of blocks that [`Self::show_errors`] counts.
+    pub(crate) fn blocks(&self) -> u64 {
+        let [columns, rows] = self.block_grid();
+        u64::from(columns) * u64::from(rows)
+    }
+
+    /// Column, row and index of the pixels of a block.
+    fn block(&self, block: u64) -> impl Iterator<Item = ([u32; 2], usize)> + use<> {
+        let (size, grid) = (self.size, self.block_grid());
+        let columns = u64::from(grid[0]);
+        let at = [block % columns, block / columns];
+        let [x, y]: [core::ops::Range<u32>; 2] = core::array::from_fn(|k| {
+            let edge = |i: u64| (i * u64::from(size[k]) / u64::from(grid[k])) as u32;
+            edge(at[k])..edge(at[k] + 1)
+        });
+        y.flat_map(move |row| {
+            x.clone().map(move |column| ([column, row], row as usize * size[0] as usize + column as usize))
+        })
+    }
+
+    /// Shows the errors of pixels from block `at` on to the selection, some `limit` pixels. Blocks and pixels shown.
+    pub(crate) fn show_errors(&self, at: u64, limit: usize, s: &mut Selection, counters: &mut [u32]) -> [u64; 2] {
+        let (mut blocks, mut pixels) = (0, 0);
+        while pixels < limit as u64 && at + blocks < self.blocks() {
+            let own = || self.block(at + blocks).map(|(place, i)| (place, self.pixel(i)));
+            let block = Block::of(own());
+            for (place, p) in own() {
+                let [error, other] = block.relative_errors(place, &p);
+                s.show_pair(error, other, counters);
+                pixels += 1;
+            }
+            blocks += 1;
+        }
+        [blocks, pixels]
     }
 
     /// Number of the pixels with most error that [`ErrorEstimate::rel_mse`] leaves out.
@@ -249,13 +286,17 @@ impl<'m> Film<'m> {
         let mean = t.sum / m;
         let Independence { ratio, noise } = self.scalars.independence;
         let spread = (t.sum_sqr / m - mean * mean).max(0.0) / m;
-        let spread = (ratio * ratio * spread + noise * noise * mean * mean).sqrt_newton();
+        let spread = ratio * ratio * spread + noise * noise * mean * mean;
+        // how much depends on the estimated expectations
+        let doubt = ratio * (t.sum_other / m - mean);
+        let half = (1.96 * 1.96 * spread + doubt * doubt).sqrt_newton();
         self.scalars.error = ErrorEstimate {
             rel_mse: ratio * mean,
-            low: (ratio * mean - 1.96 * spread).max(0.0),
-            high: ratio * mean + 1.96 * spread,
+            low: (ratio * mean - half).max(0.0),
+            high: ratio * mean + half,
             rel_mse_all: ratio * (t.sum + t.rest) / self.pixels.len().max(1) as f64,
             independence: ratio,
+            effective_pixels: if t.sum_sqr > 0.0 { t.sum * t.sum / t.sum_sqr } else { m },
         };
     }
 }

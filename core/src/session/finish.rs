@@ -47,7 +47,7 @@ const ABSORBED_PER_RAY: u64 = 4;
 /// Rays in the time of which the density of a tile is computed.
 const RAYS_PER_DENSITY: u64 = 24;
 /// Pixels whose contribution to the error is computed in the time of a ray.
-const ESTIMATED_PER_RAY: u64 = 2;
+const ESTIMATED_PER_RAY: u64 = 1;
 
 /// Shards as callers give them.
 pub(super) trait Shards<'a, 'b: 'a>: IntoIterator<Item = &'a Shard<'b>> + Clone {}
@@ -334,16 +334,16 @@ impl SessionState<'_> {
     fn estimate_error(&mut self, rays: u64) -> u64 {
         let Finishing { selection, at, .. } = &mut self.finishing;
         let limit = rays.saturating_mul(ESTIMATED_PER_RAY).min(1 << 30) as usize;
-        let n = self.film.show_errors(*at as usize, limit, selection, self.digits);
-        *at += n as u64;
-        if *at < self.film.len() as u64 {
-            return 1 + n as u64 / ESTIMATED_PER_RAY;
+        let [blocks, n] = self.film.show_errors(*at, limit, selection, self.digits);
+        *at += blocks;
+        if *at < self.film.blocks() {
+            return 1 + n / ESTIMATED_PER_RAY;
         }
         *at = 0;
         if selection.end_visit(Film::outliers, self.digits) {
             self.film.estimate_error(selection);
             self.next_stage();
         }
-        8 + n as u64 / ESTIMATED_PER_RAY
+        8 + n / ESTIMATED_PER_RAY
     }
 }

@@ -68,7 +68,7 @@ struct SavedIteration {
     seconds: [f64; 5],
     counters: Counters,
     picture: PictureStatistics,
-    error: [f64; 5],
+    error: [f64; 6],
     leaves: u64,
     subdivisions_refused: u64,
 }
@@ -76,14 +76,14 @@ struct SavedIteration {
 impl From<&IterationRecord> for SavedIteration {
     fn from(i: &IterationRecord) -> Self {
         let nothing = PictureStatistics { variance: f64::NAN, ..PictureStatistics::default() };
-        let ErrorEstimate { rel_mse, low, high, rel_mse_all, independence } = i.error;
+        let ErrorEstimate { rel_mse, low, high, rel_mse_all, independence, effective_pixels } = i.error;
         Self {
             samples: i.work.samples.into(),
             rays: i.work.rays,
             seconds: [i.work.seconds, i.tracing, i.merging, i.estimating, i.learning],
             counters: i.counters,
             picture: i.picture.unwrap_or(nothing),
-            error: [rel_mse, low, high, rel_mse_all, independence],
+            error: [rel_mse, low, high, rel_mse_all, independence, effective_pixels],
             leaves: i.cache.map_or(u64::MAX, |c| c.leaves.into()),
             subdivisions_refused: i.cache.map_or(0, |c| c.subdivisions_refused),
         }
@@ -93,7 +93,7 @@ impl From<&IterationRecord> for SavedIteration {
 impl From<SavedIteration> for IterationRecord {
     fn from(s: SavedIteration) -> Self {
         let [seconds, tracing, merging, estimating, learning] = s.seconds;
-        let [rel_mse, low, high, rel_mse_all, independence] = s.error;
+        let [rel_mse, low, high, rel_mse_all, independence, effective_pixels] = s.error;
         let cache = u32::try_from(s.leaves).ok();
         Self {
             work: Work { samples: u32::try_from(s.samples).unwrap_or(u32::MAX), rays: s.rays, seconds },
@@ -104,7 +104,7 @@ impl From<SavedIteration> for IterationRecord {
             learning,
             picture: Some(s.picture).filter(|p| !p.variance.is_nan()),
             cache: cache.map(|leaves| CacheRecord { leaves, subdivisions_refused: s.subdivisions_refused }),
-            error: ErrorEstimate { rel_mse, low, high, rel_mse_all, independence },
+            error: ErrorEstimate { rel_mse, low, high, rel_mse_all, independence, effective_pixels },
         }
     }
 }

@@ -102,8 +102,8 @@ pub struct RenderStats {
     pub mrays_per_s: f64,
     /// Estimated relMSE of the whole image; `None` below two samples per pixel.
     pub relmse_estimate: Option<f64>,
-    /// 95 % confidence interval of the estimated relMSE. [`croupier::ErrorEstimate`] says what both mean with roulette
-    /// and splitting.
+    /// 95 % confidence interval of the estimated relMSE; `None` below two samples per pixel, and where the samples do not
+    /// tell ([`croupier::ErrorEstimate::is_resolved`]): then the estimate is a lower bound.
     pub relmse_interval: Option<[f64; 2]>,
     /// Share of the eight lanes that did work, 0 to 1, by stage.
     pub lane_utilisation: BTreeMap<&'static str, f64>,
@@ -371,7 +371,7 @@ fn stats(r: &Rendered) -> RenderStats {
         seconds: r.seconds,
         mrays_per_s: r.mrays_per_s(),
         relmse_estimate: (r.spp > 1).then_some(r.error.rel_mse),
-        relmse_interval: (r.spp > 1).then_some([r.error.low, r.error.high]),
+        relmse_interval: (r.spp > 1 && r.error.is_resolved()).then_some([r.error.low, r.error.high]),
         lane_utilisation: lanes.iter().map(|(n, u)| (*n, u.share())).collect(),
         counters: counters.into_iter().collect(),
         first_non_finite: first_non_finite(c.first_non_finite, r.size),

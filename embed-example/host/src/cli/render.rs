@@ -326,8 +326,11 @@ fn print(r: &Report<'_>) -> Outcome {
     let partial = if r.stopped_early { "partial picture: " } else { "" };
     let RenderStats { spp, rays, seconds, mrays_per_s, .. } = *r.stats;
     let error = r.stats.relmse_estimate.map_or(String::new(), |e| {
-        let interval = r.stats.relmse_interval.map_or(String::new(), |[a, b]| format!(" ({a:.3e} to {b:.3e})"));
-        format!(", estimated relMSE {e:.3e}{interval}")
+        match r.stats.relmse_interval {
+            Some([a, b]) => format!(", estimated relMSE {e:.3e} ({a:.3e} to {b:.3e})"),
+            // few pixels cause most of it, and more such are not found yet
+            None => format!(", estimated relMSE at least {e:.3e} (unresolved)"),
+        }
     });
     let millions = rays as f64 * 1e-6;
     say(&format!(
