@@ -113,7 +113,7 @@ fn the_error_estimate_is_right_with_roulette_after_iterations() {
             (count(&|i| i.error.high < truth), count(&|i| i.error.low <= truth && truth <= i.error.high));
         println!("{strategy}: {ratio:.3} of the true relMSE; {held} of 100 intervals hold it, {below} are below");
         assert!((least..=most).contains(&ratio), "{strategy}: {ratio} of the true relMSE is stated");
-        assert!(below <= 10, "{strategy}: {below} of 100 intervals are below the true error");
+        assert!(below <= 12, "{strategy}: {below} of 100 intervals are below the true error");
         assert!(most > 1.1 || held >= 85, "{strategy}: {held} of 100 intervals hold the true error");
     }
 }
