@@ -93,10 +93,11 @@ impl SessionState<'_> {
     /// The budget is in units of a ray of the tracer, some 300 instructions, where the rays of [`Shard::step`] take their
     /// shading along; many small calls and one big call give the same bits. It is exceeded by a few pixels, or by a piece
     /// of work that is larger than it: the largest are a row of the denoiser that loads 16 others, 4 units per column, and
-    /// a block of pixels whose errors are computed, up to 31 x 31 pixels at one unit each. Each call looks at all shards first, at some 20 instructions each, whatever the budget. A
-    /// budget of 0 checks the shards and does nothing. Until the end the film has the
-    /// iteration in some pixels and not in others, and the estimates of before. [`Self::begin_iteration`] abandons
-    /// what is left to do: pixels that have been merged keep the iteration, others do not.
+    /// a block of pixels whose errors are computed, up to 31 x 31 pixels at one unit each. Each call looks at all shards
+    /// first, at some 20 instructions each, whatever the budget. A budget of 0 checks the shards and does nothing. Until
+    /// the end the film has the iteration in some pixels and not in others, and the estimates of before.
+    /// [`Self::begin_iteration`] abandons what is left to do: pixels that have been merged keep the iteration, others do
+    /// not.
     ///
     /// # Errors
     /// A shard that is missing, of another plan, or has not finished; the session is as before then.
