@@ -71,7 +71,11 @@ static void write_ppm(const char *path, const float *rgb, uint32_t width, uint32
     fprintf(file, "P6\n%u %u\n255\n", (unsigned)width, (unsigned)height);
     for (i = 0; i < n; i++)
         fputc(tone(rgb[i]), file);
-    fclose(file);
+    /* what is still in memory may fail to be written, too */
+    if (ferror(file) | fclose(file)) {
+        perror(path);
+        exit(1);
+    }
 }
 
 /* 64-bit FNV-1a of the numbers as little-endian bytes. */

@@ -1,10 +1,10 @@
 // Renders a baked scene on several threads: a complete program in C++17, with the objects of croupier in RAII types.
 //
 //     c++ -std=c++17 threads.cpp $(pkg-config --cflags --libs croupier) -pthread -o threads
-//     ./threads box.crp box.ppm
+//     ./threads box.crp box.ppm [THREADS]
 //
 // The picture depends on the number of shards, not on that of threads: the last line that it prints is the hash of
-// embed-example/hashes.txt, B, on one thread or on sixty-four.
+// embed-example/hashes.txt, B, on any number of threads (more than its eight shards have nothing to do).
 #include <croupier.h>
 
 #include <algorithm>
@@ -165,18 +165,23 @@ void write_ppm(const char *path, const std::vector<float> &rgb, const croupier_s
     std::ofstream file(path, std::ios::binary);
     file << "P6\n" << sizes.width << ' ' << sizes.height << "\n255\n";
     for (float x : rgb) file.put(static_cast<char>(std::sqrt(std::clamp(x, 0.0f, 1.0f)) * 255.0f));
+    file.close(); // what is still in memory may fail to be written, too
     if (!file) throw std::runtime_error(std::string("cannot write ") + path);
 }
 
 } // namespace
 
 int main(int argc, char **argv) try {
-    if (argc != 3) {
-        std::fprintf(stderr, "usage: %s SCENE.crp PICTURE.ppm\n", argv[0]);
+    unsigned threads = std::max(2u, std::thread::hardware_concurrency());
+    if (argc == 4) threads = static_cast<unsigned>(std::strtoul(argv[3], nullptr, 10));
+    if (argc < 3 || argc > 4 || threads < 1 || threads > 1024) {
+        std::fprintf(stderr, "usage: %s SCENE.crp PICTURE.ppm [THREADS, 1 to 1024]\n", argv[0]);
         return 2;
     }
     call(croupier_check_processor);
+    std::fprintf(stderr, "croupier %s, %s, %u threads\n", croupier_version(), croupier_instruction_set(), threads);
     std::ifstream file(argv[1], std::ios::binary);
+    if (!file) throw std::runtime_error(std::string("cannot read ") + argv[1]);
     std::vector<char> bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
     Scene scene(bytes);
 
@@ -188,7 +193,7 @@ int main(int argc, char **argv) try {
     call(croupier_settings_set_shards, &settings, std::uint32_t{8});
 
     Render render(scene, settings);
-    for (std::uint32_t samples : {2u, 2u, 4u}) render.iterate(samples, std::max(2u, std::thread::hardware_concurrency()));
+    for (std::uint32_t samples : {2u, 2u, 4u}) render.iterate(samples, threads);
     const auto picture = render.picture();
     write_ppm(argv[2], picture, render.sizes());
     std::printf("%016llx\n", static_cast<unsigned long long>(hash(picture)));

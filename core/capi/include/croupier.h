@@ -240,6 +240,27 @@ typedef uint32_t croupier_material_kind;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+// Environments of composed scenes.
+enum croupier_surround
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  // None.
+  CROUPIER_SURROUND_NONE = 0,
+  // The same radiance from all directions.
+  CROUPIER_SURROUND_CONSTANT = 1,
+  // A map by latitude and longitude.
+  CROUPIER_SURROUND_MAP = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum croupier_surround croupier_surround;
+#else
+typedef uint32_t croupier_surround;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
 // A scene: a baked blob in the program's memory. Calls that read it may run on several threads at a time, steps of
 // shards included; an edit needs it for itself.
 typedef struct croupier_scene croupier_scene;
@@ -253,7 +274,7 @@ typedef struct croupier_shard croupier_shard;
 
 // Text about a failure, for people: what was wrong with which object, with numbers.
 typedef struct croupier_message {
-  // UTF-8, ended by a zero byte, cut off where it is too long. Empty after a call that succeeded.
+  // UTF-8, ended by a zero byte, cut off between two characters where it is too long. Empty after a call that succeeded.
   char text[256];
 } croupier_message;
 
@@ -521,7 +542,9 @@ typedef struct croupier_arrays {
   const float (*uvs)[2];
   // Number of vertices.
   size_t vertices;
-  // Vertices of triangles, counter-clockwise seen from the front. Triangles without an area are left out.
+  // Vertices of triangles, counter-clockwise seen from the front. Those without an area are left out of the
+  // scene, and those behind them count on without a gap: triangle_count less the triangles of croupier_scene_facts
+  // are missing, and croupier_scene_triangles gives what the numbers of hits mean.
   const uint32_t (*triangles)[3];
   // Materials of triangles, or null: all have material 0.
   const uint32_t *triangle_materials;
@@ -1004,6 +1027,27 @@ croupier_status croupier_scene_material(const struct croupier_scene *scene,
                                         struct croupier_material *material,
                                         struct croupier_message *message);
 
+// Tables of material index as croupier_scene_set_material takes them, so that a material with tables can get another
+// colour. *needed, which may be null, becomes their number, 0 for most kinds; tables, which may be null, gets them.
+// CROUPIER_RANGE if there is no such material, CROUPIER_SIZE if count is less than needed.
+croupier_status croupier_scene_material_tables(const struct croupier_scene *scene,
+                                               uint32_t index,
+                                               float *tables,
+                                               size_t count,
+                                               size_t *needed,
+                                               struct croupier_message *message);
+
+// Triangles first to first + count - 1 as hits number them (croupier_hits8): corners gets the positions of the three
+// vertices of each, materials the material of each; both may be null. An intersector of the program's own is built of
+// these, since composing leaves out triangles without an area and baking may order them anew. Triangles within
+// instances have the space of their object. CROUPIER_RANGE if there are not so many.
+croupier_status croupier_scene_triangles(const struct croupier_scene *scene,
+                                         size_t first,
+                                         size_t count,
+                                         float (*corners)[3][3],
+                                         uint32_t *materials,
+                                         struct croupier_message *message);
+
 // What principled material index has besides croupier_scene_material. CROUPIER_RANGE if there is none, or it is of
 // another kind.
 croupier_status croupier_scene_principled(const struct croupier_scene *scene,
@@ -1069,6 +1113,7 @@ croupier_status croupier_scene_set_environment(struct croupier_scene *scene,
                                                struct croupier_message *message);
 
 // Replaces material index and its tables: count numbers, as many as its kind has (none for most kinds: null and 0).
+// Those of croupier_scene_material_tables serve as long as kind, roughness, index of refraction and compensation stay.
 // CROUPIER_EDIT_FIXED if the tables have another length than there is room for, or another material reads them too.
 croupier_status croupier_scene_set_material(struct croupier_scene *scene,
                                             uint32_t index,
@@ -1344,12 +1389,11 @@ croupier_status croupier_shard_suspend(struct croupier_shard *shard,
 croupier_status croupier_shard_destroy(struct croupier_shard *shard,
                                        struct croupier_message *message);
 
-// Works until about rays rays (exceeded by less than one packet of 16) are traced or the shard has finished the
-// iteration;
-// *more becomes 1 or 0. Many small steps and one big step give the same bits. Different shards may step on different threads
-// at a time, with the same session; a program cancels by not calling again. CROUPIER_PLAN if session and shard are of
-// different plans, CROUPIER_SCENE_CHANGED if the scene was edited since the session was told, CROUPIER_ITERATION if
-// none has begun; *more is 0 then.
+// Works until about rays rays are traced (exceeded by less than one packet of 16, but for rays that pass surfaces or
+// media) or the shard has finished the iteration; *more becomes 1 or 0. Many small steps and one big step give the
+// same bits. Different shards may step on different threads at a time, with the same session; a program cancels by
+// not calling again. CROUPIER_PLAN if session and shard are of different plans, CROUPIER_SCENE_CHANGED if the scene was
+// edited since the session was told, CROUPIER_ITERATION if none has begun; *more is 0 then.
 croupier_status croupier_shard_step(struct croupier_shard *shard,
                                     const struct croupier_session *session,
                                     uint64_t rays,

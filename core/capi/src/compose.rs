@@ -1,7 +1,8 @@
 //! Scenes from arrays: for hosts that bring triangles at run time.
 
 use crate::fault::{CoreError, Failure, Fault, answer, croupier_message, promised};
-use crate::memory::{ALIGN, Versioned, array, array_mut, output, overlap, read_struct, write_struct, zeroed};
+use crate::memory::{ALIGN, Versioned, array, array_mut, output, overlap, range, read_struct};
+use crate::memory::{write_struct, zeroed};
 use crate::records::{Mirror, croupier_camera, croupier_light, croupier_light_kind, croupier_material};
 use crate::records::{croupier_medium, croupier_texture};
 use crate::status::croupier_status::{self, *};
@@ -60,7 +61,9 @@ pub struct croupier_arrays {
     pub uvs: *const [f32; 2],
     /// Number of vertices.
     pub vertices: usize,
-    /// Vertices of triangles, counter-clockwise seen from the front. Triangles without an area are left out.
+    /// Vertices of triangles, counter-clockwise seen from the front. Those without an area are left out of the
+    /// scene, and those behind them count on without a gap: triangle_count less the triangles of croupier_scene_facts
+    /// are missing, and croupier_scene_triangles gives what the numbers of hits mean.
     pub triangles: *const [u32; 3],
     /// Materials of triangles, or null: all have material 0.
     pub triangle_materials: *const u32,
@@ -217,6 +220,30 @@ unsafe fn parts<'a>(arrays: *const croupier_arrays) -> Result<SceneParts<'a>, Fa
     })
 }
 
+/// Address and length of each array, with its name.
+fn arrays_of(p: &SceneParts<'_>) -> [((usize, usize), &'static str); 14] {
+    let map = match p.environment {
+        Some(Surround::Map { texels, .. }) => range(texels),
+        _ => (0, 0),
+    };
+    [
+        (range(p.positions), "positions"),
+        (range(p.normals), "normals"),
+        (range(p.uvs), "uvs"),
+        (range(p.triangles), "triangles"),
+        (range(p.triangle_materials), "triangle_materials"),
+        (range(p.materials), "materials"),
+        (range(p.emission), "emission"),
+        (range(p.tables), "tables"),
+        (range(p.names), "names"),
+        (range(p.textures), "textures"),
+        (range(p.texels), "texels"),
+        (range(p.media), "media"),
+        (range(p.lights), "lights"),
+        (map, "map"),
+    ]
+}
+
 /// Bytes that croupier_scene_compose needs: of the blob (what always suffices; most take a third of it), and of
 /// intermediate results. CROUPIER_COMPOSE, with the record and the number that are wrong in the message, if the arrays
 /// make no scene.
@@ -264,9 +291,7 @@ pub unsafe extern "C" fn croupier_scene_compose(
         if overlap(to, (scratch.addr(), scratch_size)) {
             return Err(Fault::new(CROUPIER_OVERLAP, "scratch").into());
         }
-        let vertices = (parts.positions.as_ptr().addr(), size_of_val(parts.positions));
-        let triangles = (parts.triangles.as_ptr().addr(), size_of_val(parts.triangles));
-        for (array, about) in [(vertices, "positions"), (triangles, "triangles")] {
+        for (array, about) in arrays_of(&parts) {
             if overlap(to, array) || overlap((scratch.addr(), scratch_size), array) {
                 return Err(Fault::new(CROUPIER_OVERLAP, about).into());
             }

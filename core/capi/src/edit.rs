@@ -2,7 +2,7 @@
 //! among lights, boxes around instances) is brought up to date before it returns.
 
 use crate::fault::{CoreError, Failure, Fault, answer, croupier_message, promised};
-use crate::memory::{array, array_mut, output, read_struct};
+use crate::memory::{apart, array, array_mut, output, read_struct};
 use crate::records::{Mirror, croupier_camera, croupier_environment, croupier_light};
 use crate::records::{croupier_material, croupier_principled};
 use crate::scene::{croupier_scene, scene_at};
@@ -31,9 +31,23 @@ unsafe fn edit<T>(
     scene: *mut croupier_scene,
     change: impl FnOnce(&mut SceneEdit<'_>) -> Result<T, Failure<EditError>>,
 ) -> Result<T, Failure<EditError>> {
+    promised!(edit_with(scene, |_| Ok(()), |round, ()| change(round)))
+}
+
+/// A round of edits with arrays of the caller's, which `given` makes of pointers once it has compared them with the
+/// places of the scene.
+///
+/// # Safety
+/// The caller's promise.
+unsafe fn edit_with<A, T>(
+    scene: *mut croupier_scene,
+    given: impl FnOnce(&[(usize, usize)]) -> Result<A, Fault>,
+    change: impl FnOnce(&mut SceneEdit<'_>, A) -> Result<T, Failure<EditError>>,
+) -> Result<T, Failure<EditError>> {
     let mut data = promised!(scene_at(scene))?.write()?;
+    let given = given(&data.places(scene))?;
     let mut round = data.scene.edit();
-    change(&mut round)
+    change(&mut round, given)
 }
 
 /// A record of the caller's as the core has it.
@@ -111,6 +125,7 @@ pub unsafe extern "C" fn croupier_scene_set_environment(
 }
 
 /// Replaces material index and its tables: count numbers, as many as its kind has (none for most kinds: null and 0).
+/// Those of croupier_scene_material_tables serve as long as kind, roughness, index of refraction and compensation stay.
 /// CROUPIER_EDIT_FIXED if the tables have another length than there is room for, or another material reads them too.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_scene_set_material(
@@ -123,8 +138,11 @@ pub unsafe extern "C" fn croupier_scene_set_material(
 ) -> croupier_status {
     answer!(message, Failure<EditError>, {
         let material = promised!(record(material, "material"))?;
-        let tables = promised!(array(tables, count, "tables"))?;
-        promised!(edit(scene, |round| Ok(round.material(index, material, tables)?)))
+        let given = |places: &[(usize, usize)]| {
+            apart(tables, count, places, "tables")?;
+            promised!(array(tables, count, "tables"))
+        };
+        promised!(edit_with(scene, given, |round, tables| Ok(round.material(index, material, tables)?)))
     })
 }
 
@@ -166,11 +184,15 @@ pub unsafe extern "C" fn croupier_scene_set_transforms(
     message: *mut croupier_message,
 ) -> croupier_status {
     answer!(message, Failure<EditError>, {
-        let indices = promised!(array(indices, count, "indices"))?;
-        let transforms = promised!(array(transforms, count, "transforms"))?;
+        let given = |places: &[(usize, usize)]| {
+            apart(indices, count, places, "indices")?;
+            apart(transforms, count, places, "transforms")?;
+            let indices = promised!(array(indices, count, "indices"))?;
+            Ok((indices, promised!(array(transforms, count, "transforms"))?))
+        };
         let mut to = if done.is_null() { None } else { Some(promised!(output(done, "done"))?) };
         let mut moved = 0usize;
-        let result = promised!(edit(scene, |round| {
+        let result = promised!(edit_with(scene, given, |round, (indices, transforms)| {
             for (index, transform) in indices.iter().zip(transforms) {
                 round.transform(*index, transform.to_world)?;
                 moved = moved.saturating_add(1);
@@ -223,8 +245,19 @@ pub unsafe extern "C" fn croupier_scene_rebuild(
 ) -> croupier_status {
     answer!(message, Failure<EditError>, {
         let count = scratch_size.checked_div(size_of::<Primitive>()).unwrap_or(0);
-        let scratch = promised!(array_mut(scratch.cast::<Primitive>(), count, "scratch"))?;
-        promised!(edit(scene, |round| Ok(round.rebuild(scratch)?)))
+        let given = |places: &[(usize, usize)]| {
+            apart(scratch.cast::<u8>(), scratch_size, places, "scratch")?;
+            promised!(array_mut(scratch.cast::<Primitive>(), count, "scratch"))
+        };
+        promised!(edit_with(scene, given, |round, scratch| {
+            round.rebuild(scratch).map_err(|e| match e {
+                // the core counts records, the caller bytes
+                EditError::Room { needed, .. } => {
+                    Fault::sizes("scratch", needed.saturating_mul(size_of::<Primitive>()), scratch_size).into()
+                }
+                e => e.into(),
+            })
+        }))
     })
 }
 

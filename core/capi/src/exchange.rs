@@ -2,7 +2,7 @@
 //! shards, sends these to all others and ends the iteration with all of them.
 
 use crate::fault::{CoreError, Failure, Fault, answer, croupier_message, promised};
-use crate::memory::{array, array_mut, output};
+use crate::memory::{apart, array, array_mut, output};
 use crate::plan::{Planned, croupier_plan, plan_at};
 use crate::session::{croupier_session, session_at};
 use crate::shard::{croupier_shard, shard_at};
@@ -56,6 +56,7 @@ pub unsafe extern "C" fn croupier_shard_save(
         let mut written = promised!(output(written, "written"))?;
         written.set(0);
         let data = promised!(shard_at(shard))?.read()?;
+        apart(bytes.cast::<u8>(), size, &[data.place], "bytes")?;
         let to = promised!(array_mut(bytes.cast::<u8>(), size, "bytes"))?;
         written.set(data.shard()?.save(to)?);
         Ok(())
@@ -77,9 +78,8 @@ pub unsafe extern "C" fn croupier_shard_load(
     answer!(message, Failure<SavedShardError>, {
         let session = promised!(session_at(session))?.read()?;
         let mut data = promised!(shard_at(shard))?.write()?;
-        if session.plan != data.plan {
-            return Err(Fault::new(CROUPIER_PLAN, "shard").at(data.shard()?.index().into()).into());
-        }
+        data.fits(&session)?;
+        apart(bytes.cast::<u8>(), size, &[data.place], "bytes")?;
         let bytes = promised!(array(bytes.cast::<u8>(), size, "bytes"))?;
         let (state, scene) = (session.state()?, session.scene()?);
         (session.kernel.load)(scene.scene.scene(), &session.parts, state, data.shard_mut()?, bytes)

@@ -13,7 +13,7 @@ use core::hint::black_box;
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct croupier_message {
-    /// UTF-8, ended by a zero byte, cut off where it is too long. Empty after a call that succeeded.
+    /// UTF-8, ended by a zero byte, cut off between two characters where it is too long. Empty after a call that succeeded.
     pub text: [c_char; 256],
 }
 
@@ -120,7 +120,7 @@ pub(crate) struct Text<'a> {
 }
 
 impl<'a> Text<'a> {
-    /// Clears a buffer; texts that are longer are cut off, and end with a zero byte in any case.
+    /// Clears a buffer; texts that are longer are cut off in front of the first character that does not fit, and end with a zero byte in any case.
     pub(crate) fn new(buffer: &'a mut [c_char]) -> Self {
         // byte by byte: `croupier_check_processor` runs where wide registers are not there
         buffer.iter_mut().for_each(|c| *c = black_box(0));
@@ -129,9 +129,21 @@ impl<'a> Text<'a> {
     }
 
     pub(crate) fn put(&mut self, text: &str) {
-        // the text first: a zip that ends takes one more of what it asks first
-        for (byte, c) in text.bytes().zip(self.rest.by_ref()) {
-            *c = black_box(byte as c_char);
+        for byte in text.bytes() {
+            // bytes of a character, of which the first one tells the number
+            let length = match byte {
+                0x80..0xc0 => 0,
+                0xc0..0xe0 => 2,
+                0xe0..0xf0 => 3,
+                0xf0.. => 4,
+                _ => 1,
+            };
+            if self.rest.len() < length {
+                self.rest = [].iter_mut();
+            }
+            if let Some(c) = self.rest.next() {
+                *c = black_box(byte as c_char);
+            }
         }
     }
 
@@ -202,3 +214,27 @@ macro_rules! promised {
 }
 
 pub(crate) use {answer, promised};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Texts that are cut off are UTF-8, and nothing follows the cut. Killed by: bytes that are taken one by one.
+    #[test]
+    fn texts_end_with_a_whole_character() {
+        for (room, expected) in
+            [(1, ""), (2, "a"), (3, "a"), (4, "aß"), (6, "aß"), (7, "aß€"), (10, "aß€"), (11, "aß€🂡"), (12, "aß€🂡b")]
+        {
+            let mut buffer = [1; 16];
+            let mut text = Text::new(&mut buffer[..room]);
+            text.put("aß");
+            text.put("€🂡");
+            text.put("b");
+            text.number(7);
+            let bytes = buffer.map(|c| c as u8);
+            let found = core::ffi::CStr::from_bytes_until_nul(&bytes).map(|t| t.to_str().unwrap_or("not UTF-8"));
+            let found = found.unwrap_or("no end");
+            assert_eq!(found, expected, "{room} bytes");
+        }
+    }
+}

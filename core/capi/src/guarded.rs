@@ -68,6 +68,15 @@ impl<T: Kind> Guarded<T> {
         Ok(unsafe { object.as_ref() })
     }
 
+    /// Asked again by a call that has locked the object: another one may have ended it since [`Self::at`]. The lock orders
+    /// this after that call's mark. A lock that is then dropped changes the head and not the value.
+    fn still_live(&self) -> Result<(), Fault> {
+        match self.head.mark.load(Ordering::Acquire) == T::MARK {
+            true => Ok(()),
+            false => Err(Fault::new(CROUPIER_DESTROYED, T::NAME)),
+        }
+    }
+
     /// The object to be read, by any number of calls at a time.
     pub(crate) fn read(&self) -> Result<Reading<'_, T>, Fault> {
         let users = &self.head.users;
@@ -76,7 +85,10 @@ impl<T: Kind> Guarded<T> {
             let next = now.checked_add(1).filter(|n| *n != EXCLUSIVE);
             let next = next.ok_or(Fault::new(CROUPIER_BUSY, T::NAME))?;
             match users.compare_exchange_weak(now, next, Ordering::Acquire, Ordering::Relaxed) {
-                Ok(_) => return Ok(Reading(self)),
+                Ok(_) => {
+                    let reading = Reading(self);
+                    return self.still_live().map(|()| reading);
+                }
                 Err(other) => now = other,
             }
         }
@@ -94,7 +106,10 @@ impl<T: Kind> Guarded<T> {
     /// The object for one call.
     pub(crate) fn write(&self) -> Result<Writing<'_, T>, Fault> {
         match self.head.users.compare_exchange(0, EXCLUSIVE, Ordering::Acquire, Ordering::Relaxed) {
-            Ok(_) => Ok(Writing(self)),
+            Ok(_) => {
+                let writing = Writing(self);
+                self.still_live().map(|()| writing)
+            }
             Err(_) => Err(Fault::new(CROUPIER_BUSY, T::NAME)),
         }
     }
@@ -157,5 +172,35 @@ impl<T> DerefMut for Writing<'_, T> {
 impl<T> Drop for Writing<'_, T> {
     fn drop(&mut self) {
         self.0.head.users.store(0, Ordering::Release);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Number(#[expect(dead_code, reason = "what is guarded")] u64);
+
+    impl Kind for Number {
+        const MARK: u32 = 0x1234_5678;
+        const NAME: &'static str = "number";
+    }
+
+    /// A call that found the object live and locks it after another call has ended it. Killed by: a mark that is looked
+    /// at before the lock is taken, and not afterwards.
+    #[test]
+    fn what_ends_between_the_mark_and_the_lock_is_not_used() {
+        let mut memory = core::mem::MaybeUninit::<Guarded<Number>>::uninit();
+        // SAFETY: of the right size and alignment, and on this thread alone.
+        unsafe { Guarded::place(memory.as_mut_ptr(), Number(5)) };
+        // SAFETY: made above.
+        let find = || unsafe { Guarded::at(memory.as_ptr()) };
+        let found = [(); 3].map(|()| find().ok());
+        let [Some(first), Some(reader), Some(writer)] = found else { panic!("a live object") };
+        first.write().ok().map(Writing::bury);
+        assert_eq!(reader.read().err().map(|e| e.status), Some(CROUPIER_DESTROYED));
+        assert_eq!(writer.write().err().map(|e| e.status), Some(CROUPIER_DESTROYED));
+        assert_eq!(first.head.users.load(Ordering::Relaxed), 0, "refused calls keep no lock");
+        assert_eq!(find().err().map(|e| e.status), Some(CROUPIER_DESTROYED));
     }
 }

@@ -1,7 +1,7 @@
 //! What a session has learned: statistics of the scene as bytes, the estimate of the pixels.
 
 use crate::fault::{CoreError, Failure, Fault, answer, croupier_message, promised};
-use crate::memory::{array, array_mut, output};
+use crate::memory::{apart, array, array_mut, output};
 use crate::session::{croupier_session, session_at};
 use crate::status::croupier_status::{self, *};
 use core::ffi::c_void;
@@ -46,6 +46,7 @@ pub unsafe extern "C" fn croupier_session_save_statistics(
 ) -> croupier_status {
     answer!(message, Failure<CacheError>, {
         let data = promised!(session_at(session))?.read()?;
+        apart(bytes.cast::<u8>(), size, &[data.place], "bytes")?;
         let to = promised!(array_mut(bytes.cast::<u8>(), size, "bytes"))?;
         data.state()?.cache().ok_or(Fault::new(CROUPIER_ABSENT, STATISTICS))?.save(to)?;
         Ok(())
@@ -66,6 +67,7 @@ pub unsafe extern "C" fn croupier_session_load_statistics(
 ) -> croupier_status {
     answer!(message, Failure<CacheError>, {
         let mut data = promised!(session_at(session))?.write()?;
+        apart(bytes.cast::<u8>(), size, &[data.place], "bytes")?;
         let bytes = promised!(array(bytes.cast::<u8>(), size, "bytes"))?;
         let cache = data.state_mut()?.cache_mut().ok_or(Fault::new(CROUPIER_ABSENT, STATISTICS))?;
         if merge == 0 {
@@ -94,6 +96,7 @@ pub unsafe extern "C" fn croupier_session_estimate(
         if count != needed {
             return Err(Fault::sizes("rgb", needed, count));
         }
+        apart(rgb, count, &[data.place], "rgb")?;
         let to = promised!(array_mut(rgb, count, "rgb"))?;
         for (to, ((r, g), b)) in to.as_chunks_mut().0.iter_mut().zip(r.iter().zip(g).zip(b)) {
             *to = [*r, *g, *b];
@@ -114,6 +117,7 @@ pub unsafe extern "C" fn croupier_session_give_estimate(
 ) -> croupier_status {
     answer!(message, Failure<SessionError>, {
         let mut data = promised!(session_at(session))?.write()?;
+        apart(rgb, count, &[data.place], "rgb")?;
         let (pixels, rest) = promised!(array(rgb, count, "rgb"))?.as_chunks();
         if !rest.is_empty() {
             return Err(Fault::new(CROUPIER_SIZE, "rgb").into());

@@ -95,7 +95,27 @@ pub(crate) fn block(
 
 /// Do two ranges of bytes, each by its address and length, have a byte in common?
 pub(crate) fn overlap(a: (usize, usize), b: (usize, usize)) -> bool {
-    a.0 < b.0.saturating_add(b.1) && b.0 < a.0.saturating_add(a.1)
+    a.1 > 0 && b.1 > 0 && a.0 < b.0.saturating_add(b.1) && b.0 < a.0.saturating_add(a.1)
+}
+
+/// Address and length of an array.
+pub(crate) fn range<T>(array: &[T]) -> (usize, usize) {
+    (array.as_ptr().addr(), size_of_val(array))
+}
+
+/// Refuses an array of the caller's that has a byte in common with one of the `places`, each an address and a length.
+/// To be called before a slice is made of it.
+pub(crate) fn apart<T>(
+    first: *const T,
+    count: usize,
+    places: &[(usize, usize)],
+    about: &'static str,
+) -> Result<(), Fault> {
+    let own = (first.addr(), count.saturating_mul(size_of::<T>()));
+    match places.iter().any(|place| overlap(own, *place)) {
+        true => Err(Fault::new(CROUPIER_OVERLAP, about)),
+        false => Ok(()),
+    }
 }
 
 /// A text of the caller's that ends with a zero byte.
@@ -106,11 +126,11 @@ pub(crate) unsafe fn text<'a>(text: *const c_char, about: &'static str) -> Resul
     checked(text, about)?;
     // SAFETY: the caller's promise.
     let text = unsafe { CStr::from_ptr(text) };
-    let short = text.to_bytes().get(..LONGEST).is_none();
+    let short = text.to_bytes().len() <= LONGEST;
     text.to_str().ok().filter(|_| short).ok_or(Fault::new(CROUPIER_TEXT, about))
 }
 
-/// Writes a text into a buffer of `size` bytes, cut off if it is longer and ended by a zero byte; `length` is its whole
+/// Writes a text into a buffer of `size` bytes, cut off between two characters if it is longer and ended by a zero byte; `length` is its whole
 /// length without that. Neither is needed.
 ///
 /// # Safety

@@ -2,7 +2,7 @@
 
 use crate::fault::{Fault, answer, croupier_message, promised};
 use crate::kernels;
-use crate::memory::{Versioned, array, array_mut, output, write_struct, zeroed};
+use crate::memory::{Versioned, apart, array, array_mut, output, range, write_struct, zeroed};
 use crate::parts::{croupier_hits8, croupier_rays8};
 use crate::scene::{croupier_scene, scene_at};
 use crate::session::{croupier_session, session_at};
@@ -280,6 +280,7 @@ pub unsafe extern "C" fn croupier_session_pixels(
     answer!(message, Fault, {
         let data = promised!(session_at(session))?.read()?;
         let film = data.state()?.film();
+        apart(pixels, count, &[data.place], "pixels")?;
         let to = promised!(array_mut(pixels, count, "pixels"))?;
         if first.checked_add(count).is_none_or(|end| end > film.pixels().len()) {
             return Err(Fault::new(CROUPIER_RANGE, "first pixel").at(first as u64));
@@ -307,6 +308,7 @@ pub unsafe extern "C" fn croupier_session_rgb(
         if count != needed {
             return Err(Fault::sizes("rgb", needed, count));
         }
+        apart(rgb, count, &[data.place], "rgb")?;
         let to = promised!(array_mut(rgb, count, "rgb"))?;
         for (rgb, pixel) in to.as_chunks_mut().0.iter_mut().zip(film.pixels()) {
             *rgb = pixel.mean().map(|x| x as f32);
@@ -344,6 +346,7 @@ pub unsafe extern "C" fn croupier_session_plane(
         if plane.len() != count {
             return Err(Fault::sizes("values", plane.len(), count));
         }
+        apart(values, count, &[data.place], "values")?;
         promised!(array_mut(values, count, "values"))?.copy_from_slice(plane);
         Ok(())
     })
@@ -419,13 +422,12 @@ pub unsafe extern "C" fn croupier_shard_unfinished(
         let session = promised!(session_at(session))?.read()?;
         let data = promised!(shard_at(shard))?.read()?;
         let (state, shard) = (session.state()?, data.shard()?);
-        if session.plan != data.plan {
-            return Err(Fault::new(CROUPIER_PLAN, "shard").at(shard.index().into()));
-        }
+        data.fits(&session)?;
         let needed = state.film().pixels().len().saturating_mul(3);
         if count != needed {
             return Err(Fault::sizes("rgb", needed, count));
         }
+        apart(rgb, count, &[session.place, data.place], "rgb")?;
         let to = promised!(array_mut(rgb, count, "rgb"))?.as_chunks_mut().0;
         let mut number = if written.is_null() { None } else { Some(promised!(output(written, "written"))?) };
         let scene = session.scene()?;
@@ -459,6 +461,7 @@ pub unsafe extern "C" fn croupier_scene_closest(
     answer!(message, Fault, {
         let data = promised!(scene_at(scene))?.read()?;
         let rays = promised!(array(rays, 1, "rays"))?.first().ok_or(Fault::new(CROUPIER_NULL, "rays"))?;
+        apart(hits, 1, &[range(core::slice::from_ref(rays))], "hits")?;
         let (mut to, mut lanes) = (promised!(output(hits, "hits"))?, promised!(output(hit, "hit"))?);
         let (found, mask) = kernels::closest(&data.scene.scene(), rays, active);
         to.set(found);

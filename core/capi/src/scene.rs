@@ -2,7 +2,7 @@
 
 use crate::fault::{CoreError, Failure, Fault, answer, croupier_message, promised};
 use crate::guarded::{Guarded, Kind};
-use crate::memory::{Versioned, array_mut, block, output, overlap, put_text, write_struct};
+use crate::memory::{Versioned, apart, array_mut, block, output, put_text, range, write_struct};
 use crate::records::{Mirror, croupier_camera, croupier_environment, croupier_instance, croupier_light};
 use crate::records::{croupier_material, croupier_principled, croupier_scene_facts};
 use crate::status::croupier_status::{self, *};
@@ -39,10 +39,9 @@ const _: () = {
 };
 
 impl SceneData {
-    /// Address and length of the blob.
-    pub(crate) fn blob(&self) -> (usize, usize) {
-        let bytes = self.scene.bytes();
-        (bytes.as_ptr().addr(), bytes.len())
+    /// Addresses and lengths of the blob and of the object, which is `at`.
+    pub(crate) fn places(&self, at: *const croupier_scene) -> [(usize, usize); 2] {
+        [range(self.scene.bytes()), (at.addr(), size_of::<Guarded<Self>>())]
     }
 }
 
@@ -81,10 +80,8 @@ pub unsafe extern "C" fn croupier_scene_init(
         let mut handle = promised!(output(scene, "scene"))?;
         handle.set(ptr::null_mut());
         let place = block(memory, memory_size, CROUPIER_SCENE_BYTES, "memory")?;
+        apart(blob.cast::<u8>(), blob_size, &[(place.addr().get(), CROUPIER_SCENE_BYTES)], "blob")?;
         let bytes: &'static mut [u8] = promised!(array_mut(blob.cast::<u8>(), blob_size, "blob"))?;
-        if overlap((place.addr().get(), CROUPIER_SCENE_BYTES), (bytes.as_ptr().addr(), bytes.len())) {
-            return Err(Fault::new(CROUPIER_OVERLAP, "blob").into());
-        }
         let data = SceneData { scene: EditableScene::new(bytes)? };
         promised!(Guarded::place(place.as_ptr().cast(), data));
         handle.set(place.as_ptr().cast());
@@ -190,6 +187,75 @@ pub unsafe extern "C" fn croupier_scene_material(
         let found = data.scene.scene().materials.get(index as usize).copied();
         let found = found.ok_or(Fault::new(CROUPIER_RANGE, "material").at(index.into()))?;
         promised!(output(material, "material"))?.set(bytemuck::cast(found));
+        Ok(())
+    })
+}
+
+/// Tables of material index as croupier_scene_set_material takes them, so that a material with tables can get another
+/// colour. *needed, which may be null, becomes their number, 0 for most kinds; tables, which may be null, gets them.
+/// CROUPIER_RANGE if there is no such material, CROUPIER_SIZE if count is less than needed.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn croupier_scene_material_tables(
+    scene: *const croupier_scene,
+    index: u32,
+    tables: *mut f32,
+    count: usize,
+    needed: *mut usize,
+    message: *mut croupier_message,
+) -> croupier_status {
+    answer!(message, Fault, {
+        let data = promised!(scene_at(scene))?.read()?;
+        let found = data.scene.scene().material_tables(index);
+        let found = found.ok_or(Fault::new(CROUPIER_RANGE, "material").at(index.into()))?;
+        if !needed.is_null() {
+            promised!(output(needed, "needed"))?.set(found.len());
+        }
+        if tables.is_null() {
+            return Ok(());
+        }
+        if count < found.len() {
+            return Err(Fault::sizes("tables", found.len(), count));
+        }
+        apart(tables, found.len(), &data.places(scene), "tables")?;
+        promised!(array_mut(tables, found.len(), "tables"))?.copy_from_slice(found);
+        Ok(())
+    })
+}
+
+/// Triangles first to first + count - 1 as hits number them (croupier_hits8): corners gets the positions of the three
+/// vertices of each, materials the material of each; both may be null. An intersector of the program's own is built of
+/// these, since composing leaves out triangles without an area and baking may order them anew. Triangles within
+/// instances have the space of their object. CROUPIER_RANGE if there are not so many.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn croupier_scene_triangles(
+    scene: *const croupier_scene,
+    first: usize,
+    count: usize,
+    corners: *mut [[f32; 3]; 3],
+    materials: *mut u32,
+    message: *mut croupier_message,
+) -> croupier_status {
+    answer!(message, Fault, {
+        let data = promised!(scene_at(scene))?.read()?;
+        let s = data.scene.scene();
+        let end = first.checked_add(count);
+        let found = end.and_then(|end| s.triangles.get(first..end));
+        let found = found.ok_or(Fault::new(CROUPIER_RANGE, "first triangle").at(first as u64))?;
+        let places = data.places(scene);
+        if !corners.is_null() {
+            apart(corners, count, &places, "corners")?;
+            let position = |v: u32| s.vertices.get(v as usize).map_or([0.0; 3], |v| v.p);
+            for (to, t) in promised!(array_mut(corners, count, "corners"))?.iter_mut().zip(found) {
+                let [a, b, c] = t.vertex;
+                *to = [position(a), position(b), position(c)];
+            }
+        }
+        if !materials.is_null() {
+            apart(materials, count, &places, "materials")?;
+            for (to, t) in promised!(array_mut(materials, count, "materials"))?.iter_mut().zip(found) {
+                *to = t.material;
+            }
+        }
         Ok(())
     })
 }

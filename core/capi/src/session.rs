@@ -3,7 +3,7 @@
 use crate::fault::{CoreError, Failure, Fault, answer, croupier_message, promised};
 use crate::guarded::{Guarded, Kind};
 use crate::kernels::{Kernel, State};
-use crate::memory::{Versioned, array, block, checked, output, overlap};
+use crate::memory::{Versioned, apart, array, block, output, overlap};
 use crate::parts::croupier_parts;
 use crate::plan::{croupier_plan, plan_at};
 use crate::scene::{SceneData, croupier_scene, scene_at};
@@ -124,9 +124,10 @@ unsafe fn start(s: &Start, kernel: &'static Kernel, parts: croupier_parts) -> Re
     let needed = SESSION_HEAD.saturating_add(planned.plan.session().size);
     let place = block(s.memory, s.memory_size, needed, "memory")?;
     let place_range = (place.addr().get(), needed);
-    if overlap(place_range, scene.blob()) || overlap(place_range, (s.scene.addr(), size_of::<Guarded<SceneData>>())) {
+    if scene.places(s.scene).iter().any(|place| overlap(place_range, *place)) {
         return Err(Fault::new(CROUPIER_OVERLAP, "memory").into());
     }
+    apart(s.plan, 1, &[place_range], "plan")?;
     let core = place.as_ptr().wrapping_add(SESSION_HEAD);
     // SAFETY: the caller's promise; `block` has checked address and length, of which this is the rest.
     let bytes: &'static mut [u8] = unsafe { slice::from_raw_parts_mut(core, planned.plan.session().size) };
@@ -273,6 +274,7 @@ pub unsafe extern "C" fn croupier_session_finish_iteration(
         let mut more = promised!(output(more, "more"))?;
         more.set(0);
         let mut data = promised!(session_at(session))?.write()?;
+        apart(shards, count, &[data.place], "shards")?;
         let shards = promised!(array(shards, count, "shards"))?;
         let shards = promised!(Shards::lock(shards, data.place))?;
         let result = data.state_mut()?.finish_iteration(shards.all(), Budget { rays: units });
@@ -308,8 +310,7 @@ pub unsafe extern "C" fn croupier_session_change_scene(
     answer!(message, Failure<SessionError>, {
         let mut data = promised!(session_at(session))?.write()?;
         let to = promised!(scene_at(scene))?.read()?;
-        let range = checked(scene.cast::<u8>(), "scene").map(|s| (s.addr().get(), size_of::<Guarded<SceneData>>()))?;
-        if overlap(data.place, to.blob()) || overlap(data.place, range) {
+        if to.places(scene).iter().any(|place| overlap(data.place, *place)) {
             return Err(Fault::new(CROUPIER_OVERLAP, "scene").into());
         }
         let view = to.scene.scene();

@@ -2,10 +2,10 @@
 
 use crate::fault::{CoreError, Failure, Fault, answer, croupier_message, promised};
 use crate::guarded::{Guarded, Kind, Reading};
-use crate::memory::{block, output, overlap, write_struct};
+use crate::memory::{apart, block, output, overlap, write_struct};
 use crate::picture::croupier_counters;
 use crate::plan::{croupier_plan, plan_at};
-use crate::session::{croupier_session, plain, session_at};
+use crate::session::{SessionData, croupier_session, plain, session_at};
 use crate::status::croupier_status::{self, *};
 use core::ffi::c_void;
 use core::{ptr, slice};
@@ -53,6 +53,16 @@ impl CoreError for ShardError {
 impl ShardData {
     pub(crate) fn shard(&self) -> Result<&Shard<'static>, Fault> {
         self.shard.as_ref().ok_or(Fault::new(CROUPIER_DESTROYED, Self::NAME))
+    }
+
+    /// Is it of the session's plan, and in memory of its own?
+    pub(crate) fn fits(&self, session: &SessionData) -> Result<(), Fault> {
+        let status = match (session.plan == self.plan, overlap(session.place, self.place)) {
+            (true, false) => return Ok(()),
+            (true, true) => CROUPIER_OVERLAP,
+            (false, _) => CROUPIER_PLAN,
+        };
+        Err(Fault::new(status, Self::NAME).at(self.shard()?.index().into()))
     }
 
     pub(crate) fn shard_mut(&mut self) -> Result<&mut Shard<'static>, Fault> {
@@ -148,6 +158,7 @@ unsafe fn start(s: &Start) -> Result<(), Failure<ShardError>> {
     let size = planned.plan.shard_of(s.index).size;
     let needed = SHARD_HEAD.saturating_add(size);
     let place = block(s.memory, s.memory_size, needed, "memory")?;
+    apart(s.plan, 1, &[(place.addr().get(), needed)], "plan")?;
     let core = place.as_ptr().wrapping_add(SHARD_HEAD);
     // SAFETY: the caller's promise; `block` has checked address and length, of which this is the rest.
     let bytes: &'static mut [u8] = unsafe { slice::from_raw_parts_mut(core, size) };
@@ -218,12 +229,11 @@ pub unsafe extern "C" fn croupier_shard_destroy(
     })
 }
 
-/// Works until about rays rays (exceeded by less than one packet of 16) are traced or the shard has finished the
-/// iteration;
-/// *more becomes 1 or 0. Many small steps and one big step give the same bits. Different shards may step on different threads
-/// at a time, with the same session; a program cancels by not calling again. CROUPIER_PLAN if session and shard are of
-/// different plans, CROUPIER_SCENE_CHANGED if the scene was edited since the session was told, CROUPIER_ITERATION if
-/// none has begun; *more is 0 then.
+/// Works until about rays rays are traced (exceeded by less than one packet of 16, but for rays that pass surfaces or
+/// media) or the shard has finished the iteration; *more becomes 1 or 0. Many small steps and one big step give the
+/// same bits. Different shards may step on different threads at a time, with the same session; a program cancels by
+/// not calling again. CROUPIER_PLAN if session and shard are of different plans, CROUPIER_SCENE_CHANGED if the scene was
+/// edited since the session was told, CROUPIER_ITERATION if none has begun; *more is 0 then.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_shard_step(
     shard: *mut croupier_shard,
@@ -237,12 +247,7 @@ pub unsafe extern "C" fn croupier_shard_step(
         more.set(0);
         let session = promised!(session_at(session))?.read()?;
         let mut data = promised!(shard_at(shard))?.write()?;
-        if session.plan != data.plan {
-            return Err(Fault::new(CROUPIER_PLAN, "shard").at(data.shard()?.index().into()));
-        }
-        if overlap(session.place, data.place) {
-            return Err(Fault::new(CROUPIER_OVERLAP, "shard").at(data.shard()?.index().into()));
-        }
+        data.fits(&session)?;
         let state = session.state()?;
         if state.iteration().number == 0 {
             return Err(Fault::new(CROUPIER_ITERATION, "session"));

@@ -306,6 +306,9 @@ fn absurd_values() {
     fails!(CROUPIER_TEXT, croupier_settings_set(to, c"\xff".as_ptr(), c"1".as_ptr()));
     let long = std::ffi::CString::new(vec![b'1'; 5000]).expect("a text");
     fails!(CROUPIER_TEXT, croupier_settings_set(to, c"seed".as_ptr(), long.as_ptr()));
+    let text = |bytes: usize| std::ffi::CString::new(vec![b'x'; bytes]).expect("a text");
+    fails!(CROUPIER_RANGE, croupier_settings_set(to, text(4096).as_ptr(), c"1".as_ptr()));
+    fails!(CROUPIER_TEXT, croupier_settings_set(to, text(4097).as_ptr(), c"1".as_ptr()));
     let mut planned = plan(&s);
     for (width, height) in [(0, 0), (0, 5), (u32::MAX, u32::MAX)] {
         ok!(croupier_settings_set_size(to, width, height));

@@ -30,6 +30,15 @@ fn the_manual_has_every_function() {
     assert!(gone.is_empty(), "docs/C.md has {gone:?}");
 }
 
+/// The example of the README is that of the manual. Killed by: a change of one of them.
+#[test]
+fn the_readme_has_the_example_of_the_manual() {
+    let example = |text: &'static str| text.split("```c\n").nth(1).and_then(|rest| rest.split("```").next());
+    let manual = example(include_str!("../../../docs/C.md"));
+    assert!(manual.is_some_and(|e| e.contains("croupier_shard_step")));
+    assert_eq!(example(include_str!("../../../README.md")), manual);
+}
+
 /// The examples in the manual are those that compile elsewhere, or parts of them: they call what there is. Killed by:
 /// a reader of names that sees none.
 #[test]

@@ -241,7 +241,8 @@ fn instances_move_and_hide() {
     let mut bytes = 0;
     ok!(croupier_scene_rebuild_size(own.handle, &raw mut bytes));
     let mut scratch = Block::new(bytes);
-    fails!(CROUPIER_SIZE, croupier_scene_rebuild(own.handle, scratch.pointer(), bytes - 1));
+    let text = fails!(CROUPIER_SIZE, croupier_scene_rebuild(own.handle, scratch.pointer(), bytes - 1));
+    assert_eq!(text, format!("scratch: wrong size, needed {bytes}, given {}", bytes - 1));
     ok!(croupier_scene_rebuild(own.handle, scratch.pointer(), bytes));
     ok!(croupier_scene_set_transforms(
         own.handle,
@@ -250,5 +251,104 @@ fn instances_move_and_hide() {
         1,
         ptr::null_mut()
     ));
+    assert_eq!(again(), first);
+}
+
+/// Composing leaves out a triangle without an area, and the numbers of hits are those of the triangles that the scene
+/// tells. Killed by: numbers of the arrays in their place, corners or materials of another triangle.
+#[test]
+fn scenes_tell_their_triangles() {
+    let mut own = Arrays::of(&common::baked());
+    let all = own.triangles.len();
+    own.triangles.insert(3, [5, 5, 6]);
+    own.triangle_materials.insert(3, 1);
+    let arrays = own.arrays();
+    let (mut n, mut m, mut length) = (0, 0, 0);
+    ok!(croupier_scene_compose_size(&arrays, &raw mut n, &raw mut m));
+    let (mut blob, mut scratch) = (Block::new(n), Block::new(m));
+    ok!(croupier_scene_compose(&arrays, blob.pointer(), n, scratch.pointer(), m, &raw mut length));
+    let scene = OwnScene::new(&blob.bytes()[..length]);
+    let mut facts = croupier_scene_facts { struct_size: 72, ..bytemuck::Zeroable::zeroed() };
+    ok!(croupier_scene_info(scene.handle, &raw mut facts));
+    assert_eq!((facts.triangles as usize, arrays.triangle_count), (all, all + 1));
+    let (mut corners, mut materials) = (vec![[[0.0f32; 3]; 3]; all], vec![9; all]);
+    let (to, kinds) = (corners.as_mut_ptr(), materials.as_mut_ptr());
+    ok!(croupier_scene_triangles(scene.handle, 0, all, to, kinds));
+    let given = own.triangles.iter().zip(&own.triangle_materials).enumerate().filter(|(i, _)| *i != 3);
+    for ((_, (vertex, material)), (corners, found)) in given.zip(corners.iter().zip(&materials)) {
+        assert_eq!((vertex.map(|v| own.positions[v as usize]), material), (*corners, found));
+    }
+    // some of them, without materials or corners
+    let mut two = [[[0.0f32; 3]; 3]; 2];
+    ok!(croupier_scene_triangles(scene.handle, 5, 2, two.as_mut_ptr(), ptr::null_mut()));
+    assert_eq!(two[..], corners[5..7]);
+    ok!(croupier_scene_triangles(scene.handle, all, 0, ptr::null_mut(), ptr::null_mut()));
+    for (first, count) in [(all, 1), (0, all + 1), (usize::MAX, 2), (1, usize::MAX)] {
+        fails!(CROUPIER_RANGE, croupier_scene_triangles(scene.handle, first, count, to, kinds));
+    }
+    // a ray to the middle of a triangle, from the side, hits that one or one in front of it
+    for (i, c) in corners.iter().enumerate() {
+        let middle: [f32; 3] = std::array::from_fn(|k| (c[0][k] + c[1][k] + c[2][k]) / 3.0);
+        let (e, f): ([f32; 3], [f32; 3]) =
+            (std::array::from_fn(|k| c[1][k] - c[0][k]), std::array::from_fn(|k| c[2][k] - c[0][k]));
+        let normal = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
+        let length = normal.iter().map(|x| x * x).sum::<f32>().sqrt();
+        let mut rays: croupier_rays8 = croupier_rays8 {
+            origin: [[0.0; 8]; 3],
+            direction: [[0.0; 8]; 3],
+            tmin: [0.0; 8],
+            tmax: [f32::INFINITY; 8],
+            time: [0.0; 8],
+        };
+        for k in 0..3 {
+            rays.direction[k] = [-normal[k] / length; 8];
+            rays.origin[k] = [middle[k] + 1e-3 * normal[k] / length; 8];
+        }
+        let none = [CROUPIER_NONE; 8];
+        let mut hits = croupier_hits8 { t: [0.0; 8], triangle: none, u: [0.0; 8], v: [0.0; 8], instance: [none; 2] };
+        let mut hit = 0;
+        ok!(croupier_scene_closest(scene.handle, &rays, 1, &raw mut hits, &raw mut hit));
+        assert_eq!((hit, hits.triangle[0]), (1, i as u32));
+    }
+}
+
+/// A rough plastic gets another colour with the tables that it has. Killed by: tables of another material or length.
+#[test]
+fn rough_plastics_change_colour() {
+    let mut own = Arrays::of(&common::baked());
+    let mut plastic: croupier_material = bytemuck::Zeroable::zeroed();
+    ok!(croupier_material_init(&raw mut plastic, croupier_material_kind::CROUPIER_ROUGH_PLASTIC as u32));
+    (plastic.reflectance, plastic.alpha, plastic.eta[0]) = ([0.5; 3], 0.3, 1.5);
+    own.materials[0] = plastic;
+    let arrays = own.arrays();
+    let (mut n, mut m, mut length) = (0, 0, 0);
+    ok!(croupier_scene_compose_size(&arrays, &raw mut n, &raw mut m));
+    let (mut blob, mut scratch) = (Block::new(n), Block::new(m));
+    ok!(croupier_scene_compose(&arrays, blob.pointer(), n, scratch.pointer(), m, &raw mut length));
+    let scene = OwnScene::new(&blob.bytes()[..length]);
+    let render = Render::new(scene.handle, &plan(&settings(scene.handle, 1)), None);
+    let again = || {
+        ok!(croupier_session_change_scene(render.session, scene.handle, 0));
+        render.render(1000, u64::MAX)
+    };
+    let first = again();
+    let mut needed = 0;
+    ok!(croupier_scene_material_tables(scene.handle, 1, ptr::null_mut(), 0, &raw mut needed));
+    assert_eq!(needed, 0, "a diffuse one");
+    ok!(croupier_scene_material_tables(scene.handle, 0, ptr::null_mut(), 0, &raw mut needed));
+    assert!(needed > 0);
+    let mut tables = vec![-1.0f32; needed + 1];
+    let (to, n) = (tables.as_mut_ptr(), tables.len());
+    fails!(CROUPIER_RANGE, croupier_scene_material_tables(scene.handle, 99, to, n, &raw mut needed));
+    fails!(CROUPIER_SIZE, croupier_scene_material_tables(scene.handle, 0, to, needed - 1, &raw mut needed));
+    ok!(croupier_scene_material_tables(scene.handle, 0, to, n, ptr::null_mut()));
+    assert!(tables[..needed].iter().all(|x| (0.0..=1.0).contains(x)) && tables[needed] == -1.0);
+    let mut old: croupier_material = bytemuck::Zeroable::zeroed();
+    ok!(croupier_scene_material(scene.handle, 0, &raw mut old));
+    let red = croupier_material { reflectance: [0.7, 0.1, 0.1], ..old };
+    fails!(CROUPIER_EDIT_FIXED, croupier_scene_set_material(scene.handle, 0, &red, ptr::null(), 0));
+    ok!(croupier_scene_set_material(scene.handle, 0, &red, to, needed));
+    assert_ne!(again(), first);
+    ok!(croupier_scene_set_material(scene.handle, 0, &old, to, needed));
     assert_eq!(again(), first);
 }

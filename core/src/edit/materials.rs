@@ -8,7 +8,8 @@ use core::ops::Range;
 
 impl SceneEdit<'_> {
     /// Replaces a material and the tables that it refers to: as many entries as its kind has, in their order, computed
-    /// by whoever bakes materials; they must fit where the old ones are. Kind, texture and medium may change; triangles
+    /// by whoever bakes materials, or those of [`Scene::material_tables`](crate::Scene::material_tables) as long as kind,
+    /// roughness, refractive index and compensation stay; they must fit where the old ones are. Kind, texture and medium may change; triangles
     /// and lights stay as they are. A principled material keeps its record; [`Self::principled`] replaces both.
     ///
     /// A material that goes over to a kind without tables, or without that record, loses the place of those that it had, and cannot
@@ -25,7 +26,7 @@ impl SceneEdit<'_> {
         let keeps_record = is_layered(&material);
         let kept = keeps_record || !tables.is_empty();
         let material = Material { table: if kept { old.table } else { NONE }, ..material };
-        let fits = tables.len() == room(&material) && tables.len() <= room(&old);
+        let fits = tables.len() == material.table_entries() && tables.len() <= old.table_entries();
         if !fits || (keeps_record && !is_layered(&old)) {
             return Err(EditError::Fixed { of, index });
         }
@@ -72,19 +73,11 @@ fn is_layered(m: &Material) -> bool {
     m.kind < u32::BITS && LAYERED_KINDS >> m.kind & 1 != 0
 }
 
-/// Entries of the tables of a material; those of a principled one are in its record.
-fn room(m: &Material) -> usize {
-    let compensated = m.flags & MATERIAL_COMPENSATED != 0;
-    let used = |p: &&Parameter| compensated || !p.compensates();
-    let facts = MaterialKind::from_u32(m.kind).map(MaterialKind::facts);
-    facts.map_or(0, |f| f.parameters.iter().filter(used).map(|p| p.entries()).sum::<usize>())
-}
-
 /// Entries of the tables section that a material reads.
 fn reads(tables: &[f32], m: &Material) -> [Range<usize>; 3] {
     let from = |first: u32, count: usize| first as usize..(first as usize).saturating_add(count);
     let record = PrincipledRecord::read::<1>(tables, m.table).filter(|_| is_layered(m));
-    let Some([r]) = record else { return [from(m.table, room(m)), 0..0, 0..0] };
+    let Some([r]) = record else { return [from(m.table, m.table_entries()), 0..0, 0..0] };
     let energy = if r.energy == NONE { 0..0 } else { from(r.energy, PRINCIPLED_ENERGY_ROWS * EnergyRow::ENTRIES) };
     let reflection = from(r.reflection, PRINCIPLED_ROWS * ReflectionRow::ENTRIES);
     [from(m.table, PrincipledRecord::ENTRIES), reflection, energy]

@@ -116,6 +116,14 @@ impl<'s> Scene<'s> {
         PrincipledRecord::read::<1>(self.0.tables, m.table).map(|[r]| r)
     }
 
+    /// Tables of a material as [`SceneEdit::material`](crate::SceneEdit::material) takes them: none for most kinds. `None` if
+    /// there is no such material.
+    pub fn material_tables(&self, material: u32) -> Option<&'s [f32]> {
+        let m = self.0.materials.get(material as usize)?;
+        let (first, count) = (m.table as usize, m.table_entries());
+        if count == 0 { Some(&[]) } else { self.0.tables.get(first..first.saturating_add(count)) }
+    }
+
     /// Name of a material, empty if it has none.
     pub fn material_name(&self, material: u32) -> &'s str {
         if (material as usize) < self.materials.len() { self.name(material as usize) } else { "" }

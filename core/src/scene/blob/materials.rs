@@ -246,6 +246,14 @@ pub struct Material {
 }
 
 impl Material {
+    /// Entries of the tables of its kind, from `table` on; 0 for a principled one, whose record says where they are.
+    pub fn table_entries(&self) -> usize {
+        let compensated = self.flags & MATERIAL_COMPENSATED != 0;
+        let used = |p: &&Parameter| compensated || !p.compensates();
+        let facts = MaterialKind::from_u32(self.kind).map(MaterialKind::facts);
+        facts.map_or(0, |f| f.parameters.iter().filter(used).map(|p| p.entries()).sum())
+    }
+
     /// A material of this kind without texture, tables and medium; its numbers are 0, and those that the kind uses
     /// ([`MaterialFacts::parameters`]) are still to be set.
     pub const fn new(kind: MaterialKind) -> Self {
