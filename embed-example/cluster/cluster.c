@@ -13,6 +13,7 @@
  */
 #define _POSIX_C_SOURCE 200112L
 #include <croupier.h>
+#include <errno.h>
 #include <limits.h>
 #include <mpi.h>
 #include <stdint.h>
@@ -44,6 +45,21 @@ static void *block(size_t bytes)
         MPI_Abort(MPI_COMM_WORLD, 1);
     }
     return memory;
+}
+
+/* A number of the command line, with a fraction or without. */
+static double number(const char *text, double low, double high, int whole)
+{
+    char *end = NULL;
+    double value;
+    errno = 0;
+    value = strtod(text, &end);
+    if (errno || end == text || *end || !(value >= low && value <= high) || (whole && value != (double)(long)value)) {
+        fprintf(stderr, "rank %d: '%s' is no %s from %g to %g\n", rank, text, whole ? "whole number" : "number", low,
+                high);
+        MPI_Abort(MPI_COMM_WORLD, 2);
+    }
+    return value;
 }
 
 static void *read_file(const char *path, size_t *bytes)
@@ -86,49 +102,82 @@ static void give_up(int r, const char *why)
     dead[r] = 1;
 }
 
-#define WRITTEN 32767 /* tag of the message that the picture is there */
+#ifndef TAGS
+#define TAGS 32767 /* that all implementations of MPI have */
+#endif
+#define WRITTEN TAGS /* tag of the message that the picture is there */
 
-/* Messages of one iteration are told from those of others by their tags. */
-static int tag(int iteration, int shard)
+/* Messages of one iteration are told from those of others by their tags. After TAGS / SHARDS iterations tags come
+ * again: then the iteration that ends each message tells. */
+static int tag(uint32_t iteration, int shard)
 {
-    return (iteration * SHARDS + shard) % 32767;
+    return (int)(((uint64_t)iteration * SHARDS + (uint64_t)shard) % TAGS);
 }
 
-/* Shards on their way to all other processes. */
-static struct { void *bytes; MPI_Request *requests; } outgoing[SHARDS];
+/* Messages on their way to all other processes. */
+static struct sending {
+    struct sending *next;
+    void *bytes;
+    MPI_Request *requests;
+} *outgoing;
 
-/* Has everybody taken a shard, or everybody who lives? */
-static int sent(int shard, int to_the_dead)
+static MPI_Request *no_requests(void)
+{
+    MPI_Request *requests = block(sizeof(MPI_Request) * (size_t)ranks);
+    int r;
+    for (r = 0; r < ranks; r++)
+        requests[r] = MPI_REQUEST_NULL;
+    return requests;
+}
+
+/* Have all of these arrived? */
+static int arrived(MPI_Request *requests)
 {
     int r, done, all = 1;
-    for (r = 0; outgoing[shard].requests && r < ranks; r++)
-        if (to_the_dead || !dead[r])
-            all &= MPI_Test(&outgoing[shard].requests[r], &done, MPI_STATUS_IGNORE) == MPI_SUCCESS && done;
+    for (r = 0; r < ranks; r++)
+        all &= MPI_Test(&requests[r], &done, MPI_STATUS_IGNORE) == MPI_SUCCESS && done;
     return all;
 }
 
-static size_t send(croupier_shard *handle, int iteration, int shard, size_t most)
+static int all_arrived(void)
+{
+    struct sending *s;
+    int all = 1;
+    for (s = outgoing; s; s = s->next)
+        all &= arrived(s->requests);
+    return all;
+}
+
+static size_t send(croupier_shard *handle, uint32_t iteration, int shard, size_t most)
 {
     size_t bytes;
+    struct sending *s = outgoing;
     int r;
-    /* What a dead process never takes stays where it is: MPI may still read it. */
-    if (!outgoing[shard].bytes || !sent(shard, 1)) {
-        outgoing[shard].bytes = block(most);
-        outgoing[shard].requests = block(sizeof(MPI_Request) * (size_t)ranks);
-        for (r = 0; r < ranks; r++)
-            outgoing[shard].requests[r] = MPI_REQUEST_NULL;
+    /* What somebody has not taken yet stays where it is, for good if he is dead: MPI may still read it. */
+    while (s && !arrived(s->requests))
+        s = s->next;
+    if (!s) {
+        s = block(sizeof *s);
+        s->next = outgoing;
+        s->bytes = block(most + sizeof iteration);
+        s->requests = no_requests();
+        outgoing = s;
     }
-    check(croupier_shard_save(handle, outgoing[shard].bytes, most, &bytes, &m));
+    check(croupier_shard_save(handle, s->bytes, most, &bytes, &m));
+    memcpy((char *)s->bytes + bytes, &iteration, sizeof iteration);
     for (r = 0; r < ranks; r++)
         if (r != rank && !dead[r])
-            MPI_Isend(outgoing[shard].bytes, (int)bytes, MPI_BYTE, r, tag(iteration, shard), MPI_COMM_WORLD,
-                      &outgoing[shard].requests[r]);
+            MPI_Isend(s->bytes, (int)(bytes + sizeof iteration), MPI_BYTE, r, tag(iteration, shard), MPI_COMM_WORLD,
+                      &s->requests[r]);
     return bytes;
 }
 
-/* Takes a message with this tag, if there is one; 1 if a shard was loaded. Without a handle it is thrown away. */
-static int receive(croupier_shard *handle, croupier_session *session, int message_tag, void **buffer, size_t most)
+/* Takes a message about a shard, if there is one; 1 if it was loaded. Without a handle it is thrown away. */
+static int receive(croupier_shard *handle, croupier_session *session, uint32_t iteration, int shard, void **buffer,
+                   size_t most)
 {
+    const int message_tag = tag(iteration, shard);
+    const size_t end = sizeof iteration;
     MPI_Request request;
     MPI_Status status;
     int found = 0, bytes = 0, done = 0;
@@ -137,18 +186,19 @@ static int receive(croupier_shard *handle, croupier_session *session, int messag
         return 0;
     MPI_Get_count(&status, MPI_BYTE, &bytes);
     /* The announcement is here; its sender may have stopped in the middle of the message. */
-    MPI_Irecv(*buffer, (int)most, MPI_BYTE, status.MPI_SOURCE, message_tag, MPI_COMM_WORLD, &request);
+    MPI_Irecv(*buffer, (int)(most + end), MPI_BYTE, status.MPI_SOURCE, message_tag, MPI_COMM_WORLD, &request);
     while (!done && MPI_Wtime() - begun < patience)
         if (MPI_Test(&request, &done, MPI_STATUS_IGNORE) != MPI_SUCCESS)
             break;
     if (!done) {
         give_up(status.MPI_SOURCE, "stopped in the middle of a message");
-        *buffer = block(most); /* the old one may yet be written to */
+        *buffer = block(most + end); /* the old one may yet be written to */
         return 0;
     }
-    if (!handle)
+    /* Of an earlier iteration: a shard that two have rendered, and that came late the second time. */
+    if (!handle || (size_t)bytes < end || memcmp((char *)*buffer + bytes - end, &iteration, end))
         return 0;
-    if (croupier_shard_load(handle, session, *buffer, (size_t)bytes, &m) == CROUPIER_OK)
+    if (croupier_shard_load(handle, session, *buffer, (size_t)bytes - end, &m) == CROUPIER_OK)
         return 1;
     fprintf(stderr, "rank %d: from rank %d: %s\n", rank, status.MPI_SOURCE, m.text);
     give_up(status.MPI_SOURCE, "sends what does not belong");
@@ -169,13 +219,18 @@ static uint64_t hash(const float *values, size_t count)
     return h;
 }
 
-/* Square roots in place of the sRGB curve. */
+/* Square roots in place of the sRGB curve. The picture gets its name when it is complete: this process may be taken for
+ * dead and ended while it writes, and another may write the same picture. */
 static void write_ppm(const char *path, const float *rgb, uint32_t width, uint32_t height)
 {
-    size_t i, n = (size_t)width * height * 3;
-    FILE *file = fopen(path, "wb");
+    size_t i, n = (size_t)width * height * 3, length = strlen(path) + 32;
+    char *unfinished = block(length);
+    FILE *file;
+    int failed_writes;
+    snprintf(unfinished, length, "%s.%d.part", path, rank);
+    file = fopen(unfinished, "wb");
     if (!file) {
-        perror(path);
+        perror(unfinished);
         MPI_Abort(MPI_COMM_WORLD, 1);
     }
     fprintf(file, "P6\n%u %u\n255\n", (unsigned)width, (unsigned)height);
@@ -185,7 +240,15 @@ static void write_ppm(const char *path, const float *rgb, uint32_t width, uint32
             y++;
         fputc(y, file);
     }
-    fclose(file);
+    failed_writes = ferror(file);
+    /* The last bytes may fail only here. */
+    failed_writes |= fclose(file);
+    if (failed_writes || rename(unfinished, path)) {
+        perror(path);
+        remove(unfinished);
+        MPI_Abort(MPI_COMM_WORLD, 1);
+    }
+    free(unfinished);
 }
 
 int main(int argc, char **argv)
@@ -203,7 +266,8 @@ int main(int argc, char **argv)
     croupier_session *session;
     croupier_shard *shards[SHARDS];
     size_t k, bytes, floats, most = 0;
-    int i, r, n;
+    uint32_t n;
+    int i, r, done = 0;
 
     MPI_Init(&argc, &argv);
     MPI_Comm_set_errhandler(MPI_COMM_WORLD, MPI_ERRORS_RETURN);
@@ -214,8 +278,10 @@ int main(int argc, char **argv)
         MPI_Abort(MPI_COMM_WORLD, 2);
     }
     const char *const *samples = argc > 4 ? (const char *const *)argv + 4 : usual;
-    const int iterations = argc > 4 ? argc - 4 : 3;
-    patience = argc > 4 ? atof(argv[3]) : patience;
+    const uint32_t iterations = argc > 4 ? (uint32_t)argc - 4 : 3;
+    for (n = 0; n < iterations; n++)
+        number(samples[n], 1, 65536, 1);
+    patience = argc > 4 ? number(argv[3], 0.001, 1e6, 0) : patience;
     dead = block(sizeof(int) * (size_t)ranks);
     memset(dead, 0, sizeof(int) * (size_t)ranks);
 
@@ -236,18 +302,18 @@ int main(int argc, char **argv)
         check(croupier_plan_saved_shard_size(&plan, (uint32_t)i, &bytes, &m));
         most = bytes > most ? bytes : most;
     }
-    if (most > INT_MAX) {
+    if (most > INT_MAX - sizeof n) {
         fprintf(stderr, "shards of %lu bytes are too large for a message: more SHARDS\n", (unsigned long)most);
         MPI_Abort(MPI_COMM_WORLD, 1);
     }
-    void *buffer = block(most);
+    void *buffer = block(most + sizeof n);
 
     for (n = 0; n < iterations; n++) {
         int have[SHARDS] = {0}, missing = SHARDS;
         size_t exchanged = 0;
         double last;
         uint32_t more;
-        check(croupier_session_begin_iteration(session, (uint32_t)atoi(samples[n]), &m));
+        check(croupier_session_begin_iteration(session, (uint32_t)number(samples[n], 1, 65536, 1), &m));
         while (missing) {
             for (i = 0; i < SHARDS; i++)
                 if (!have[i] && owner(i) == rank) {
@@ -261,7 +327,7 @@ int main(int argc, char **argv)
             last = MPI_Wtime();
             while (missing && failed == before && MPI_Wtime() - last < patience) {
                 for (i = 0; i < SHARDS && failed == before; i++)
-                    if (!have[i] && receive(shards[i], session, tag(n, i), &buffer, most)) {
+                    if (!have[i] && receive(shards[i], session, n, i, &buffer, most)) {
                         have[i] = 1, missing--;
                         last = MPI_Wtime();
                     }
@@ -279,25 +345,25 @@ int main(int argc, char **argv)
             check(croupier_session_finish_iteration(session, shards, SHARDS, 1000000, &more, &m));
         while (more);
         for (i = 0; n > 0 && i < SHARDS; i++) /* shards that two have rendered come twice */
-            receive(NULL, session, tag(n - 1, i), &buffer, most);
-        fprintf(stderr, "rank %d: iteration %d sent %lu bytes to each other\n", rank, n + 1, (unsigned long)exchanged);
+            receive(NULL, session, n - 1, i, &buffer, most);
+        fprintf(stderr, "rank %d: iteration %lu sent %lu bytes to each other\n", rank, (unsigned long)n + 1,
+                (unsigned long)exchanged);
     }
 
     floats = (size_t)sizes.width * sizes.height * 3;
     float *rgb = block(floats * sizeof *rgb);
     check(croupier_session_rgb(session, rgb, floats, &m));
     /* The first that lives writes the picture, and says so; any other has the same. */
-    MPI_Request said[1];
-    for (n = 0; owner(0) != rank && !n;) {
+    MPI_Request heard, *said = no_requests();
+    double last;
+    while (owner(0) != rank && !done) {
         const int writer = owner(0);
-        double last = MPI_Wtime();
-        MPI_Irecv(NULL, 0, MPI_BYTE, writer, WRITTEN, MPI_COMM_WORLD, said);
-        for (; !n && MPI_Wtime() - last < patience; nanosleep(&pause, NULL)) {
-            MPI_Test(said, &n, MPI_STATUS_IGNORE);
-            for (i = 0; i < SHARDS; i++)
-                sent(i, 0);
+        MPI_Irecv(NULL, 0, MPI_BYTE, writer, WRITTEN, MPI_COMM_WORLD, &heard);
+        for (last = MPI_Wtime(); !done && MPI_Wtime() - last < patience; nanosleep(&pause, NULL)) {
+            MPI_Test(&heard, &done, MPI_STATUS_IGNORE);
+            all_arrived();
         }
-        if (!n)
+        if (!done)
             give_up(writer, "is silent");
     }
     if (owner(0) == rank) {
@@ -307,10 +373,13 @@ int main(int argc, char **argv)
         fflush(stdout);
         for (r = 0; r < ranks; r++)
             if (r != rank && !dead[r])
-                MPI_Isend(NULL, 0, MPI_BYTE, r, WRITTEN, MPI_COMM_WORLD, said);
+                MPI_Isend(NULL, 0, MPI_BYTE, r, WRITTEN, MPI_COMM_WORLD, &said[r]);
     }
-    /* MPI cannot end in order without the dead. The picture is there: nobody has to wait for anybody. */
-    if (failed)
+    /* MPI ends in order if every message has arrived, and cannot without the dead. */
+    for (done = 0, last = MPI_Wtime(); !failed && !done && MPI_Wtime() - last < patience; nanosleep(&pause, NULL))
+        done = all_arrived() & arrived(said);
+    /* Otherwise: the picture is there, nobody has to wait for anybody. */
+    if (!done)
         MPI_Abort(MPI_COMM_WORLD, 0);
     return MPI_Finalize() != MPI_SUCCESS;
 }
