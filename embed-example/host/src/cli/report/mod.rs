@@ -97,7 +97,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         }
         ledger.kernels.extend(new);
     }
-    let written = write(&args.out, &ledger)?;
+    let written = write(args, &ledger)?;
     say(&format!("wrote {}", written.iter().map(|p| text::path(p)).collect::<Vec<_>>().join(", ")))
 }
 
@@ -111,8 +111,12 @@ fn read(path: &Path) -> Result<Ledger, Box<dyn Error>> {
     Err(format!("{}: a ledger of format {}, this program reads {FORMAT}", name(), ledger.format).into())
 }
 
-/// Writes ledger, page, figures and tables; the files, the page first.
-fn write(folder: &Path, ledger: &Ledger) -> Result<Vec<PathBuf>, Box<dyn Error>> {
+/// Writes ledger, page, figures and tables; the files, the page first. What was read is never written over: a page that
+/// is made again beside its ledger leaves that as it is.
+fn write(args: &Args, ledger: &Ledger) -> Result<Vec<PathBuf>, Box<dyn Error>> {
+    let given = args.from.iter().chain(&args.join).chain(&args.scenes);
+    let read: Vec<_> = given.filter_map(|p| p.canonicalize().ok()).collect();
+    let own = args.from.as_ref().filter(|_| args.join.is_empty()).and_then(|p| p.canonicalize().ok());
     let figures = figures::all(ledger)?;
     let mut files = vec![("index.html".to_string(), page::html(ledger, &figures)?)];
     files.push(("ledger.json".into(), serde_json::to_string(ledger)?));
@@ -120,7 +124,14 @@ fn write(folder: &Path, ledger: &Ledger) -> Result<Vec<PathBuf>, Box<dyn Error>>
     files.extend(figures.iter().map(|f| (format!("{}.svg", f.name), f.file())));
     let mut written = Vec::new();
     for (name, text) in files {
-        let path = folder.join(name);
+        let path = args.out.join(name);
+        let there = path.canonicalize().ok();
+        if there.is_some() && there == own {
+            continue;
+        }
+        if there.is_some_and(|p| read.contains(&p)) {
+            return Err(format!("{} was read, and would be written over: give another --out", text::path(&path)).into());
+        }
         std::fs::write(&path, text).map_err(|e| format!("cannot write {}: {e}", text::path(&path)))?;
         written.push(path);
     }

@@ -3,7 +3,9 @@
 use super::figures::{Figure, LEVEL, series_of};
 use super::ledger::{Component, Kernel, Ledger, SceneRecord};
 use super::sums::share_interval;
-use super::tables::{Reached, calibration, change, expected, forecast_quality, held, number, reached, saved};
+use super::tables::{
+    Reached, calibration, change, expected, forecast_quality, held, last_error, number, reached, saved,
+};
 use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment, Value, context};
 use std::error::Error;
@@ -136,7 +138,7 @@ fn curve_rows(scene: &SceneRecord) -> Vec<Value> {
             time,
             interval,
             bias => if c.biased { floor } else { "unbiased".into() },
-            end => number(super::figures::last_error(c)),
+            end => number(last_error(c)),
             largest => number(ends.iter().copied().fold(f64::NAN, f64::max)),
             spp => number(last.map_or(f64::NAN, |p| p.spp)),
         }

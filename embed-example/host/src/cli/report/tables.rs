@@ -1,6 +1,5 @@
 //! What the ledger says, in few numbers: for tables, figures and CSV files.
 
-use super::figures::last_error;
 use super::ledger::{Curve, ForecastRun, Knob, Ledger, Spread};
 use super::sums::{bootstrap, geometric_mean, log_interpolate, mean, share_interval};
 use std::error::Error;
@@ -59,6 +58,11 @@ pub(super) fn reached(curve: &Curve, level: f64) -> Reached {
     let seconds = crossing(curve, level).unwrap_or(by_end).min(last);
     // as wide, in proportion, as that at the end
     Reached::In { seconds, interval: interval.map(|t| t / by_end * seconds), extrapolated }
+}
+
+/// Mean over the seeds of the last relMSE of a curve.
+pub(super) fn last_error(curve: &Curve) -> f64 {
+    mean(&curve.runs.iter().filter_map(|r| r.points.last()).map(|p| p.rel_mse).collect::<Vec<_>>())
 }
 
 /// First time at which the mean error of all runs is `level`.

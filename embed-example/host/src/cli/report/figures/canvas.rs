@@ -280,7 +280,7 @@ mod tests {
     #[test]
     fn ticks_are_round_and_few() {
         assert_eq!(log_ticks([0.9, 12.0], 6), [1.0, 2.0, 5.0, 10.0]);
-        assert_eq!(log_ticks([0.25, 4.0], 4), [0.3, 1.0, 3.0]);
+        assert_eq!(log_ticks([0.25, 4.0], 4), [0.5, 1.0, 2.0]);
         assert_eq!(log_ticks([0.9, 2.4], 8), [1.0, 1.5, 2.0]);
         assert_eq!(log_ticks([1e-6, 1e6], 5).len(), 5);
     }

@@ -1,7 +1,7 @@
 //! Error over core-seconds, time to an error, and path lengths.
 
 use super::super::ledger::{Curve, SceneRecord};
-use super::super::sums::{log_interpolate, mean, quantile};
+use super::super::sums::{log_interpolate, quantile};
 use super::super::tables::{Reached, reached};
 use super::canvas::*;
 use plotters::prelude::*;
@@ -226,9 +226,4 @@ pub(super) fn depths(name: &str, scene: &SceneRecord) -> Result<Option<Figure>, 
         Ok(())
     };
     Figure::draw(name, &format!("Light and time by path length: {}", scene.name), caption, [300, 280], draw).map(Some)
-}
-
-/// Mean over the seeds of the last relMSE of a curve.
-pub(crate) fn last_error(curve: &Curve) -> f64 {
-    mean(&curve.runs.iter().filter_map(|r| r.points.last()).map(|p| p.rel_mse).collect::<Vec<_>>())
 }

@@ -6,7 +6,7 @@ mod marks;
 mod points;
 
 pub(super) use canvas::{Figure, series_of};
-pub(super) use curves::{LEVEL, last_error};
+pub(super) use curves::LEVEL;
 
 use super::ledger::Ledger;
 use std::error::Error;
