@@ -155,11 +155,12 @@ pub(super) fn measure(
     let by_seed: Vec<_> = (0..effort.seeds).map(|_| take(variants.len())).collect();
     for (i, (name, _, biased)) in variants.iter().enumerate() {
         let runs: Vec<_> = by_seed.iter().map(|row| &row[i]).collect();
-        let pictures: Vec<_> = runs.iter().map(|r| r.1.picture()).collect();
+        let bias = bias(&runs.iter().map(|r| r.1.picture()).collect::<Vec<_>>(), &reference);
         record.curves.push(Curve {
             name: name.clone(),
             biased: *biased,
-            bias: bias(&pictures, &reference),
+            bias: bias.0,
+            bias_error: bias.1,
             runs: runs.iter().map(|(seed, watched)| Run { seed: *seed, ..watched.run() }).collect(),
         });
     }
@@ -233,8 +234,8 @@ fn jobs(
 }
 
 /// Squared relative bias: the product of the differences of two independent pictures from the reference, over all
-/// pairs; and its standard error, by leaving one picture out after the other.
-fn bias(pictures: &[Vec<f64>], reference: &Reference) -> [f64; 2] {
+/// pairs; and its standard error, by leaving one of three pictures or more out after the other.
+fn bias(pictures: &[Vec<f64>], reference: &Reference) -> (f64, Option<f64>) {
     let n = pictures.len();
     let product = |i: usize, j: usize| {
         let (a, b) = (&pictures[i], &pictures[j]);
@@ -248,10 +249,10 @@ fn bias(pictures: &[Vec<f64>], reference: &Reference) -> [f64; 2] {
     };
     let all = mean(&pairs.iter().map(|p| p.2).collect::<Vec<_>>());
     if n < 3 {
-        return [all, f64::NAN];
+        return (all, None);
     }
     let deviations: f64 = (0..n).map(|k| (without(k) - all).powi(2)).sum();
-    [all, ((n - 1) as f64 / n as f64 * deviations).sqrt()]
+    (all, Some(((n - 1) as f64 / n as f64 * deviations).sqrt()))
 }
 
 /// Renders to the error that the curves reached in the seconds asked for, with what they predicted.
@@ -305,10 +306,12 @@ mod tests {
         };
         let reference = Reference::new([picture(1, 0.0, 0.1), picture(2, 0.0, 0.1)]);
         let pictures: Vec<_> = (10..18).map(|seed| picture(seed, 0.2, 1.0)).collect();
-        let [found, error] = bias(&pictures, &reference);
+        let (found, error) = bias(&pictures, &reference);
+        let error = error.unwrap();
         assert!((found - 0.04 / 1.01).abs() < 4.0 * error && error < 0.01, "{found} +- {error}");
         let pictures: Vec<_> = (10..18).map(|seed| picture(seed, 0.0, 1.0)).collect();
-        let [found, error] = bias(&pictures, &reference);
-        assert!(found.abs() < 4.0 * error, "{found} +- {error}");
+        let (found, error) = bias(&pictures, &reference);
+        assert!(found.abs() < 4.0 * error.unwrap(), "{found} +- {error:?}");
+        assert_eq!(bias(&pictures[..2], &reference).1, None);
     }
 }

@@ -239,9 +239,10 @@ fn rows(
         instruction_set: INSTRUCTION_SET.into(),
         arguments: e.count,
         exhaustive,
-        max_ulp: e.max,
+        // a ledger has no infinities
+        max_ulp: e.max.min(f64::MAX),
         worst: e.worst,
-        mean_ulp: e.sum / e.count.max(1) as f64,
+        mean_ulp: (e.sum / e.count.max(1) as f64).min(f64::MAX),
         ns,
     })
 }

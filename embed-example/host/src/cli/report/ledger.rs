@@ -104,8 +104,10 @@ pub(super) struct Curve {
     /// Its expectation is not the scene's: a strategy that cuts paths, or a smaller depth.
     pub(super) biased: bool,
     pub(super) runs: Vec<Run>,
-    /// Squared relative bias against the reference, and its standard error over the seeds.
-    pub(super) bias: [f64; 2],
+    /// Squared relative bias against the reference; may be below 0 by chance.
+    pub(super) bias: f64,
+    /// Its standard error over the seeds, of three at least.
+    pub(super) bias_error: Option<f64>,
 }
 
 /// A render: its error after every iteration.

@@ -128,8 +128,8 @@ fn curve_rows(scene: &SceneRecord) -> Vec<Value> {
             }
             Reached::Never => ("not reached: bias floor".into(), "-".into()),
         };
-        let [bias, error] = c.bias;
-        let floor = if c.biased && bias > 2.0 * error { number(bias) } else { "none found".into() };
+        let known = c.bias_error.is_some_and(|error| c.bias > 2.0 * error);
+        let floor = if known { number(c.bias) } else { "none found".into() };
         let ends: Vec<f64> = c.runs.iter().filter_map(|r| r.points.last()).map(|p| p.rel_mse).collect();
         let last = c.runs.first().and_then(|r| r.points.last());
         context! {

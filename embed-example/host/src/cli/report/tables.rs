@@ -39,7 +39,7 @@ pub(super) enum Reached {
 /// When the mean error of a curve's renders comes down to `level`: where it does, or where it would as bias² + V /
 /// time.
 pub(super) fn reached(curve: &Curve, level: f64) -> Reached {
-    let bias = if curve.biased { curve.bias[0].max(0.0) } else { 0.0 };
+    let bias = if curve.biased { curve.bias.max(0.0) } else { 0.0 };
     if bias >= level {
         return Reached::Never;
     }
@@ -262,7 +262,7 @@ mod tests {
     fn curve(biased: bool, bias: f64, v: f64, end: f64) -> Curve {
         let point = |t: f64| Point { core_seconds: t, spp: 100.0 * t, rays: 1, rel_mse: bias + v / t };
         let run = |seed| Run { seed, points: [0.01, 0.1, 1.0].map(|t| point(t * end)).to_vec() };
-        Curve { name: "x".into(), biased, runs: (0..4).map(run).collect(), bias: [bias, 0.0] }
+        Curve { name: "x".into(), biased, runs: (0..4).map(run).collect(), bias, bias_error: None }
     }
 
     /// Killed by: a floor that is crossed, V of the whole error, a crossing on linear scales.
