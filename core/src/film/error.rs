@@ -38,6 +38,19 @@ impl ErrorEstimate {
     pub fn is_resolved(&self) -> bool {
         self.effective_pixels >= RESOLVED
     }
+
+    /// Figure of merit of a render that took `work`, in any unit: 1 / (relMSE x work). It is about the same however long
+    /// a render goes on, so that it tells which of two renders of a scene is the more efficient; infinite without error or
+    /// work.
+    ///
+    /// ```
+    /// let short = croupier::ErrorEstimate { rel_mse: 0.04, ..Default::default() };
+    /// let long = croupier::ErrorEstimate { rel_mse: 0.01, ..Default::default() };
+    /// assert_eq!(short.figure_of_merit(5.0), long.figure_of_merit(20.0));
+    /// ```
+    pub fn figure_of_merit(&self, work: f64) -> f64 {
+        1.0 / (self.rel_mse * work)
+    }
 }
 
 /// Constant in the denominator of relMSE, added to the squared mean so that black pixels do not dominate.

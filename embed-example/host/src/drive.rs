@@ -3,6 +3,7 @@
 
 mod calibrate;
 mod error;
+mod forecast;
 mod observe;
 mod part;
 mod result;
@@ -10,6 +11,7 @@ pub mod schedule;
 
 pub use calibrate::Calibration;
 pub use error::DriveError;
+pub use forecast::{Forecast, UNKNOWN, forecast};
 pub use observe::{Observer, Progress, Target, Unobserved};
 pub use part::{Part, PartError, Share};
 pub use result::{CacheRecord, IterationRecord, Rendered};
@@ -186,7 +188,11 @@ pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
         if begun.take().is_none() {
             session.begin_iteration(samples);
         }
-        let run = Run { session: &session, observer, start, all, last, samples, error, rays: AtomicU64::new(0) };
+        let end = match share.target {
+            Target::Error(e) => forecast(e, learns(settings), &iterations),
+            _ => None,
+        };
+        let run = Run { session: &session, observer, start, all, last, samples, error, end, rays: AtomicU64::new(0) };
         stopped_early = pool.install(|| run.all(&mut shards));
         if stopped_early && saver.wanted() {
             // The iteration under way, as it was before anything of it was merged: resumed, it is traced anew.
@@ -318,7 +324,7 @@ impl Saver<'_> {
 }
 
 /// Does anything learn between iterations, so that the cost of a camera sample changes?
-fn learns(s: &Settings) -> bool {
+pub fn learns(s: &Settings) -> bool {
     s.strategy.needs_image() || s.shadow_roulette || s.adaptive
 }
 
@@ -373,6 +379,7 @@ struct Run<'a, 's, 'm, P: Profile, X: Extension> {
     last: Work,
     samples: u32,
     error: Option<ErrorEstimate>,
+    end: Option<Forecast>,
     rays: AtomicU64,
 }
 
@@ -411,6 +418,7 @@ impl<P: Profile + Sync, X: Extension + Sync> Run<'_, '_, '_, P, X> {
             rays: self.all.rays + rays,
             seconds: self.start.elapsed().as_secs_f64(),
             relmse_estimate: self.error.map(|e| e.rel_mse),
+            forecast: self.end,
         }
     }
 }

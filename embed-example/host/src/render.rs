@@ -105,6 +105,10 @@ pub struct RenderStats {
     /// 95 % confidence interval of the estimated relMSE; `None` below two samples per pixel, and where the samples do not
     /// tell ([`croupier::ErrorEstimate::is_resolved`]): then the estimate is a lower bound.
     pub relmse_interval: Option<[f64; 2]>,
+    /// Figure of merit, 1 / (estimated relMSE x million rays) ([`croupier::ErrorEstimate::figure_of_merit`]): it tells
+    /// renders of a scene from each other, on any machine and whatever their length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub figure_of_merit: Option<f64>,
     /// Share of the eight lanes that did work, 0 to 1, by stage.
     pub lane_utilisation: BTreeMap<&'static str, f64>,
     /// Counts of work and of limits that were met (full rings, contributions that are not finite, ...), by their names
@@ -226,7 +230,7 @@ pub fn render_scene(
     Ok(RenderResult {
         picture: picture(&rendered, &names, options.denoise),
         stats: stats(&rendered),
-        statistics: Statistics::of(&rendered),
+        statistics: Statistics::of(&rendered).with_forecasts(&rendered, options.target, &options.settings),
         plan,
         cache: rendered.cache,
         stopped_early: rendered.stopped_early,
@@ -372,6 +376,7 @@ fn stats(r: &Rendered) -> RenderStats {
         mrays_per_s: r.mrays_per_s(),
         relmse_estimate: (r.spp > 1).then_some(r.error.rel_mse),
         relmse_interval: (r.spp > 1 && r.error.is_resolved()).then_some([r.error.low, r.error.high]),
+        figure_of_merit: Some(r.error.figure_of_merit(c.rays() as f64 * 1e-6)).filter(|f| r.spp > 1 && f.is_finite()),
         lane_utilisation: lanes.iter().map(|(n, u)| (*n, u.share())).collect(),
         counters: counters.into_iter().collect(),
         first_non_finite: first_non_finite(c.first_non_finite, r.size),

@@ -1,7 +1,8 @@
 //! Figures of paths, iterations and time, to compare roulette strategies with (EARS, SIGGRAPH 2022, Table 1, Fig. 9 and
 //! section 6.2).
 
-use crate::drive::{IterationRecord, Rendered};
+use crate::drive::{self, Forecast, IterationRecord, Rendered, Target};
+use croupier::Settings;
 use serde::Serialize;
 use std::fmt;
 
@@ -51,6 +52,10 @@ pub struct IterationFigures {
     pub relmse_estimate: Option<f64>,
     /// Seconds, on the wall or by [`Observer::seconds`](crate::drive::Observer::seconds).
     pub seconds: f64,
+    /// When the render was to end, as predicted after the iteration ([`drive::forecast`]); absent unless an error is the
+    /// target.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub forecast: Option<Forecast>,
 }
 
 /// Time of a part of the work.
@@ -92,6 +97,17 @@ impl Statistics {
             time: time(r),
         }
     }
+
+    /// The statistics with what was predicted after every iteration, if the render was to stop at an error.
+    #[must_use]
+    pub fn with_forecasts(mut self, r: &Rendered, target: Target, settings: &Settings) -> Self {
+        if let Target::Error(e) = target {
+            for (n, figures) in self.iterations.iter_mut().enumerate() {
+                figures.forecast = drive::forecast(e, drive::learns(settings), &r.iterations[..=n]);
+            }
+        }
+        self
+    }
 }
 
 impl IterationFigures {
@@ -110,6 +126,7 @@ impl IterationFigures {
             subdivisions_refused: i.cache.map(|c| c.subdivisions_refused),
             relmse_estimate: judged.then_some(i.error.rel_mse),
             seconds: i.work.seconds,
+            forecast: None,
         }
     }
 }

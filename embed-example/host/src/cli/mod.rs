@@ -17,6 +17,7 @@ mod output;
 mod probes;
 mod progress;
 mod render;
+mod report;
 mod scene;
 mod settings;
 mod signals;
@@ -58,6 +59,8 @@ enum Command {
     Probes(probes::Args),
     /// Compare an image with a reference: error, bias, perceived difference
     Compare(compare::Args),
+    /// Measure what accuracy costs in time: one page with figures, tables and the numbers behind them
+    Report(report::Args),
 }
 
 /// Says what is wrong with the arguments, or what was asked for; quotes long arguments in part.
@@ -93,6 +96,7 @@ pub(crate) fn run() -> ExitCode {
         Some(Command::Lightmap(args)) => lightmap::run(&args),
         Some(Command::Probes(args)) => probes::run(&args),
         Some(Command::Compare(args)) => compare::run(&args).map(done),
+        Some(Command::Report(args)) => report::run(&args).map(done),
     };
     match outcome {
         Ok(status) => status,

@@ -36,7 +36,28 @@ impl Drop for Baking {
     }
 }
 
-/// Progress bar of a render with its error estimate and the time left. Ends the render on a signal.
+/// What is measured, and the share that is done. Disappears when dropped.
+pub(crate) struct Measuring(ProgressBar);
+
+impl Measuring {
+    pub(crate) fn start() -> Self {
+        Self(styled(ProgressBar::new(STEPS), "measuring [{bar:30}] {percent:>3} %  {elapsed}  {msg}"))
+    }
+
+    /// Shows what is measured, and the share of everything that is done.
+    pub(crate) fn show(&self, what: &str, share: f64) {
+        self.0.set_message(what.to_owned());
+        self.0.set_position((share * STEPS as f64) as u64);
+    }
+}
+
+impl Drop for Measuring {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+/// Progress bar of a render with its error estimate and the time left, with an interval where it is predicted. Ends the render on a signal.
 pub(crate) struct Rendering {
     bar: ProgressBar,
     target: Target,
@@ -51,7 +72,7 @@ impl Rendering {
 impl Observer for Rendering {
     fn progress(&self, p: &Progress) {
         let left = self.target.seconds_left(p);
-        self.bar.set_message(message(p, left));
+        self.bar.set_message(message(p, left, self.target.seconds_left_interval(p)));
         if let Some(left) = left.filter(|left| p.seconds + left > 0.0) {
             self.bar.set_position((p.seconds / (p.seconds + left) * STEPS as f64) as u64);
         }
@@ -68,11 +89,12 @@ impl Drop for Rendering {
     }
 }
 
-fn message(p: &Progress, left: Option<f64>) -> String {
+fn message(p: &Progress, left: Option<f64>, interval: Option<[f64; 2]>) -> String {
     let error = p.relmse_estimate.map_or_else(|| "?".into(), |e| format!("{e:.2e}"));
     let left = left.map_or_else(|| "?".into(), duration);
     let speed = p.rays as f64 / p.seconds.max(1e-3) * 1e-6;
-    format!("{:.0} spp, relMSE {error}, {speed:.1} Mrays/s, {left} left", p.spp)
+    let interval = interval.map_or(String::new(), |i| format!(" ({} to {})", duration(i[0]), duration(i[1])));
+    format!("{:.0} spp, relMSE {error}, {speed:.1} Mrays/s, {left} left{interval}", p.spp)
 }
 
 /// Duration as in `42 s`, `3:05 min`, `2:07 h`.
@@ -88,23 +110,30 @@ fn duration(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use croupier_host::drive::Forecast;
 
     /// Killed by: an error that falls as 1 / sqrt(work), a time left of NaN at the start.
     #[test]
     fn time_left() {
-        let p = Progress { spp: 16.0, rays: 1_000_000, seconds: 10.0, relmse_estimate: Some(0.04) };
+        let mut p = Progress { spp: 16.0, rays: 1_000_000, seconds: 10.0, relmse_estimate: Some(0.04), forecast: None };
         assert_eq!(Target::Spp(64).seconds_left(&p), Some(30.0));
         assert_eq!(Target::Seconds(12.5).seconds_left(&p), Some(2.5));
         assert_eq!(Target::Rays(4_000_000).seconds_left(&p), Some(30.0));
         let left = Target::Error(0.01).seconds_left(&p).unwrap();
         assert!((left - 30.0).abs() < 1e-9, "{left}");
         assert_eq!(Target::Error(0.1).seconds_left(&p), Some(0.0));
-        assert_eq!(message(&p, Some(185.0)), "16 spp, relMSE 4.00e-2, 0.1 Mrays/s, 3:05 min left");
+        assert_eq!(message(&p, Some(185.0), None), "16 spp, relMSE 4.00e-2, 0.1 Mrays/s, 3:05 min left");
+        assert_eq!(Target::Error(0.01).seconds_left_interval(&p), None);
+        p.forecast = Some(Forecast { seconds: 70.0, interval: [55.0, 100.0] });
+        assert_eq!(Target::Error(0.01).seconds_left(&p), Some(60.0));
+        let interval = Target::Error(0.01).seconds_left_interval(&p);
+        assert!(message(&p, Some(60.0), interval).ends_with("1:00 min left (45 s to 1:30 min)"));
+        assert_eq!(Target::Spp(64).seconds_left_interval(&p), None);
         let nothing = Progress::default();
         for target in [Target::Spp(4), Target::Rays(4), Target::Error(0.1)] {
             assert_eq!(target.seconds_left(&nothing), None);
         }
-        assert_eq!(message(&nothing, None), "0 spp, relMSE ?, 0.0 Mrays/s, ? left");
+        assert_eq!(message(&nothing, None, None), "0 spp, relMSE ?, 0.0 Mrays/s, ? left");
         assert_eq!([duration(0.2), duration(59.0), duration(7620.0)], ["1 s", "59 s", "2:07 h"]);
     }
 }

@@ -1,5 +1,6 @@
 //! Stop conditions, progress and observers of a render.
 
+use super::forecast::Forecast;
 use croupier::Film;
 
 /// Stop condition of a render.
@@ -18,17 +19,26 @@ pub enum Target {
 }
 
 impl Target {
-    /// Seconds left, if work goes on at the speed so far and the squared error falls as 1 / work. `None` while nothing
-    /// is known.
+    /// Seconds left, if work goes on at the speed so far and the squared error falls as 1 / work; by the forecast where
+    /// there is one. `None` while nothing is known.
     pub fn seconds_left(&self, p: &Progress) -> Option<f64> {
         let by_part = |part: f64| p.seconds * (1.0 / part - 1.0);
         let left = match *self {
             Self::Spp(n) => by_part(p.spp / f64::from(n)),
             Self::Seconds(s) => s - p.seconds,
             Self::Rays(n) => by_part(p.rays as f64 / n as f64),
-            Self::Error(e) => by_part(e / p.relmse_estimate?),
+            Self::Error(e) => match p.forecast {
+                Some(end) => end.seconds - p.seconds,
+                None => by_part(e / p.relmse_estimate?),
+            },
         };
         left.is_finite().then(|| left.max(0.0))
+    }
+
+    /// 95 % interval of the seconds left, where there is a forecast: for [`Target::Error`].
+    pub fn seconds_left_interval(&self, p: &Progress) -> Option<[f64; 2]> {
+        let end = p.forecast.filter(|_| matches!(self, Self::Error(_)))?;
+        Some(end.interval.map(|s| (s - p.seconds).max(0.0)))
     }
 }
 
@@ -46,6 +56,9 @@ pub struct Progress {
     /// single sample, its square is used as its squared error, so that the estimate is far too large after an iteration
     /// of one sample.
     pub relmse_estimate: Option<f64>,
+    /// When the render will end, by the iterations before the one under way: for [`Target::Error`], from 4 samples per
+    /// pixel on.
+    pub forecast: Option<Forecast>,
 }
 
 /// Observer of a render, who may end it. Called from the thread that called [`drive`](super::drive) and from its workers.

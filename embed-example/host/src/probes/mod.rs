@@ -197,7 +197,8 @@ pub fn render_probes(
                 while shard.step(&session, Budget { rays: STEP_RAYS }) == StepResult::More {}
                 let seconds = start.elapsed().as_secs_f64();
                 let rays = session.counters().rays();
-                observer.progress(&Progress { spp: (iteration * cells) as f64, rays, seconds, relmse_estimate: None });
+                let spp = (iteration * cells) as f64;
+                observer.progress(&Progress { spp, rays, seconds, ..Progress::default() });
                 observer.stop()
             };
             shards.par_iter_mut().map(step).collect::<Vec<_>>().contains(&true)
