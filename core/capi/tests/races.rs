@@ -11,10 +11,11 @@ use std::sync::atomic::{AtomicPtr, AtomicU32, AtomicUsize, Ordering};
 use std::thread;
 
 /// Two threads that destroy the same shard at a time: one of them does. Killed by: a mark that is looked at before the
-/// lock is taken, and not afterwards (some tens of these rounds then have two).
+/// lock is taken, and not afterwards: some tens of the rounds then have two that do, where threads have cores of their
+/// own. `guarded` has the same without chance.
 #[test]
 fn one_of_two_threads_destroys() {
-    const ROUNDS: usize = 30_000;
+    const ROUNDS: usize = 1000;
     let own = OwnScene::new(&common::baked());
     let mut s = settings(own.handle, 1);
     ok!(croupier_settings_set_size(&raw mut s, 1, 1));
@@ -45,19 +46,18 @@ fn one_of_two_threads_destroys() {
                 handle.store(shard, Ordering::Relaxed);
                 destroyed.store(0, Ordering::Relaxed);
             }
-            meet(3 * round);
+            meet(2 * round);
             let status = c!(croupier_shard_destroy(handle.load(Ordering::Relaxed), ptr::null_mut()));
             let expected = matches!(status, CROUPIER_OK | CROUPIER_BUSY | CROUPIER_DESTROYED);
             destroyed.fetch_add(if expected { u32::from(status == CROUPIER_OK) } else { 100 }, Ordering::Relaxed);
-            meet(3 * round + 1);
+            meet(2 * round + 1);
             // a thread that ended here would leave the other one waiting
-            wrong.fetch_add(u32::from(destroyed.load(Ordering::Relaxed) != 1), Ordering::Relaxed);
-            meet(3 * round + 2);
+            wrong.fetch_add(u32::from(maker && destroyed.load(Ordering::Relaxed) != 1), Ordering::Relaxed);
         }
     };
     thread::scope(|scope| {
         scope.spawn(|| run(true));
         scope.spawn(|| run(false));
     });
-    assert_eq!(wrong.into_inner(), 0, "rounds, seen by both threads, in which not one call destroyed the shard");
+    assert_eq!(wrong.into_inner(), 0, "rounds in which not exactly one call destroyed the shard");
 }

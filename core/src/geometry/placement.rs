@@ -81,7 +81,8 @@ impl Map8 {
         }
         let map = Self::of(i, time);
         let lanes: [[[f32; 3]; 3]; 8] = core::array::from_fn(|i| map.inverse(i));
-        ([0, 1, 2].map(|row| Vec3x8::from_fn(|i| lanes[i][row])), map.t)
+        // `min`: the compiler does not know the numbers of the array where it compiles `map` as a function
+        ([0, 1, 2].map(|row: usize| Vec3x8::from_fn(|i| lanes[i][row.min(2)])), map.t)
     }
 }
 

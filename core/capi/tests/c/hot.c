@@ -1,6 +1,8 @@
 /*
  * All that a program calls while it renders. `.ci/run c` links it against a library in which panics end in a function that
- * does not exist: it links only if none of these calls can reach a panic.
+ * does not exist: it links only if none of these calls can reach a panic. Calls reach the tracers through the session, so
+ * that the linker would leave them out: it is told to link croupier_session_init and croupier_session_init_with, too, and the
+ * step looks for the tracers in the program.
  */
 #include <croupier.h>
 
