@@ -1,5 +1,6 @@
 //! What a row of a table renders with: a roulette strategy, and perhaps other choices.
 
+use croupier::unstable::Sampler;
 use croupier::unstable::learn::{ControlVariate, Learning, PixelEstimator};
 use croupier::{Settings, Strategy};
 
@@ -9,6 +10,7 @@ pub const MODIFIERS: &[(&str, &str)] = &[
     ("shadow", "roulette of light samples and their rays"),
     ("constant", "the cached mean as control variate of roulette"),
     ("small", "one shard, and less than 256 KiB for all that is learned"),
+    ("sobol", "Sobol' points in place of hashed numbers"),
     ("truth", "strategies that learn are told the true pixels instead of denoised ones"),
     ("idle", "learned factors are all 1: what learning costs where paths are as with `classic:200`"),
 ];
@@ -52,6 +54,9 @@ impl Variant {
         s.strategy = self.strategy;
         s.adaptive |= self.has("adaptive");
         s.shadow_roulette |= self.has("shadow");
+        if self.has("sobol") {
+            s.sampler = Sampler::Sobol;
+        }
         if self.has("constant") {
             s.control_variate = ControlVariate::Cached;
         }

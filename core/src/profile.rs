@@ -18,6 +18,7 @@
 //! be worth is in docs/EFFECTS.md.
 
 use crate::scene::Effects;
+use core::marker::PhantomData;
 
 /// A set of effects, fixed at compile time.
 pub trait Profile {
@@ -25,6 +26,18 @@ pub trait Profile {
     const EFFECTS: Effects;
     /// Name of the profile in reports.
     const NAME: &'static str;
+    /// Do the kernels contain [`Sampler::Sobol`](crate::unstable::Sampler::Sobol)? Settings that ask for it are refused where they do not.
+    const SOBOL: bool = false;
+}
+
+/// The profile `P` with [`Sampler::Sobol`](crate::unstable::Sampler::Sobol).
+#[derive(Clone, Copy, Debug)]
+pub struct WithSobol<P>(PhantomData<P>);
+
+impl<P: Profile> Profile for WithSobol<P> {
+    const EFFECTS: Effects = P::EFFECTS;
+    const NAME: &'static str = P::NAME;
+    const SOBOL: bool = true;
 }
 
 /// The profile of exactly these effects, given by [`Effects`]' bits.
@@ -55,6 +68,7 @@ macro_rules! profiles {
             impl Profile for $profile {
                 const EFFECTS: Effects = $effects;
                 const NAME: &'static str = $name;
+                const SOBOL: bool = true;
             }
         )*
 

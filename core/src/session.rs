@@ -14,6 +14,7 @@ use crate::memory::{Carver, MemoryError};
 use crate::plan::Plan;
 use crate::profile::{Full, Profile};
 use crate::record::{Finishing, ResumeError, SessionRecord, SessionScalars};
+use crate::sampler::Sampler;
 use crate::scene::{Effects, Scene};
 use crate::settings::MAX_PATH_LENGTH;
 use crate::tracer::media_at;
@@ -38,6 +39,12 @@ pub enum SessionError {
     Profile {
         /// The missing effects.
         missing: Effects,
+    },
+    /// The settings call for a sampler that the profile was compiled without
+    /// ([`WithSobol`](crate::unstable::profile::WithSobol)).
+    Sampler {
+        /// The sampler.
+        missing: Sampler,
     },
     /// The shards are not all of the plan's, in order.
     Shards {
@@ -76,6 +83,9 @@ impl fmt::Display for SessionError {
                 f.write_str("the scene calls for effects outside the kernel profile:")?;
                 let mut names = missing.names().enumerate();
                 names.try_for_each(|(i, name)| write!(f, "{}{name}", if i == 0 { " " } else { ", " }))
+            }
+            Self::Sampler { missing } => {
+                write!(f, "the settings call for the sampler {}, which the kernel profile lacks", missing.name())
             }
             Self::Shards { expected } => {
                 write!(f, "the end of an iteration needs every shard in order; shard {expected} is missing")
@@ -241,6 +251,7 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector, X: Extension> SessionBuil
         let Self { scene, intersector, selector, extension, profile } = self;
         let scene = with_surfaces::<I>(scene);
         check_effects::<P, X>(&scene)?;
+        check_sampler::<P>(plan)?;
         let camera_media = || camera_media::<P, I>(&scene, &intersector);
         let mut c = Carver::new(block, plan.session()).map_err(SessionError::Memory)?;
         let s = plan.settings();
@@ -290,6 +301,7 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector, X: Extension> SessionBuil
         let Self { scene, intersector, selector, extension, profile } = self;
         let scene = with_surfaces::<I>(scene);
         check_effects::<P, X>(&scene)?;
+        check_sampler::<P>(&state.plan)?;
         let same = state.scene == scene.hash;
         let camera_media = if same { state.camera_media } else { camera_media::<P, I>(&scene, &intersector) };
         Ok(SessionView { scene, intersector, selector, extension, state, camera_media, profile })
@@ -311,6 +323,13 @@ fn check_effects<P: Profile, X: Extension>(scene: &Scene<'_>) -> Result<(), Sess
     let wanted = if X::POINTS { scene.effects.with(Effects::DIFFUSE) } else { scene.effects };
     let missing = wanted.without(kernels);
     if kernels.contains(wanted) { Ok(()) } else { Err(SessionError::Profile { missing }) }
+}
+
+fn check_sampler<P: Profile>(plan: &Plan) -> Result<(), SessionError> {
+    match plan.settings().sampler {
+        missing @ Sampler::Sobol if !P::SOBOL => Err(SessionError::Sampler { missing }),
+        _ => Ok(()),
+    }
 }
 
 /// Bits of the media that the camera is inside of.
@@ -383,6 +402,11 @@ macro_rules! worlds {
             #[inline(always)]
             fn iteration(&self) -> Iteration {
                 self.state.iteration
+            }
+
+            #[inline(always)]
+            fn sampler(&self) -> Sampler {
+                if P::SOBOL { self.state.plan.settings().sampler } else { Sampler::Hashed }
             }
 
             #[inline(always)]

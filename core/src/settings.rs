@@ -4,6 +4,7 @@ use crate::film::{Aov, AovSet, FilmLayout};
 use crate::learn::cache::CacheSize;
 use crate::learn::{ControlVariate, Learning, Needs};
 use crate::rrs::{Space, Strategy};
+use crate::sampler::Sampler;
 use crate::scene::Scene;
 use crate::setting::{SettingInfo, SettingRange, SettingValue, settings};
 use core::fmt;
@@ -25,6 +26,9 @@ settings! {
             SettingRange::Size { max_pixels: 1 << 31 }, scene;
         seed: u64 = 0 =>
             "seed", "Seed of all random numbers: another one gives another, independent image";
+        /// With the Sobol' points the picture depends on how its samples are divided into iterations.
+        sampler: Sampler = Sampler::Hashed =>
+            "sampler", "Random numbers: independent hashes, or Owen-scrambled Sobol points, spread more evenly over a pixel";
         /// The picture depends on it (rounding and the comb), never on threads.
         shards: u32 = 1 =>
             "shards", "Units of parallel work; the image depends on their number",

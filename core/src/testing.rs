@@ -8,6 +8,7 @@ use crate::learn::{LearnedScalars, LearnedState};
 use crate::light::PowerSelector;
 use crate::memory::{BLOCK_ALIGN, Carver, Measure};
 use crate::plan::Plan;
+use crate::sampler::Sampler;
 use crate::scene::blob::*;
 use crate::scene::{Effects, Records, Scene};
 use crate::settings::Settings;
@@ -167,6 +168,7 @@ pub(crate) struct TestWorld<'a> {
     lights: PowerSelector<'a>,
     learned: LearnedState<'a>,
     iteration: Iteration,
+    sampler: Sampler,
     max_depth: u32,
 }
 
@@ -200,6 +202,10 @@ impl<'a> World for TestWorld<'a> {
 
     fn iteration(&self) -> Iteration {
         self.iteration
+    }
+
+    fn sampler(&self) -> Sampler {
+        self.sampler
     }
 
     fn epoch(&self) -> u64 {
@@ -242,6 +248,7 @@ pub(crate) fn world<R>(change: impl FnOnce(&mut Settings), f: impl FnOnce(&TestW
             lights: PowerSelector(*scene),
             learned,
             iteration: Iteration { number: 1, first_sample: 0, samples: 4 },
+            sampler: settings.sampler,
             max_depth: settings.max_depth,
         };
         let (mut own, at) = block(plan.shard().size);

@@ -6,6 +6,7 @@ use crate::extension::Extension;
 use crate::geometry::{Hit8, Ray8};
 use crate::learn::LearnedState;
 use crate::light::LightSelector;
+use crate::sampler::Sampler;
 use crate::scene::{Effects, Scene};
 use bytemuck::{Pod, Zeroable};
 use croupier_simd::Mask8;
@@ -57,6 +58,8 @@ pub trait World: sealed::Sealed {
     fn learned(&self) -> &LearnedState<'_>;
     /// The iteration that runs.
     fn iteration(&self) -> Iteration;
+    /// Where the numbers of paths come from; constant in kernels without the Sobol' sampler.
+    fn sampler(&self) -> Sampler;
     /// Path segments at which every path ends.
     fn max_depth(&self) -> u32;
     /// Bits of the media that the camera is inside of.

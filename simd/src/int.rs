@@ -123,6 +123,13 @@ impl U32x8 {
         (self >> 8).to_i32().to_f32() * (1.0 / 16_777_216.0)
     }
 
+    /// Bit `i` of each lane as bit `31 - i`.
+    #[cfg_attr(feature = "compact", inline(never))]
+    #[cfg_attr(not(feature = "compact"), inline(always))]
+    pub fn reverse_bits(self) -> Self {
+        Self::new(self.to_array().map(u32::reverse_bits))
+    }
+
     /// Smallest lane.
     #[cfg_attr(feature = "compact", inline(never))]
     #[cfg_attr(not(feature = "compact"), inline(always))]

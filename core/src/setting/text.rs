@@ -3,6 +3,7 @@
 use super::range::{BYTE_SUFFIXES, SettingRange, SettingValue};
 use crate::film::{Aov, AovSet};
 use crate::rrs::{Norm, ParseError, Strategy};
+use crate::sampler::Sampler;
 
 /// A type of values that settings can have.
 pub(crate) trait Value: Copy {
@@ -175,4 +176,4 @@ macro_rules! named_values {
 
 pub(crate) use named_values;
 
-named_values!(Norm);
+named_values!(Norm, Sampler);

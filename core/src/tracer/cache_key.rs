@@ -43,8 +43,8 @@ pub(super) fn cache_lookup<W: World>(world: &W, book: &Bookkeeping<'_>, a: &Arri
             let dir = Vec3x8::select(by_view, v.wo, Vec3x8::select(by_normal, v.ns, mirrored));
             let seen = v.path.depth.eq(U32x8::splat(1));
             let known = if learned.weighs_pixels() { active } else { active.and_not(seen) };
-            let bin =
-                learned.scene_bins(VertexKind8::of(by_normal, in_medium, seen), v.p, dir, v.key.cache_jitter(), known);
+            let (kind, jitter) = (VertexKind8::of(by_normal, in_medium, seen), v.key.cache_jitter(world.sampler()));
+            let bin = learned.scene_bins(kind, v.p, dir, jitter, known);
             let mut unscale = a.albedo;
             if (seen & active).any() {
                 // in one cell bright pixels see bright samples: only their ratio is alike, whatever a pixel's samples

@@ -13,6 +13,7 @@ use crate::camera;
 use crate::extension::{Extension, PixelSamples8, SourceRays8};
 use crate::geometry::Ray8;
 use crate::rng::Key8;
+use crate::sampler::Seed;
 use crate::scene::Effects;
 use crate::tiles::{TILE_PIXELS, Tiles};
 use crate::world::World;
@@ -125,11 +126,12 @@ pub(super) fn camera_samples<W: World>(
     book: &mut Bookkeeping<'_>,
 ) -> CameraSamples8 {
     let (settings, tiles, learned, iteration) = (&job.settings, &job.tiles, world.learned(), world.iteration());
-    // numbers of one pixel must not come back in another iteration, however many samples it had
-    let (seed, first_sample) = match settings.adaptive {
-        true => (settings.seed ^ iteration.number.wrapping_mul(0x9e37_79b9_7f4a_7c15), 0),
-        false => (settings.seed, iteration.first_sample),
-    };
+    let sampler = world.sampler();
+    let mut seed = Seed { seed: settings.seed, iteration: iteration.number, first: iteration.first_sample };
+    if settings.adaptive {
+        // numbers of one pixel must not come back in another iteration, however many samples it had
+        seed = Seed { seed: seed.of_iteration(), first: 0, iteration: 0 };
+    }
     let (mut x, mut y, mut pixel, mut sample) = ([0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8]);
     let (mut root, mut record, mut weight) = ([0u32; 8], [NO_RECORD; 8], [[1.0; 3]; 8]);
     let mut lanes = 0;
@@ -144,13 +146,16 @@ pub(super) fn camera_samples<W: World>(
         let Some(opened) = book.open_camera_sample(target, s < settings.learning.samples) else { break };
         [x[lanes], y[lanes]] = p;
         pixel[lanes] = film;
-        sample[lanes] = first_sample.wrapping_add(s);
+        sample[lanes] = s;
         weight[lanes] = error_weight;
         (root[lanes], record[lanes]) = opened;
         lanes += 1;
     }
-    let key = Key8::camera(seed, U32x8::new(pixel), U32x8::new(sample));
-    let [u0, u1, u2, u3] = key.pixel_and_lens();
+    let key = Key8::camera_sample(sampler, seed, U32x8::new(pixel), U32x8::new(sample));
+    let lens = W::EFFECTS.contains(Effects::LENS) && world.scene().effects.contains(Effects::LENS)
+        || W::Extension::RAYS
+        || W::Extension::POINTS;
+    let [u0, u1, u2, u3] = key.pixel_and_lens(sampler, lens);
     let px = F32x8::from_fn(|i| x[i] as f32) + u0;
     let py = F32x8::from_fn(|i| y[i] as f32) + u1;
     let asked = Mask8::first(lanes);
@@ -158,18 +163,19 @@ pub(super) fn camera_samples<W: World>(
     let (position, u) = ([px, py], [u2, u3]);
     let mut time = F32x8::ZERO;
     if moves::<W>(world.scene()) {
-        time = key.time();
+        time = key.time(sampler);
         for (root, time) in root.iter().zip(time.to_array()).take(lanes) {
             book.roots.get(*root).time = time;
         }
     }
+    let depth = U32x8::splat(1);
     CameraSamples8 {
         asked,
         count: lanes as u64,
         pixels: PixelSamples8 { size: settings.size, column, row, position, u, active: asked },
         time,
-        path: Path8 { root: U32x8::new(root), record: U32x8::new(record), depth: U32x8::splat(1) },
-        key: key.next_vertex(),
+        path: Path8 { root: U32x8::new(root), record: U32x8::new(record), depth },
+        key: key.next_vertex(sampler, depth),
         error_weight: Vec3x8::from_fn(|i| weight[i]),
     }
 }

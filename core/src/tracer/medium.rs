@@ -64,12 +64,12 @@ pub(crate) fn cross_media<W: World>(
     if reached.any() {
         let found = emission::shapes(world, rays, stops.select(light, rays.travelled + end), reached);
         book.accumulate(reached, &rays.path, &found, Beyond::Ray);
-        wait(ring, rays, stopped, (rays.ray.o + rays.ray.d * tmax, light, rays.media));
+        wait(ring, rays, stopped, (rays.ray.o + rays.ray.d * tmax, light, rays.media), world.sampler());
     }
     let unfinished = inside & flight.unfinished & goes_on;
     if unfinished.any() {
         let o = rays.ray.o + rays.ray.d * flight.t;
-        wait(ring, rays, unfinished, (o, rays.travelled + flight.t, rays.media));
+        wait(ring, rays, unfinished, (o, rays.travelled + flight.t, rays.media), world.sampler());
     }
     let ended = inside.and_not((flight.collided | flight.passed | flight.unfinished) & goes_on);
     book.close_lanes(ended, &rays.path);

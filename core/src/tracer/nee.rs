@@ -23,7 +23,14 @@ pub(crate) fn sample_lights<W: World>(world: &W, samples: &Samples8) -> Option<L
 fn one_per_lane<W: World>(world: &W, samples: &Samples8) -> LightSample8 {
     let v = &samples.vertex;
     let at = Reference8 { p: v.p, n: v.ng, time: samples.time };
-    light::sample_at(W::EFFECTS, world.scene(), world.lights(), &at, samples.key.light(), samples.continues)
+    light::sample_at(
+        W::EFFECTS,
+        world.scene(),
+        world.lights(),
+        &at,
+        samples.key.light(world.sampler()),
+        samples.continues,
+    )
 }
 
 /// The shadow rays of a packet's light samples, whose BSDF is `f`. With `roulette` they survive by what they would

@@ -15,6 +15,7 @@ use super::shading::Arrival8;
 use super::vertex::{PathVertex, pack_samples};
 use crate::geometry::{self, Ray8, SurfaceHit8};
 use crate::rng::Key8;
+use crate::sampler::Sampler;
 use crate::world::World;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
@@ -98,12 +99,13 @@ pub(crate) fn wait(
     rays: &RayState8,
     lanes: Mask8,
     (o, distance, media): (Vec3x8, F32x8, MediaSet8),
+    sampler: Sampler,
 ) {
     let on = RayState8 {
         ray: Ray8::unbounded(o, rays.ray.d).at(rays.ray.time),
         travelled: distance,
         media,
-        key: rays.key.straight_on(),
+        key: rays.key.straight_on(sampler),
         ..*rays
     };
     let records = PathVertex::of_columns(on.columns());
@@ -128,7 +130,7 @@ pub(crate) fn pass<W: World>(
     let passed = possible & rays.key.straight().lt(a.straight);
     let (v, d) = (&a.vertex, rays.ray.d);
     let media = across(world, rays.media, hit, v.ng, d, passed);
-    wait(ring, rays, passed, (geometry::offset(v.p, v.ng, v.error, d), hit.t, media));
+    wait(ring, rays, passed, (geometry::offset(v.p, v.ng, v.error, d), hit.t, media), world.sampler());
     book.counters.passed.count(passed.count());
     passed
 }

@@ -59,7 +59,7 @@ pub(crate) fn samples<W: World>(world: &W, ring: &Ring<'_>, book: &mut Bookkeepi
         class,
         with_nee,
         path: Path8 { record: book.open_samples(vertex.path.record, taken.lanes, with_nee), ..vertex.path },
-        key: vertex.key.sample(taken.sample),
+        key: vertex.key.sample(world.sampler(), taken.sample),
         time: if moves::<W>(world.scene()) { book.roots.times(vertex.path.root, active) } else { F32x8::ZERO },
         vertex,
     }

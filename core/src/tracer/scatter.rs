@@ -57,7 +57,7 @@ impl<'s> Visitor<'s> for Kernel<'_, 's> {
 #[inline(always)]
 pub(crate) fn scatter<W: World>(world: &W, samples: &Samples8, nee: Option<Vec3x8>) -> Scattered8 {
     let v = &samples.vertex;
-    let kernel = Kernel { scene: world.scene(), samples, nee, u: samples.key.scattering() };
+    let kernel = Kernel { scene: world.scene(), samples, nee, u: samples.key.scattering(world.sampler()) };
     // a class outside the profile cannot be: sessions refuse such scenes
     let scattered = match samples.class.kernel() {
         ClassKernel::Surface(kind) => dispatch::<W, _>(kind, kernel),
@@ -69,6 +69,7 @@ pub(crate) fn scatter<W: World>(world: &W, samples: &Samples8, nee: Option<Vec3x
     let beta = v.beta * s.weight;
     let valid = samples.continues & s.valid;
     let finite = beta.is_finite();
+    let depth = samples.path.depth + U32x8::splat(1);
     Scattered8 {
         nee,
         broken: valid.and_not(finite),
@@ -83,8 +84,8 @@ pub(crate) fn scatter<W: World>(world: &W, samples: &Samples8, nee: Option<Vec3x
             weight: s.weight,
             pdf: s.pdf,
             skip_mis: s.delta,
-            path: super::path::Path8 { depth: samples.path.depth + U32x8::splat(1), ..samples.path },
-            key: samples.key.next_vertex(),
+            path: super::path::Path8 { depth, ..samples.path },
+            key: samples.key.next_vertex(world.sampler(), depth),
             albedo_product: v.albedo_product,
             error_weight: v.error_weight,
         },
