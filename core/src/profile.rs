@@ -25,15 +25,19 @@ pub trait Profile {
     const EFFECTS: Effects;
     /// Name of the profile in reports.
     const NAME: &'static str;
+    /// Do the kernels choose lights by the tree of scenes that have one? Without it they choose by power: pictures are as
+    /// right, with more noise under many lights.
+    const LIGHT_TREES: bool = true;
 }
 
-/// The profile of exactly these effects, given by [`Effects`]' bits.
+/// The profile of exactly these effects, given by [`Effects`]' bits, without light trees.
 #[derive(Clone, Copy, Debug)]
 pub struct Custom<const EFFECTS: u32>;
 
 impl<const EFFECTS: u32> Profile for Custom<EFFECTS> {
     const EFFECTS: Effects = Effects(EFFECTS);
     const NAME: &'static str = "custom";
+    const LIGHT_TREES: bool = false;
 }
 
 /// Code to run with a profile that is chosen at run time; see [`AnyProfile::dispatch`].
