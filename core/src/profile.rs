@@ -26,8 +26,12 @@ pub trait Profile {
     const EFFECTS: Effects;
     /// Name of the profile in reports.
     const NAME: &'static str;
-    /// Do the kernels contain [`Sampler::Sobol`](crate::unstable::Sampler::Sobol)? Settings that ask for it are refused where they do not.
+    /// Do the kernels contain [`Sampler::Sobol`](crate::unstable::Sampler::Sobol)? Settings that ask for it are refused where
+    /// they do not.
     const SOBOL: bool = false;
+    /// Do the kernels choose lights by the tree of scenes that have one? Without it they choose by power: pictures are as
+    /// right, with more noise under many lights.
+    const LIGHT_TREES: bool = true;
 }
 
 /// The profile `P` with [`Sampler::Sobol`](crate::unstable::Sampler::Sobol).
@@ -38,15 +42,17 @@ impl<P: Profile> Profile for WithSobol<P> {
     const EFFECTS: Effects = P::EFFECTS;
     const NAME: &'static str = P::NAME;
     const SOBOL: bool = true;
+    const LIGHT_TREES: bool = P::LIGHT_TREES;
 }
 
-/// The profile of exactly these effects, given by [`Effects`]' bits.
+/// The profile of exactly these effects, given by [`Effects`]' bits, without light trees.
 #[derive(Clone, Copy, Debug)]
 pub struct Custom<const EFFECTS: u32>;
 
 impl<const EFFECTS: u32> Profile for Custom<EFFECTS> {
     const EFFECTS: Effects = Effects(EFFECTS);
     const NAME: &'static str = "custom";
+    const LIGHT_TREES: bool = false;
 }
 
 /// Code to run with a profile that is chosen at run time; see [`AnyProfile::dispatch`].

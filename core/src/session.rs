@@ -9,7 +9,7 @@ use crate::film::{DIGITS, Film};
 use crate::instructions::{INSTRUCTION_SET, missing_instructions};
 use crate::learn::cache::Cache;
 use crate::learn::{LearnedScalars, LearnedState, PictureStatistics};
-use crate::light::{LightSelector, PowerSelector};
+use crate::light::{LightSelector, TreeSelector};
 use crate::memory::{Carver, MemoryError};
 use crate::plan::Plan;
 use crate::profile::{Full, Profile};
@@ -122,7 +122,7 @@ pub struct Session<
     'm,
     P: Profile = Full,
     I: Intersector = WideBvh<'s>,
-    L: LightSelector = PowerSelector<'s>,
+    L: LightSelector = TreeSelector<'s>,
     X: Extension = (),
 > {
     scene: Scene<'s>,
@@ -163,7 +163,7 @@ pub struct SessionView<
     'm,
     P: Profile = Full,
     I: Intersector = WideBvh<'a>,
-    L: LightSelector = PowerSelector<'a>,
+    L: LightSelector = TreeSelector<'a>,
     X: Extension = (),
 > {
     scene: Scene<'a>,
@@ -181,7 +181,7 @@ pub struct SessionBuilder<
     's,
     P: Profile = Full,
     I: Intersector = WideBvh<'s>,
-    L: LightSelector = PowerSelector<'s>,
+    L: LightSelector = TreeSelector<'s>,
     X: Extension = (),
 > {
     scene: Scene<'s>,
@@ -204,7 +204,7 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector, X: Extension> SessionBuil
         SessionBuilder { scene, intersector, selector, extension, profile }
     }
 
-    /// Another choice of lights than by power.
+    /// Another choice of lights than by the scene's light tree, or by power where it has none.
     pub fn light_selector<M: LightSelector>(self, selector: M) -> SessionBuilder<'s, P, I, M, X> {
         let Self { scene, intersector, extension, profile, .. } = self;
         SessionBuilder { scene, intersector, selector, extension, profile }
@@ -339,8 +339,8 @@ fn camera_media<P: Profile, I: Intersector>(scene: &Scene<'_>, intersector: &I) 
 }
 
 impl<'s, 'm> Session<'s, 'm> {
-    /// A session with all kernels, the scene's own tree and lights chosen by power, in a shared block of at least
-    /// [`Plan::session`] bytes.
+    /// A session with all kernels, the scene's own trees for rays and lights (lights by power where it has none), in a
+    /// shared block of at least [`Plan::session`] bytes.
     ///
     /// # Errors
     /// A block that does not fit.
@@ -358,7 +358,7 @@ impl<'s, 'm> Session<'s, 'm> {
 
     /// A session whose parts can be replaced before it is built; at first they are those of [`Session::new`].
     pub fn builder(scene: Scene<'s>) -> SessionBuilder<'s> {
-        let (intersector, selector) = (WideBvh::new(&scene), PowerSelector(scene));
+        let (intersector, selector) = (WideBvh::new(&scene), TreeSelector(scene));
         SessionBuilder { scene, intersector, selector, extension: (), profile: PhantomData }
     }
 }
@@ -370,6 +370,7 @@ macro_rules! worlds {
 
         impl<P: Profile, I: Intersector, L: LightSelector, X: Extension> World for $World {
             const EFFECTS: Effects = effects::<P, X>();
+            const LIGHT_TREES: bool = P::LIGHT_TREES;
             type Intersector = I;
             type Lights = L;
             type Extension = X;

@@ -97,6 +97,8 @@ pub(crate) fn scene<R>(f: impl FnOnce(&Scene<'_>) -> R) -> R {
         tables: &[],
         lights: &lights,
         light_alias: &alias,
+        light_nodes: &[],
+        light_trails: &[],
         environment: Some(&environment),
         env_texels: &[],
         env_alias: &[],

@@ -39,6 +39,8 @@ pub struct Identity {
 pub trait World: sealed::Sealed {
     /// Effects that the kernels are compiled with.
     const EFFECTS: Effects;
+    /// See [`Profile::LIGHT_TREES`](crate::profile::Profile::LIGHT_TREES).
+    const LIGHT_TREES: bool;
     /// What finds hits.
     type Intersector: Intersector;
     /// What chooses lights.

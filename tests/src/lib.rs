@@ -17,6 +17,7 @@ pub mod jacobian;
 pub mod light_oracle;
 pub mod light_scene;
 pub mod loading;
+pub mod many_lights;
 pub mod math;
 pub mod media_flights;
 pub mod media_oracle;

@@ -194,12 +194,24 @@ impl Map {
             / self.width as f64
     }
 
-    /// Probability of each cell, row by row: its share of the luminance.
+    /// Probability of each cell, row by row: its share of the luminance above the mean over the sphere (Karlik et al.
+    /// 2019), of all luminance if the map is even.
     pub fn probabilities(&self) -> Vec<f64> {
         let [w, h] = self.cells();
         let cells: Vec<f64> = (0..w * h).map(|k| self.cell_integral(k % w, k / w)).collect();
         let total: f64 = cells.iter().sum();
-        cells.iter().map(|c| c / total).collect()
+        let solid_angle = |j| {
+            let [above, below] = self.cosines(j);
+            (above - below) * TAU / w as f64
+        };
+        let above = |(k, c): (usize, &f64)| (c - total / (4.0 * PI) * solid_angle(k / w)).max(0.0);
+        let left: Vec<f64> = cells.iter().enumerate().map(above).collect();
+        let sum: f64 = left.iter().sum();
+        if sum > 1e-3 * total {
+            left.iter().map(|c| c / sum).collect()
+        } else {
+            cells.iter().map(|c| c / total).collect()
+        }
     }
 
     /// Density of the place (x, t) in a cell, over the unit square: bilinear luminance, normalised.

@@ -17,6 +17,8 @@ pub(crate) fn none<'s>(info: &'s SceneInfo, camera: &'s Camera) -> Records<'s> {
         tables: &[],
         lights: &[],
         light_alias: &[],
+        light_nodes: &[],
+        light_trails: &[],
         environment: None,
         env_texels: &[],
         env_alias: &[],

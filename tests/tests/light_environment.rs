@@ -205,6 +205,10 @@ fn density_is_accurate_near_the_poles_of_a_fine_map() {
                 let cell = f64::from(tables[j].probability) * f64::from(tables[h + j * w + i].probability);
                 let want = cell * case.map.inside(i, j, x, t) / solid_angle;
                 let got = f64::from(pdf.lane(l)) / 0.75;
+                if want == 0.0 {
+                    assert_eq!(got, 0.0, "cell {i}, {j} is not above the mean");
+                    continue;
+                }
                 worst = worst.max((got / want - 1.0).abs());
                 // Rounded directions lie up to 1e-7 rad off: 3e-5 rows, and the corners differ by up to 30 to 1.
                 assert!((got / want - 1.0).abs() < 2e-3, "cell {i}, {j} at {x}, {t}: {got} for {want}");
@@ -246,9 +250,10 @@ fn samples_follow_the_density() {
                 expected[k * parts * parts + n] = p * share * total as f64;
             }
         }
-        // A direction on the edge of a cell may round across it.
+        // A direction on the edge of a cell may round across it, into a cell at or below the mean.
         let strays: u64 = counts.iter().zip(&expected).filter(|(_, e)| **e == 0.0).map(|(c, _)| c).sum();
-        assert_eq!(strays, 0, "{}: samples in black cells", case.name);
+        assert!(strays <= total / 50_000, "{}: {strays} samples in cells that are never picked", case.name);
+        counts.iter_mut().zip(&expected).filter(|(_, e)| **e == 0.0).for_each(|(c, _)| *c = 0);
         let p = chi_square_in_order(&counts, &expected);
         println!("{}: {total} samples, p = {p:.3}", case.name);
         assert!(p > 1e-6, "{}: p = {p}", case.name);
@@ -257,17 +262,31 @@ fn samples_follow_the_density() {
     }
 }
 
-/// What a sample states is what its direction gives: bit for bit. The estimate L / pdf of the whole is right and quiet,
-/// also with a sun of one texel. Killed by: stating the density of the place in the cell instead of the direction's,
-/// leaving out the selection probability on one side.
+/// What a sample states is what its direction gives: bit for bit. The estimate L / pdf of all cells that are picked is
+/// right, also with a sun of one texel; with uniform directions as the other technique and MIS weights the estimate of
+/// the whole is right. Killed by: stating the density of the place in the cell instead of the direction's, leaving out the
+/// selection probability on one side, a density above 0 in cells that are never picked.
 #[test]
 fn samples_state_what_their_direction_gives() {
     let mut rng = SplitMix(34);
     for case in cases() {
         let [w, h] = case.map.cells();
         let (mut sum, mut sqr, n) = (0.0, 0.0, 160_000.0);
+        let mut both = [0.0; 2];
+        let uniform = 1.0 / (4.0 * PI);
+        let heuristic = |own: f64, other: f64| own * own / (own * own + other * other);
         for _ in 0..20_000 {
             let s = case.draw(random_words(&mut rng));
+            let d = Vec3x8::from_fn(|_| case.world(rng.direction())).normalize();
+            let [pdf_d, radiance_d] = [case.pdf(d).to_array(), case.radiance(d).luminance().to_array()];
+            for i in 0..8 {
+                let mut x = f64::from(radiance_d[i]) / uniform * heuristic(uniform, f64::from(pdf_d[i]));
+                if s.valid.lane(i) && s.infinite.lane(i) {
+                    let p = f64::from(s.pdf.lane(i));
+                    x += luminance(wide(s.radiance.lane(i))) / p * heuristic(p, uniform);
+                }
+                (both[0], both[1]) = (both[0] + x, both[1] + x * x);
+            }
             let (pdf, radiance) = (case.pdf(s.wi), case.radiance(s.wi));
             for i in (s.valid & s.infinite).lanes() {
                 assert_eq!(pdf.lane(i).to_bits(), s.pdf.lane(i).to_bits(), "{}", case.name);
@@ -278,13 +297,24 @@ fn samples_state_what_their_direction_gives() {
                 (sum, sqr) = (sum + x, sqr + x * x);
             }
         }
-        let want = f64::from(SCALE) * (0..w * h).map(|k| quick_integral(&case.map, k % w, k / w)).sum::<f64>();
-        let mean = sum / n;
-        let deviation = (sqr / n - mean * mean).max(0.0).sqrt();
-        println!("{}: {mean:.5} for {want:.5}, relative deviation {:.3}", case.name, deviation / mean);
-        assert!((mean - want).abs() < 5.0 * deviation / f64::sqrt(n) + 1e-5 * want, "{}: {mean} for {want}", case.name);
-        // With a quarter of the samples on the other light, perfect sampling deviates by sqrt(1/3).
-        assert!(deviation / mean < 0.8, "{}: {deviation}", case.name);
+        let tables = &case.owner.env_alias;
+        let picked = |k: usize| tables[k / w].probability > 0.0 && tables[h + k].probability > 0.0;
+        let (mut want, mut whole) = (0.0, 0.0);
+        for k in 0..w * h {
+            let integral = f64::from(SCALE) * quick_integral(&case.map, k % w, k / w);
+            whole += integral;
+            want += if picked(k) { integral } else { 0.0 };
+        }
+        let check = |what: &str, want: f64, sum: f64, sqr: f64, n: f64| {
+            let mean = sum / n;
+            let error = (sqr / n - mean * mean).max(0.0).sqrt() / n.sqrt();
+            println!("{}, {what}: {mean:.5} +- {error:.5} for {want:.5}", case.name);
+            assert!((mean - want).abs() < 5.0 * error + 1e-5 * want, "{}, {what}: {mean} for {want}", case.name);
+            // a tail of cells that are picked rarely must not hide that
+            assert!(error < 0.02 * want, "{}, {what}: +- {error}", case.name);
+        };
+        check("light samples", want, sum, sqr, n);
+        check("both techniques", whole, both[0], both[1], n);
     }
 }
 

@@ -6,7 +6,7 @@ use croupier::unstable::accel::{Intersector, WideBvh};
 use croupier::unstable::bsdf::NoBsdf;
 use croupier::unstable::extension::{Extension, PixelSamples8, SourcePoints8, SourceRays8};
 use croupier::unstable::geometry::{FIRST_OWN_SURFACE, Hit8, OwnSurface8, Ray8};
-use croupier::unstable::light::PowerSelector;
+use croupier::unstable::light::TreeSelector;
 use croupier::unstable::profile::Full;
 use croupier::unstable::scene::blob::NONE;
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -55,7 +55,7 @@ trait Parts {
 }
 
 type Builder<'s, K> =
-    SessionBuilder<'s, Full, <K as Parts>::Intersector<'s>, PowerSelector<'s>, <K as Parts>::Extension>;
+    SessionBuilder<'s, Full, <K as Parts>::Intersector<'s>, TreeSelector<'s>, <K as Parts>::Extension>;
 
 fn builder<'s, K: Parts>(scene: Scene<'s>, host: &croupier_parts) -> Builder<'s, K> {
     let (intersector, extension) = K::of(scene, host);

@@ -96,6 +96,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> EditableScene<B> {
             sky: self.sky,
             relit: &mut self.relit,
             lights_changed: false,
+            lights_moved: false,
             world_moved: false,
             moved_within: None,
         }
@@ -151,6 +152,8 @@ pub struct SceneEdit<'a> {
     sky: [f64; 3],
     relit: &'a mut bool,
     pub(super) lights_changed: bool,
+    /// Lights have other places.
+    pub(super) lights_moved: bool,
     /// An instance of the world has moved.
     pub(super) world_moved: bool,
     /// First and last object other than the world whose instances have moved.
@@ -297,6 +300,21 @@ impl SceneEdit<'_> {
         if !core::mem::replace(self.relit, true) {
             *self.identity ^= RELIT;
         }
+        self.refit_light_tree();
+    }
+
+    /// Makes the nodes of the light tree say what the lights are now. Which lights hang together stays.
+    fn refit_light_tree(&mut self) {
+        let nodes = self.records().map_or(0, |scene| scene.light_nodes.len());
+        for index in 0..nodes {
+            let Some(scene) = self.records().map(Scene::assume_valid) else { return };
+            let Some(node) = light::light_node_of(&scene, scene.light_nodes, index) else { return };
+            // not by `write`: what follows from the lights is no part of the identity
+            let place = self.table.record(SectionKind::LightNodes, index as u32);
+            if let Some(place) = place.and_then(|range| self.bytes.get_mut(range)) {
+                place.copy_from_slice(bytemuck::bytes_of(&node));
+            }
+        }
     }
 }
 
@@ -305,6 +323,8 @@ impl Drop for SceneEdit<'_> {
         self.settle_moves(None);
         if self.lights_changed {
             self.relight();
+        } else if self.lights_moved {
+            self.refit_light_tree();
         }
     }
 }

@@ -153,6 +153,7 @@ impl SceneEdit<'_> {
     /// Sets the areas of the lights of an instance of the world.
     fn settle_areas(&mut self, instance: &Instance) {
         let count = self.read::<Object>(SectionKind::Objects, instance.object).map_or(0, |o| o.lights);
+        self.lights_moved |= count > 0;
         for index in (instance.first_light..=u32::MAX).zip(0..count).map(|(light, _)| light) {
             let (Some(scene), Ok(light)) = (self.records(), self.read::<Light>(SectionKind::Lights, index)) else {
                 return;

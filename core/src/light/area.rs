@@ -233,8 +233,9 @@ pub fn area_radiance(scene: &Scene<'_>, hit: &SurfaceHit8, dir: Vec3x8, ng: Vec3
     Vec3x8::from_fn(|i| scene.lights.get(hit.light[i] as usize).map_or([0.0; 3], |l| l.emission)).zero_unless(mask)
 }
 
-/// Area of the emitting triangle of light `index` in the world when the shutter opens, for [`Light::area`].
-pub fn area_of(scene: &Scene<'_>, index: u32, light: &Light) -> f32 {
+/// Corners of the emitting triangle of light `index` in the world when the shutter opens, and a normal of its front, as long
+/// as twice the area.
+pub(super) fn in_world(scene: &Scene<'_>, index: u32, light: &Light) -> ([[f32; 3]; 3], [f32; 3]) {
     let corner = |k: usize| {
         let t = scene.triangles.get(light.triangle as usize);
         let p = t.and_then(|t| scene.vertices.get(t.vertex[k] as usize)).map_or([0.0; 3], |v| v.p);
@@ -245,5 +246,11 @@ pub fn area_of(scene: &Scene<'_>, index: u32, light: &Light) -> f32 {
     let [a, b, c] = corners;
     let placed = geometry::place(scene, instance, F32x8::ZERO, corners, Mask8::all_lanes());
     let normal = if light.instance == 0 { geometry::triangle_normal(a, b, c) } else { placed.normal };
-    0.5 * normal.length().lane(0)
+    (placed.corners.map(|p| p.lane(0)), normal.lane(0))
+}
+
+/// Area of the emitting triangle of light `index` in the world when the shutter opens, for [`Light::area`].
+pub fn area_of(scene: &Scene<'_>, index: u32, light: &Light) -> f32 {
+    let (_, [x, y, z]) = in_world(scene, index, light);
+    0.5 * Vec3x8::splat(x, y, z).length().lane(0)
 }

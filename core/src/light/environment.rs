@@ -6,10 +6,12 @@
 //! theta is atan2(hypot(x, z), y): the same as acos(y), but as accurate at the poles as elsewhere.
 //!
 //! **Sampling.** Cells are what lies between four texels: `height - 1` rows of `width` cells. An alias table chooses
-//! the row, another the cell in it; a cell's probability is its share of the integral of the luminance over the sphere.
+//! the row, another the cell in it; a cell's probability is its share of the integral of the luminance over the sphere,
+//! above the map's mean (`compose/lat_long.rs` has the reason): cells at or below the mean have a density of 0, and BSDF
+//! samples alone find them.
 //! Inside a cell the density is bilinear in the four corner luminances over (column, share of the cell's solid angle
-//! above), so there is no 1 / sin theta: the density is bounded, poles included (NUMERICS SMP-5), and black where
-//! the map is. Away from the poles the share is nearly linear in theta and samples follow the bilinear map itself, a
+//! above), so there is no 1 / sin theta: the density is bounded, poles included (NUMERICS SMP-5), and 0 where the map
+//! is black. Away from the poles the share is nearly linear in theta and samples follow the bilinear map itself, a
 //! sun of a single texel included.
 //!
 //! The density is computed from the direction alone, for samples as for scattered rays: both agree bit for bit.
@@ -276,7 +278,8 @@ pub fn environment_radiance(scene: &Scene<'_>, dir: Vec3x8, mask: Mask8) -> Vec3
 }
 
 /// Density with which [`super::sample_of`] at `p`, `n` chooses the unit world direction `dir` to the environment:
-/// selection probability times solid-angle density. 0 outside `mask` and where the map is black.
+/// selection probability times solid-angle density. 0 outside `mask` and in cells of a map that are not brighter than its
+/// mean.
 #[inline(always)]
 pub fn environment_pdf<S: LightSelector>(
     scene: &Scene<'_>,

@@ -14,7 +14,7 @@
 //! | rectangle | `rectangle.rs` | uniform in its solid angle | 1 / solid angle | pi A L |
 //! | disk | `disk.rs` | near: in the solid angle of a square around it; far: uniform on the disk | 1 / that; r^2 / (A cos) | pi A L |
 //!
-//! A light is chosen by a [`LightSelector`] (power-weighted: `power.rs`); every density stated here contains the
+//! A light is chosen by a [`LightSelector`] (power-weighted: `power.rs`; by a tree in scenes with many: `tree.rs`); every density stated here contains the
 //! selection probability. What [`sample_of`] states for a direction is what [`area_pdf`], [`meet_shapes`] and
 //! [`environment_pdf`] give for a scattered ray that finds the same light (NUMERICS MIS-3): for the environment and where
 //! all directions to a shape are alike bit for bit, for others up to the rounding of the hit. Densities are finite and never NaN; where one would be infinite (edge-on or touching) both
@@ -33,12 +33,14 @@ mod shape;
 mod sphere;
 mod spot;
 mod sun;
+mod tree;
 
 pub use area::{area_of, area_pdf, area_radiance, area_texture};
 pub use environment::{environment_pdf, environment_radiance};
 pub use meet::{ShapeRays8, meet_shapes, nearest_shape};
 pub use mis::power_heuristic;
 pub use power::{PowerSelector, SceneExtent, luminance};
+pub use tree::{LightTree, SURFACE_FLOOR, TreeSelector, build_light_tree, light_importance, light_node_of};
 
 use crate::scene::blob::{Light, LightKind, NONE};
 use crate::scene::{Effects, Scene};
@@ -100,8 +102,8 @@ impl LightSample8 {
     }
 }
 
-/// Choice of a light for a reference point. [`PowerSelector`] is built in; hosts may bring their own, such as a
-/// light tree.
+/// Choice of a light for a reference point. [`TreeSelector`] and [`PowerSelector`] are built in; hosts may bring their
+/// own.
 ///
 /// Pictures are right if both functions tell the same probabilities and every light that could be seen from a point has
 /// one above 0: delta lights (points, spots, parallel light, the sun) are found in no other way. How good the choice is shows in the noise only.
@@ -144,6 +146,28 @@ pub trait LightSelector {
 
     /// Probability that [`Self::select`] picks `light` in the lanes of `mask`, 0 in the others.
     fn probability(&self, point: Vec3x8, normal: Vec3x8, light: U32x8, mask: Mask8) -> F32x8;
+
+    /// The choice that kernels make whose profile has no light trees
+    /// ([`Profile::LIGHT_TREES`](crate::unstable::profile::Profile::LIGHT_TREES)), so that they do without the code for
+    /// them. Provided: the selector itself.
+    fn without_tree(&self) -> impl LightSelector
+    where
+        Self: Sized,
+    {
+        self
+    }
+}
+
+impl<S: LightSelector> LightSelector for &S {
+    #[inline(always)]
+    fn select(&self, point: Vec3x8, normal: Vec3x8, r: U32x8) -> (U32x8, F32x8) {
+        (*self).select(point, normal, r)
+    }
+
+    #[inline(always)]
+    fn probability(&self, point: Vec3x8, normal: Vec3x8, light: U32x8, mask: Mask8) -> F32x8 {
+        (*self).probability(point, normal, light, mask)
+    }
 }
 
 /// Light of lanes without one: black, of no kind.

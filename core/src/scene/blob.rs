@@ -59,12 +59,14 @@ macro_rules! kinds {
 }
 
 mod instances;
+mod light_tree;
 mod lights;
 mod materials;
 mod media;
 mod principled;
 
 pub use instances::*;
+pub use light_tree::*;
 pub use lights::*;
 pub use materials::*;
 pub use media::*;
@@ -118,6 +120,10 @@ kinds! {
         Objects = 19, "objects";
         /// [`Instance`]s, those of each object in a run.
         Instances = 20, "instances";
+        /// [`LightNode`]s of the tree that chooses among lights; none where they are chosen by [`Self::LightAlias`].
+        LightNodes = 21, "light nodes";
+        /// `u32` trails, as many as lights: where the light tree has them ([`LightNode`]).
+        LightTrails = 22, "light trails";
     }
 }
 

@@ -28,6 +28,10 @@ pub struct Records<'s> {
     pub lights: &'s [Light],
     /// Alias table over the lights; may be empty if no light emits.
     pub light_alias: &'s [Alias],
+    /// Light tree; empty where lights are chosen by the alias table.
+    pub light_nodes: &'s [LightNode],
+    /// Trails of the lights in the tree.
+    pub light_trails: &'s [u32],
     /// Environment, if any.
     pub environment: Option<&'s Environment>,
     /// Radiance of the environment map.
@@ -55,7 +59,38 @@ pub struct Records<'s> {
     pub hash: u64,
 }
 
-impl Records<'_> {
+impl<'s> Records<'s> {
+    /// A scene with nothing but these.
+    pub const fn of(info: &'s SceneInfo, camera: &'s Camera) -> Self {
+        Records {
+            info,
+            nodes: &[],
+            leaves: &[],
+            triangles: &[],
+            vertices: &[],
+            materials: &[],
+            textures: &[],
+            texels: &[],
+            tables: &[],
+            lights: &[],
+            light_alias: &[],
+            light_nodes: &[],
+            light_trails: &[],
+            environment: None,
+            env_texels: &[],
+            env_alias: &[],
+            camera,
+            media: &[],
+            densities: &[],
+            majorants: &[],
+            objects: &[],
+            instances: &[],
+            names: &[],
+            effects: Effects(0),
+            hash: 0,
+        }
+    }
+
     /// An empty scene: what a container shows that has lost its bytes.
     pub(crate) const NOTHING: Records<'static> = {
         const INFO: &SceneInfo =
@@ -70,30 +105,6 @@ impl Records<'_> {
             size: [1, 1],
             kind: CameraKind::Perspective as u32,
         };
-        Records {
-            info: INFO,
-            nodes: &[],
-            leaves: &[],
-            triangles: &[],
-            vertices: &[],
-            materials: &[],
-            textures: &[],
-            texels: &[],
-            tables: &[],
-            lights: &[],
-            light_alias: &[],
-            environment: None,
-            env_texels: &[],
-            env_alias: &[],
-            camera: CAMERA,
-            media: &[],
-            densities: &[],
-            majorants: &[],
-            objects: &[],
-            instances: &[],
-            names: &[],
-            effects: Effects(0),
-            hash: 0,
-        }
+        Records::of(INFO, CAMERA)
     };
 }

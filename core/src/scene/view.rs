@@ -79,6 +79,8 @@ impl<'s> Scene<'s> {
             tables: sections.records(SectionKind::Tables)?,
             lights: sections.records(SectionKind::Lights)?,
             light_alias: sections.records(SectionKind::LightAlias)?,
+            light_nodes: sections.records(SectionKind::LightNodes)?,
+            light_trails: sections.records(SectionKind::LightTrails)?,
             environment,
             env_texels: sections.records(SectionKind::EnvTexels)?,
             env_alias: sections.records(SectionKind::EnvAlias)?,

@@ -3,7 +3,7 @@
 use super::packets::Contribution8;
 use super::packets::RayState8;
 use crate::geometry::SurfaceHit8;
-use crate::light::{self, ShapeRays8, TEXTURED_EMISSION, power_heuristic};
+use crate::light::{self, LightSelector, ShapeRays8, TEXTURED_EMISSION, power_heuristic};
 use crate::scene::{Effects, Scene};
 use crate::world::World;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -17,7 +17,12 @@ pub(crate) fn environment<W: World>(world: &W, rays: &RayState8, escaped: Mask8)
         return None;
     }
     let radiance = light::environment_radiance(scene, rays.ray.d, escaped);
-    let pdf = light::environment_pdf(scene, world.lights(), rays.from, rays.normal, rays.ray.d, escaped);
+    let (from, n, d) = (rays.from, rays.normal, rays.ray.d);
+    let pdf = if W::LIGHT_TREES {
+        light::environment_pdf(scene, world.lights(), from, n, d, escaped)
+    } else {
+        light::environment_pdf(scene, &world.lights().without_tree(), from, n, d, escaped)
+    };
     Some(weighted(rays, radiance, pdf))
 }
 
@@ -38,7 +43,12 @@ pub(crate) fn area<W: World>(world: &W, rays: &RayState8, hit: &SurfaceHit8, ng:
     if sampled.none() {
         return Some(Contribution8 { pixel: rays.beta * radiance, local: rays.weight * radiance });
     }
-    let pdf = light::area_pdf(scene, world.lights(), rays.from, rays.normal, hit, rays.ray.d, sampled);
+    let (from, n, d) = (rays.from, rays.normal, rays.ray.d);
+    let pdf = if W::LIGHT_TREES {
+        light::area_pdf(scene, world.lights(), from, n, hit, d, sampled)
+    } else {
+        light::area_pdf(scene, &world.lights().without_tree(), from, n, hit, d, sampled)
+    };
     Some(weighted(rays, radiance, pdf))
 }
 
@@ -67,10 +77,16 @@ pub(crate) fn nearest_shape<W: World>(world: &W, rays: &RayState8, upto: F32x8, 
 pub(crate) fn shapes<W: World>(world: &W, rays: &RayState8, upto: F32x8, mask: Mask8) -> Contribution8 {
     let mut sum = Vec3x8::ZERO;
     let part = part(rays, upto, mask);
-    light::meet_shapes(world.scene(), world.lights(), &part, rays.normal, !rays.skip_mis, |met, radiance, pdf| {
+    let met = |met: Mask8, radiance: Vec3x8, pdf: F32x8| {
         let weight = rays.skip_mis.select(F32x8::ONE, power_heuristic(rays.pdf, pdf));
         sum += radiance * met.zero_unless(weight);
-    });
+    };
+    let (scene, n, sampled) = (world.scene(), rays.normal, !rays.skip_mis);
+    if W::LIGHT_TREES {
+        light::meet_shapes(scene, world.lights(), &part, n, sampled, met);
+    } else {
+        light::meet_shapes(scene, &world.lights().without_tree(), &part, n, sampled, met);
+    }
     Contribution8 { pixel: rays.beta * sum, local: rays.weight * sum }
 }
 

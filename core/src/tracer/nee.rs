@@ -6,7 +6,7 @@ use super::packets::{Contribution8, Samples8, ShadowRays8};
 use crate::bsdf::Eval8;
 use crate::geometry::{self, Ray8};
 use crate::learn::cache::NO_BIN;
-use crate::light::{self, LightSample8, Reference8, power_heuristic};
+use crate::light::{self, LightSample8, LightSelector, Reference8, power_heuristic};
 use crate::world::World;
 use croupier_simd::{F32x8, U32x8, Vec3x8};
 
@@ -23,14 +23,12 @@ pub(crate) fn sample_lights<W: World>(world: &W, samples: &Samples8) -> Option<L
 fn one_per_lane<W: World>(world: &W, samples: &Samples8) -> LightSample8 {
     let v = &samples.vertex;
     let at = Reference8 { p: v.p, n: v.ng, time: samples.time };
-    light::sample_at(
-        W::EFFECTS,
-        world.scene(),
-        world.lights(),
-        &at,
-        samples.key.light(world.sampler()),
-        samples.continues,
-    )
+    let (scene, words) = (world.scene(), samples.key.light(world.sampler()));
+    if W::LIGHT_TREES {
+        light::sample_at(W::EFFECTS, scene, world.lights(), &at, words, samples.continues)
+    } else {
+        light::sample_at(W::EFFECTS, scene, &world.lights().without_tree(), &at, words, samples.continues)
+    }
 }
 
 /// The shadow rays of a packet's light samples, whose BSDF is `f`. With `roulette` they survive by what they would

@@ -191,6 +191,8 @@ pub fn bake(
         .section(SectionKind::Names, &materials.names)
         .section(SectionKind::Lights, &lights.lights)
         .section(SectionKind::LightAlias, &lights.alias)
+        .section(SectionKind::LightNodes, &lights.nodes)
+        .section(SectionKind::LightTrails, &lights.trails)
         .section(SectionKind::Environment, &lights.environment)
         .section(SectionKind::EnvTexels, &lights.env_texels)
         .section(SectionKind::EnvAlias, &lights.env_alias)

@@ -23,7 +23,7 @@ use croupier::unstable::accel::WideBvh;
 use croupier::unstable::extension::Extension;
 use croupier::unstable::film::Aov;
 use croupier::unstable::learn::cache::{Cache, CacheError};
-use croupier::unstable::light::PowerSelector;
+use croupier::unstable::light::TreeSelector;
 use croupier::unstable::profile::{AnyProfile, Profile, ProfileVisitor};
 use croupier::unstable::rrs::Space;
 use croupier::{
@@ -336,7 +336,7 @@ pub(crate) fn save(cache: &Cache<'_>) -> Result<Vec<u8>, CacheError> {
 
 /// Ends an iteration that has begun at `begun` and is traced.
 fn end_iteration<'s, P: Profile, X: Extension>(
-    session: &mut Session<'s, '_, P, WideBvh<'s>, PowerSelector<'s>, X>,
+    session: &mut Session<'s, '_, P, WideBvh<'s>, TreeSelector<'s>, X>,
     shards: &[Shard<'_>],
     begun: Instant,
 ) -> Result<IterationRecord, SessionError> {
@@ -371,7 +371,7 @@ fn end_iteration<'s, P: Profile, X: Extension>(
 
 /// One iteration over all shards.
 struct Run<'a, 's, 'm, P: Profile, X: Extension> {
-    session: &'a Session<'s, 'm, P, WideBvh<'s>, PowerSelector<'s>, X>,
+    session: &'a Session<'s, 'm, P, WideBvh<'s>, TreeSelector<'s>, X>,
     observer: &'a dyn Observer,
     start: Instant,
     /// Iterations before this one, and the last of them.

@@ -20,13 +20,16 @@ fn map(texels: &[[f32; 3]], width: u32, height: u32) -> LatLong<'_> {
 /// The alias tables of an environment map: one over its `height - 1` rows of cells, then one of `width` entries per
 /// row, in the layout of the blob's `EnvAlias` section. Empty if the map is black.
 ///
-/// A cell's weight is the integral of the bilinear luminance over its solid angle, so a cell between black texels is
-/// never picked and any other one can be. `texels` are linear radiance, row 0 (+Y) first.
+/// A cell's weight is the integral of the bilinear luminance over its solid angle, above that of the map's mean
+/// ([`LatLong::weights`]): a cell at or below the mean is never picked and any other one can be. `texels` are linear
+/// radiance, row 0 (+Y) first.
 ///
 /// # Panics
 /// Unless `width >= 1`, `height >= 2` and `texels.len() == width * height`.
 pub fn map_tables(texels: &[[f32; 3]], width: u32, height: u32) -> Vec<Alias> {
-    let cells = cell_integrals(&map(texels, width, height));
+    let map = map(texels, width, height);
+    let shared = map.shared_luminance::<Std>();
+    let cells: Vec<f64> = (0..map.rows()).flat_map(|j| (0..map.columns()).map(map.weights::<Std>(j, shared))).collect();
     let rows: Vec<f64> = cells.chunks(width as usize).map(|row| row.iter().sum()).collect();
     let mut tables = alias::build(&rows);
     if tables.is_empty() {
@@ -34,7 +37,7 @@ pub fn map_tables(texels: &[[f32; 3]], width: u32, height: u32) -> Vec<Alias> {
     }
     for row in cells.chunks(width as usize) {
         let table = alias::build(row);
-        // A black row is never picked; its table is there to keep the layout regular.
+        // A row without weight is never picked; its table is there to keep the layout regular.
         tables.extend(if table.is_empty() { alias::build(&vec![1.0; width as usize]) } else { table });
     }
     tables

@@ -28,7 +28,7 @@ use crate::blob::AlignedBytes;
 use croupier::unstable::Iteration;
 use croupier::unstable::accel::WideBvh;
 use croupier::unstable::extension::Extension;
-use croupier::unstable::light::PowerSelector;
+use croupier::unstable::light::TreeSelector;
 use croupier::unstable::profile::{Full, Profile};
 use croupier::{
     Budget, Counters, EditError, EditableScene, Film, Plan, Scene, SceneEdit, SceneError, Session, SessionBuilder,
@@ -167,7 +167,7 @@ fn own<T>(lock: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// The parts of a session: kernels of `P`, the scene's own tree, lights by power, `X`.
-type Builder<'s, P, X> = SessionBuilder<'s, P, WideBvh<'s>, PowerSelector<'s>, X>;
+type Builder<'s, P, X> = SessionBuilder<'s, P, WideBvh<'s>, TreeSelector<'s>, X>;
 
 fn builder<P: Profile, X: Extension>(scene: Scene<'_>, extension: X) -> Builder<'_, P, X> {
     Session::builder(scene).profile::<P>().extension(extension)

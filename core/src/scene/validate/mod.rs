@@ -6,6 +6,7 @@ mod alias;
 mod environment;
 mod geometry;
 mod instances;
+mod light_tree;
 mod lights;
 mod materials;
 mod media;
@@ -33,6 +34,7 @@ pub(super) fn scene(scene: &Records<'_>) -> Result<Effects, SceneError> {
     let lights = lights::lights(scene)?;
     let environment = environment::environment(scene)?;
     lights::table(scene, environment.emits)?;
+    light_tree::light_tree(scene)?;
     tree::tree(scene)?;
     Ok(surfaces.with(instances).with(lights).with(environment.effects).with(camera))
 }

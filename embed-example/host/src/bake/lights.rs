@@ -7,11 +7,12 @@ use crate::description::{Emitter, Environment, LightShape, Model, SceneDescripti
 use crate::math::Std;
 use crate::{alias, environment};
 use bytemuck::Zeroable;
+use croupier::Scene;
 use croupier::unstable::compose::{FieldError, LightSource, MIN_CONE_DEG, Sides};
-use croupier::unstable::light::luminance;
-use croupier::unstable::scene::Field;
-use croupier::unstable::scene::blob::{self, Alias, EnvironmentKind, Light, LightKind};
-use croupier::unstable::scene::blob::{MAX_EMISSION, MAX_SHAPE_LIGHTS, MAX_SIDE};
+use croupier::unstable::light::{LightTree, build_light_tree, luminance};
+use croupier::unstable::scene::blob::{self, Alias, EnvironmentKind, Light, LightKind, LightNode, NONE, SceneInfo};
+use croupier::unstable::scene::blob::{LIGHT_TREE_MIN, MAX_EMISSION, MAX_SHAPE_LIGHTS, MAX_SIDE};
+use croupier::unstable::scene::{Field, Records};
 use glam::DVec3;
 use std::ops::Range;
 
@@ -20,6 +21,9 @@ use std::ops::Range;
 pub(super) struct Lights {
     pub lights: Vec<Light>,
     pub alias: Vec<Alias>,
+    /// Light tree, in scenes with many lights.
+    pub nodes: Vec<LightNode>,
+    pub trails: Vec<u32>,
     /// None or one.
     pub environment: Vec<blob::Environment>,
     pub env_texels: Vec<[f32; 3]>,
@@ -105,10 +109,38 @@ pub(super) fn bake(
     weights.iter_mut().zip(&shares).for_each(|(weight, share)| *weight *= share);
     hidden.into_iter().flatten().for_each(|light| weights[light] = 0.0);
     out.alias = alias::build(&weights);
+    out.grow(geometry, forest);
     Ok(out)
 }
 
 impl Lights {
+    /// Builds the light tree, if there are enough lights that are chosen at all.
+    fn grow(&mut self, geometry: &Geometry, forest: &Forest) {
+        let n = self.lights.len();
+        if self.alias.iter().filter(|a| a.probability > 0.0).count() < LIGHT_TREE_MIN {
+            return;
+        }
+        let [bounds_min, bounds_max] = forest.bounds;
+        let info = SceneInfo { bounds_min, bounds_max, max_depth: 1, dropped_triangles: 0 };
+        let camera = Zeroable::zeroed();
+        let scene = Scene::assume_valid(Records {
+            vertices: &geometry.vertices,
+            triangles: &geometry.triangles,
+            lights: &self.lights,
+            light_alias: &self.alias,
+            environment: self.environment.first(),
+            objects: &forest.objects,
+            instances: &forest.instances,
+            ..Records::of(&info, &camera)
+        });
+        let mut nodes: Vec<LightNode> = vec![Zeroable::zeroed(); n];
+        let (mut trails, mut order) = (vec![NONE; n], vec![0; n]);
+        let tree = LightTree { nodes: &mut nodes, trails: &mut trails, order: &mut order };
+        let count = build_light_tree(&scene, tree).expect("a node, a trail and an entry per light suffice");
+        nodes.truncate(count);
+        (self.nodes, self.trails) = (nodes, trails);
+    }
+
     /// Adds the lights of instances, one for each emitting triangle of each; returns those that are hidden.
     fn place(
         &mut self,
