@@ -1,6 +1,6 @@
 /*
  * A program that brings triangles at run time, traces rays with an intersector of its own, and edits the scene between
- * pictures. The last line that it prints is a hash of the picture, the same on every machine (embed-example/hashes.txt, C).
+ * pictures. The last line that it prints is a hash of the picture, the same on every machine (hashes.txt, C).
  */
 #define _POSIX_C_SOURCE 200112L
 #include <croupier.h>
