@@ -79,8 +79,8 @@ fn headlines(ledger: &Ledger) -> Vec<Value> {
     let ratio = saved(ledger, "ears", "classic", LEVEL);
     if ratio.is_finite() {
         let n = ledger.scenes.len();
-        let says = format!("less time with ears than with classic to 1 % relMSE, geometric mean of {n} scenes");
-        found.push(headline(format!("{}x", number(ratio)), says));
+        let says = format!("times as long as ears does classic take to 1 % relMSE, geometric mean of {n} scenes");
+        found.push(headline(number(ratio), says));
     }
     for (strategy, line) in calibration(ledger).into_iter().filter(|c| c.0 == "ears") {
         if let Some(p) = line.iter().find(|p| p.level == 0.95) {
