@@ -35,10 +35,11 @@ fn variance(images: &[Image]) -> f64 {
 }
 
 /// Equivalence (TOST) of the mean with that of hashed numbers without roulette: differences up to 0.4 % with 95 %
-/// confidence from both sides, whose standard errors are below 0.12 %. Box, every material and light with a lens, media;
-/// roulette, splitting with siblings, everything that is learned. Killed by: coordinates of one block that are used twice,
-/// siblings that repeat a point (their mean stays, so that the test of variance below has them), a shuffle that is no
-/// permutation, light chosen and placed by one coordinate, a flag that makes a bit of a random number constant.
+/// confidence from both sides, whose standard errors are below 0.12 %. Box, every material and light with a lens,
+/// media; roulette, splitting with siblings, everything that is learned. Killed by: coordinates of one block that are
+/// used twice, siblings that repeat a point (their mean stays, so that the test of variance below has them), a shuffle
+/// that is no permutation, light chosen and placed by one coordinate, a flag that makes a bit of a random number
+/// constant.
 #[test]
 fn the_mean_is_that_of_hashed_numbers() {
     for (name, scene, depth) in
@@ -68,8 +69,8 @@ fn the_mean_is_that_of_hashed_numbers() {
     }
 }
 
-/// A closed box that glows: radiance 1 / (1 - 0.5) less what the last segments would have brought, whatever the pixel, with
-/// roulette and splitting. Killed by: numbers in [0, 1] that never come near 1, a weight that is lost.
+/// A closed box that glows: radiance 1 / (1 - 0.5) less what the last segments would have brought, whatever the pixel,
+/// with roulette and splitting. Killed by: numbers in [0, 1] that never come near 1, a weight that is lost.
 #[test]
 fn a_glowing_box_has_its_radiance() {
     let scene = blob(&glowing_box(0.5, 1.0, [8, 8]));
@@ -85,9 +86,10 @@ fn a_glowing_box_has_its_radiance() {
     }
 }
 
-/// In a box 64 samples of one iteration have at most two thirds of the variance of hashed numbers, and one sample has the
-/// same (within 15 %). Splitting: siblings do not repeat each other, so that 3 of them are better than one. Killed by: a
-/// sequence that is not carried to the vertices, samples of a pixel that repeat a point, siblings that are copies.
+/// In a box 64 samples of one iteration have at most two thirds of the variance of hashed numbers, and one sample has
+/// the same (within 15 %). Splitting: siblings do not repeat each other, so that 3 of them are better than one. Killed
+/// by: a sequence that is not carried to the vertices, samples of a pixel that repeat a point, siblings that are
+/// copies.
 #[test]
 fn variance_falls() {
     let scene = blob(&cornell([12, 12]));
@@ -105,8 +107,8 @@ fn variance_falls() {
     assert!(split < 0.6, "3 siblings have {split} times the variance of one sample");
 }
 
-/// Kernels without the sampler refuse settings that call for it, and nothing else. Killed by: a profile that renders hashed
-/// numbers without a word.
+/// Kernels without the sampler refuse settings that call for it, and nothing else. Killed by: a profile that renders
+/// hashed numbers without a word.
 #[test]
 fn profiles_without_it_refuse_it() {
     fn session<P: Profile>(bytes: &[u8], sampler: Sampler) -> Result<(), SessionError> {
