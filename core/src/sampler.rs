@@ -7,10 +7,10 @@
 //! With [`Sampler::Hashed`] all bits of a key are random, and a block is a hash of them. With [`Sampler::Sobol`] a key
 //! either is such a one, of which bit 63 is set, or it belongs to a sequence: then its low word is the same for all
 //! samples of a pixel, and its high word is the number of the camera sample in the iteration. Its blocks are points of
-//! that number, of a sequence with a scramble of its own for each block, depth, pixel and iteration. Samples of the first
-//! [`SOBOL_DEPTH`] vertices belong to sequences. Those that splitting makes of one path are siblings, each with a number,
-//! and each number has a sequence of its own: they are independent of each other, and each is spread evenly among the
-//! siblings of its number in the other paths of the pixel.
+//! that number, of a sequence with a scramble of its own for each block, depth, pixel and iteration. Samples of the
+//! first [`SOBOL_DEPTH`] vertices belong to sequences. Those that splitting makes of one path are siblings, each with a
+//! number, and each number has a sequence of its own: they are independent of each other, and each is spread evenly
+//! among the siblings of its number in the other paths of the pixel.
 //!
 //! What holds for both: numbers of different blocks and keys are independent, but for the samples of a pixel in an
 //! iteration. Iterations are independent, so that the film's error estimate, which measures how much they differ
@@ -28,8 +28,8 @@ pub enum Sampler {
     /// Independent numbers, hashes of pixel, sample and depth.
     #[default]
     Hashed,
-    /// Owen-scrambled Sobol' points for the samples of a pixel in an iteration, which are spread more evenly. Pays where
-    /// iterations have 4 samples and more; iterations of one sample are as with hashed numbers.
+    /// Owen-scrambled Sobol' points for the samples of a pixel in an iteration, which are spread more evenly. Pays
+    /// where iterations have 4 samples and more; iterations of one sample are as with hashed numbers.
     Sobol,
 }
 
@@ -153,7 +153,8 @@ impl Key8 {
         }
     }
 
-    /// Steps 2 `pair` and 2 `pair` + 1 of a flight through a medium: each the words of an optical depth and of a choice.
+    /// Steps 2 `pair` and 2 `pair` + 1 of a flight through a medium: each the words of an optical depth and of a
+    /// choice.
     #[inline(always)]
     pub(crate) fn flight_steps(self, pair: u32) -> [[U32x8; 2]; 2] {
         let [a, b, c, d] = self.words(FLIGHT_BLOCK + pair);
@@ -185,9 +186,9 @@ impl Key8 {
         }
     }
 
-    /// Offset of a vertex's look-up in the cache, three numbers. With hashed numbers the bits of the key itself, of which
-    /// everything that the vertex draws is a hash. The low 8 of each word, which the first two axes do not see, make the
-    /// third.
+    /// Offset of a vertex's look-up in the cache, three numbers. With hashed numbers the bits of the key itself, of
+    /// which everything that the vertex draws is a hash. The low 8 of each word, which the first two axes do not see,
+    /// make the third.
     #[inline(always)]
     pub(crate) fn cache_jitter(self, sampler: Sampler) -> [F32x8; 3] {
         if sampler == Sampler::Sobol {
@@ -333,9 +334,9 @@ mod tests {
         points.iter().map(cell).collect::<std::collections::HashSet<_>>().len()
     }
 
-    /// Samples of vertices 1 to 4 belong to sequences, in every block, whatever their number among siblings; later ones do
-    /// not: 64 independent points leave 23 of 64 cells empty. Killed by: a depth that is off by one, a child that forgets
-    /// its sample's number, keys of one depth in another.
+    /// Samples of vertices 1 to 4 belong to sequences, in every block, whatever their number among siblings; later ones
+    /// do not: 64 independent points leave 23 of 64 cells empty. Killed by: a depth that is off by one, a child that
+    /// forgets its sample's number, keys of one depth in another.
     #[test]
     fn samples_of_early_vertices_are_stratified() {
         for pixel in 0..8 {
@@ -353,9 +354,9 @@ mod tests {
         }
     }
 
-    /// Siblings, depths, blocks, pixels and iterations: no two draw alike. Over 512 pixels the correlation of what the same
-    /// camera sample draws is below 0.13, 3 standard deviations of one pair and 5 of none of these. Killed by: a scramble
-    /// that two of them share, an iteration that begins as the one before.
+    /// Siblings, depths, blocks, pixels and iterations: no two draw alike. Over 512 pixels the correlation of what the
+    /// same camera sample draws is below 0.13, 3 standard deviations of one pair and 5 of none of these. Killed by: a
+    /// scramble that two of them share, an iteration that begins as the one before.
     #[test]
     fn sequences_are_independent() {
         let columns: Vec<Vec<f64>> =

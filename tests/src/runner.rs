@@ -1,5 +1,6 @@
 //! Drives the core by hand, in any order of shards and steps; compiled once for all tests.
 
+use croupier::unstable::Sampler;
 use croupier::unstable::accel::{Intersector, WideBvh};
 use croupier::unstable::film::{PixelAov, PixelStats};
 use croupier::unstable::learn::cache::CacheError;
@@ -293,6 +294,7 @@ pub fn kinds_of_statistics(scene: &[u8], shards: u32) -> Vec<Settings> {
         of("ears", true, true, learning),
         of("ears", false, true, blocks),
         of("bolin-meyer", true, true, learning),
+        Settings { sampler: Sampler::Sobol, ..of("ears", true, false, learning) },
     ]
 }
 

@@ -1,6 +1,7 @@
 //! The error that the film estimates is the true one.
 
 use croupier::Settings;
+use croupier::unstable::Sampler;
 use croupier::unstable::film::{PixelStats, REL_MSE_EPSILON};
 use croupier_tests::runner::{Image, Schedule, render, scheduled, settings};
 use croupier_tests::scenes::*;
@@ -114,6 +115,35 @@ fn the_error_estimate_is_right_with_roulette_after_iterations() {
         println!("{strategy}: {ratio:.3} of the true relMSE; {held} of 100 intervals hold it, {below} are below");
         assert!((least..=most).contains(&ratio), "{strategy}: {ratio} of the true relMSE is stated");
         assert!(below <= 12, "{strategy}: {below} of 100 intervals are below the true error");
+        assert!(most > 1.1 || held >= 85, "{strategy}: {held} of 100 intervals hold the true error");
+    }
+}
+
+/// With Sobol' points samples of an iteration are spread evenly, so that one iteration states more than the true error, as
+/// with combs; from the second on the film measures how independent they are. Intervals as above. Killed by: iterations
+/// that go on with a sequence, whose differences are larger than their errors.
+#[test]
+fn the_error_estimate_is_right_with_sobol_points() {
+    let scene = blob(&cornell([16, 16]));
+    let growing = [1, 1, 2, 4, 8, 16, 32];
+    for (strategy, iterations, [least, most]) in [
+        ("none", &[64][..], [1.2, 4.0]),
+        ("none", &growing, [0.9, 1.1]),
+        ("classic", &[64; 4], [0.9, 1.1]),
+        ("classic:1", &growing, [0.9, 1.1]),
+        ("ears", &growing, [0.9, 1.1]),
+    ] {
+        let base = Settings { max_depth: 12, sampler: Sampler::Sobol, ..settings(&scene, strategy) };
+        let run = |seed| scheduled(&scene, &Settings { seed, ..base }, iterations, Schedule::InOrder(1 << 20));
+        let images: Vec<Image> = (0..100).map(run).collect();
+        let truth = rel_mse_of(&images);
+        let ratio = images.iter().map(|i| i.error.rel_mse).sum::<f64>() / images.len() as f64 / truth;
+        let count = |f: &dyn Fn(&Image) -> bool| images.iter().filter(|i| f(i)).count();
+        let (below, held) =
+            (count(&|i| i.error.high < truth), count(&|i| i.error.low <= truth && truth <= i.error.high));
+        println!("{strategy}: {ratio:.3} of the true relMSE; {held} of 100 intervals hold it, {below} are below");
+        assert!((least..=most).contains(&ratio), "{strategy}: {ratio} of the true relMSE is stated");
+        assert!(below <= 10, "{strategy}: {below} of 100 intervals are below the true error");
         assert!(most > 1.1 || held >= 85, "{strategy}: {held} of 100 intervals hold the true error");
     }
 }

@@ -1,10 +1,10 @@
 //! Variance of pixels with Sobol' points against hashed numbers, at equal samples per pixel.
 //!
 //! A row renders a scene small, with the program's own schedule of iterations, with both samplers and many seeds. The
-//! variance of a pixel is that of its mean between seeds, over its squared mean (plus 0.01), which needs no reference; the
-//! same worst pixels are left out on both sides. `gain` is the ratio, hashed over Sobol', with its 95 % interval by the
-//! jackknife over seeds. `stated` is the film's own estimate of relMSE over what is found, all pixels counted: 1 if the
-//! error that a render states is the true one.
+//! variance of a pixel is that of its mean between seeds, over its squared mean (plus 0.01), which needs no reference;
+//! the same worst pixels are left out on both sides. `gain` is the ratio, hashed over Sobol', with its 95 % interval by
+//! the jackknife over seeds. `stated` is the film's own estimate of relMSE over what is found, all pixels counted: 1 if
+//! the error that a render states is the true one.
 
 use clap::Parser;
 use croupier::unstable::Sampler;

@@ -1,4 +1,5 @@
-//! Owen-scrambled Sobol' points, padded block by block (Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4) 2020).
+//! Owen-scrambled Sobol' points, padded block by block (Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4)
+//! 2020).
 //!
 //! Plain version: a block of number `b` of the key (lo, i) draws coordinates 0 to 3 of point `shuffle(i)` of the Sobol'
 //! sequence, each scrambled by Owen's method. The seeds of shuffle and scrambles are hashes of `lo` and `b`.
@@ -6,8 +7,8 @@
 //! 1. *Scrambles are hashes.* Owen's scramble flips each binary digit by a random function of the digits before it.
 //!    [`scramble`] is such a function of numbers whose digits are reversed: additions and products carry towards higher
 //!    bits only (Laine and Karras 2011; the constants are those of Vegdahl 2021).
-//! 2. *Numbers stay reversed.* The sequence is computed with its first digit in bit 0, so that each coordinate is reversed
-//!    once, at the end, and the index is never.
+//! 2. *Numbers stay reversed.* The sequence is computed with its first digit in bit 0, so that each coordinate is
+//!    reversed once, at the end, and the index is never.
 //! 3. *Coordinate 1 needs no direction numbers.* Digit j is the sum of those bits b of the index for which the binomial
 //!    b over j is odd: b contains the bits of j. Five steps add these (a Pascal matrix modulo 2 is a Kronecker power).
 //! 4. *Coordinates 2 and 3 take as many steps as the largest index of the packet has bits.* For this the shuffle keeps
@@ -147,9 +148,9 @@ mod tests {
         }
     }
 
-    /// An Owen scramble: what the first k digits become depends on them alone, and digit k + 1 is flipped for some of them
-    /// and not for others; the shuffle keeps 0 and the number of bits besides. Killed by: an even factor, a shift to the
-    /// right of what is scrambled, a constant term in the shuffle.
+    /// An Owen scramble: what the first k digits become depends on them alone, and digit k + 1 is flipped for some of
+    /// them and not for others; the shuffle keeps 0 and the number of bits besides. Killed by: an even factor, a shift
+    /// to the right of what is scrambled, a constant term in the shuffle.
     #[test]
     fn digits_depend_on_those_before() {
         for seed in 0..64 {
@@ -179,8 +180,8 @@ mod tests {
     }
 
     /// Any 2^m points that begin at a multiple of 2^m: coordinates 0 and 1 have one point in each of the elementary
-    /// intervals of area 2^-m, 2 and 3 one in each of their 2^m intervals; so it is after shuffle and scramble. Killed by: a
-    /// shuffle that mixes blocks, a scramble that is none, coordinates in another order.
+    /// intervals of area 2^-m, 2 and 3 one in each of their 2^m intervals; so it is after shuffle and scramble. Killed
+    /// by: a shuffle that mixes blocks, a scramble that is none, coordinates in another order.
     #[test]
     fn blocks_are_nets() {
         for seed in 0..16 {
@@ -204,9 +205,9 @@ mod tests {
         }
     }
 
-    /// Points 0 to 7 over many seeds: each coordinate is uniform (chi-square with 15 degrees of freedom below its quantile
-    /// of 1e-6), the four of a point are independent, and so are those of two blocks. Killed by: a point that is the same
-    /// for all seeds, one seed for two coordinates or for the shuffle and a scramble.
+    /// Points 0 to 7 over many seeds: each coordinate is uniform (chi-square with 15 degrees of freedom below its
+    /// quantile of 1e-6), the four of a point are independent, and so are those of two blocks. Killed by: a point that
+    /// is the same for all seeds, one seed for two coordinates or for the shuffle and a scramble.
     #[test]
     fn points_are_uniform_over_seeds() {
         const N: u32 = 1 << 14;

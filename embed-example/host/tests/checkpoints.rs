@@ -49,17 +49,25 @@ fn resumed_renders_have_the_same_bits() {
     let baked = bake(&builtin::cornell_box(), &BakeOptions::default(), |_, _| {}).unwrap();
     let scene = Scene::from_bytes(&baked.bytes).unwrap();
     let dir = tempfile::tempdir().unwrap();
-    for (strategy, adaptive) in [("classic", false), ("ears", false), ("ears", true), ("bolin-meyer", false)] {
+    for (strategy, adaptive, sampler) in [
+        ("classic", false, "hashed"),
+        ("ears", false, "hashed"),
+        ("ears", true, "hashed"),
+        ("bolin-meyer", false, "hashed"),
+        ("classic", false, "sobol"),
+        ("ears", true, "sobol"),
+    ] {
         let mut settings =
             Settings { size: [40, 30], shards: 3, aovs: true.into(), adaptive, ..Settings::for_scene(&scene) };
         settings.set("rrs", strategy).unwrap();
+        settings.set("sampler", sampler).unwrap();
         settings.set("cache-bytes", "1MiB").unwrap();
         let learns = strategy == "ears";
         let plain = Options { threads: 1, save_cache: learns, ..Options::new(settings, Target::Spp(37)) };
         let whole = drive_scene(scene, &plain, &After::new(u32::MAX)).unwrap();
         let mut breaks = 0;
         for asks in [1, 2, 5, 11] {
-            let path = dir.path().join(format!("{strategy}{adaptive}{asks}"));
+            let path = dir.path().join(format!("{strategy}{adaptive}{sampler}{asks}"));
             let schedule = Schedule { path: path.clone(), every: 1e9 };
             let mut resume = None;
             // The more asks are left, the further it comes before the next break.
