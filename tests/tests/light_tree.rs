@@ -7,8 +7,10 @@ use croupier::unstable::scene::blob::*;
 use croupier::unstable::simd::{Mask8, U32x8, Vec3x8};
 use croupier::{EditableScene, Scene};
 use croupier_host::blob::AlignedBytes;
+use croupier_host::description::{Instance, Vertex as Corner};
 use croupier_tests::light_oracle::{V, cross, dot, length, sub, unit, wide};
 use croupier_tests::many_lights::cloud;
+use croupier_tests::placed::{add_prototype, flatten};
 use croupier_tests::scenes::blob;
 use croupier_tests::stats::{SplitMix, chi_square_in_order};
 use many_kinds::mixed;
@@ -205,6 +207,53 @@ fn edits_refit_the_tree() {
     }
     scene.seal();
     assert!(Scene::from_bytes(scene.bytes()).is_ok());
+}
+
+/// Places, directions and weights of all lights in a tree, by place.
+fn leaves(scene: &Scene<'_>) -> Vec<[f32; 8]> {
+    let of = |n: &LightNode, k: usize| {
+        let [m, a] = [&n.middle, &n.axis].map(|rows| [rows[0][k], rows[1][k], rows[2][k]]);
+        [m[0], m[1], m[2], a[0], a[1], a[2], n.radius[k], n.weight[k]]
+    };
+    let leaf = |n: &LightNode, k: usize| n.child[k] != NONE && n.child[k] & LEAF_BIT != 0;
+    let all = scene.light_nodes.iter().flat_map(|n| (0..8).filter(|k| leaf(n, *k)).map(|k| of(n, k)));
+    let mut out: Vec<_> = all.collect();
+    out.sort_by(|a, b| a[..3].partial_cmp(&b[..3]).unwrap());
+    out
+}
+
+/// Emitters of instances are in the tree where they are in the world, and move along with an edit. Killed by: lights of
+/// instances in the space of their prototypes, mirrored ones that face the wrong way, a tree that moves leave as it is.
+#[test]
+fn instances_have_their_places_in_the_tree() {
+    let mut scene = cloud(3, [4, 4]);
+    let lamp = scene.triangles.last().unwrap().material;
+    let first = scene.triangles.len() as u32;
+    let at = |x, y, z| Corner { position: [x, y, z], ..Corner::default() };
+    let corners = [at(0.0, 0.0, 0.0), at(0.3, 0.0, 0.0), at(0.0, 0.2, 0.1), at(0.1, 0.4, -0.2)];
+    scene.add_mesh("lamp", lamp, &corners, &[[0, 1, 2], [1, 3, 2]], false);
+    let prototype = add_prototype(&mut scene, "lamp", first, vec![]);
+    for k in 0..30u8 {
+        let [x, z] = [f32::from(k % 6), f32::from(k / 6)];
+        let side = if k % 3 == 0 { -1.0 } else { 1.0 };
+        let to_world = [[side, 0.2, 0.0, x], [0.0, 1.0, 0.1, 1.0 + 0.05 * x * z], [0.3, 0.0, 1.0, z]];
+        let name = format!("lamp {k}");
+        scene.instances.push(Instance { name, prototype, to_world, to_world_end: None, visible: true });
+    }
+    let agree = |a: &Scene<'_>, b: &Scene<'_>| {
+        let (a, b) = (leaves(a), leaves(b));
+        assert!(a.len() == b.len() && a.len() == 63, "{} {}", a.len(), b.len());
+        for (a, b) in a.iter().flatten().zip(b.iter().flatten()) {
+            assert!((a - b).abs() <= 1e-4 * (1.0 + a.abs()), "{a} {b}");
+        }
+    };
+    let placed = blob(&scene);
+    agree(&Scene::from_bytes(&placed).unwrap(), &Scene::from_bytes(&blob(&flatten(&scene))).unwrap());
+    let moved = [[1.0, 0.0, 0.0, -3.0], [0.0, 1.0, 0.0, 2.5], [0.0, 0.0, 1.0, -4.0]];
+    let mut edited = EditableScene::new(placed).unwrap();
+    edited.edit().transform(7, [moved; 2]).unwrap();
+    scene.instances[7].to_world = moved;
+    agree(&edited.scene(), &Scene::from_bytes(&blob(&scene)).unwrap());
 }
 
 /// Changes a section's bytes and makes the blob's hash right again.

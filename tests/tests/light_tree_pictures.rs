@@ -8,11 +8,23 @@ use croupier::unstable::profile::Full;
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier::{Budget, Plan, Scene, Session, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
+use croupier_host::description::{Camera, SceneDescription};
 use croupier_tests::many_lights::cloud;
 use croupier_tests::runner::{Image, settings};
-use croupier_tests::scenes::blob;
+use croupier_tests::scenes::{blob, camera};
 use croupier_tests::stats::equivalent;
 use many_kinds::mixed;
+
+/// A camera that sees the floor below the lamps and hardly any lamp: what is seen directly has the same noise whatever
+/// chooses lights.
+fn at_the_floor(size: [u32; 2]) -> Camera {
+    camera([0.0, 0.2, 3.0], [0.0, 0.0, 2.73], 50.0, size)
+}
+
+/// The blob of all kinds of lights over a floor.
+fn lit() -> AlignedBytes {
+    blob(&SceneDescription { camera: at_the_floor([12, 9]), ..mixed(200) })
+}
 
 /// Never inlined, so that a profiler finds it by its name.
 #[inline(never)]
@@ -45,11 +57,11 @@ fn difference(a: &Image, b: &Image) -> (f64, f64) {
 }
 
 /// The picture of all kinds of lights is the same as with lights chosen by power, and less noisy. Differences above
-/// 1.5 % show with a probability of 99 %. Killed by: a light that is left out, MIS densities of
+/// 1 % show with a probability of 99 %. Killed by: a light that is left out, MIS densities of
 /// another selector than samples have, delta lights that are not seen from some points.
 #[test]
 fn pictures_are_those_of_a_choice_by_power() {
-    let bytes = blob(&mixed(200));
+    let bytes = lit();
     let scene = Scene::from_bytes(&bytes).unwrap();
     for depth in [2, 4] {
         let s = Settings { max_depth: depth, seed: 3, ..settings(&bytes, "none") };
@@ -62,9 +74,9 @@ fn pictures_are_those_of_a_choice_by_power() {
             100.0 * d,
             100.0 * error
         );
-        assert!(error < 0.004, "{error}");
-        assert!(equivalent(d, error, 0.015, 0.01), "{d} +- {error}");
-        assert!(gain > 1.5, "{gain}");
+        assert!(error < 0.0025, "{error}");
+        assert!(equivalent(d, error, 0.01, 0.01), "{d} +- {error}");
+        assert!(gain > 2.0, "{gain}");
     }
 }
 
@@ -75,13 +87,13 @@ fn wrong_densities_show() {
     impl LightSelector for Wrong<'_> {
         fn select(&self, p: Vec3x8, n: Vec3x8, r: U32x8) -> (U32x8, F32x8) {
             let (light, probability) = self.0.select(p, n, r);
-            (light, probability * 1.05)
+            (light, probability * 1.2)
         }
         fn probability(&self, p: Vec3x8, n: Vec3x8, light: U32x8, mask: Mask8) -> F32x8 {
             self.0.probability(p, n, light, mask)
         }
     }
-    let bytes = blob(&mixed(200));
+    let bytes = lit();
     let scene = Scene::from_bytes(&bytes).unwrap();
     let s = Settings { max_depth: 2, seed: 5, ..settings(&bytes, "none") };
     let right = render_by(scene, &s, 5000, TreeSelector(scene));
@@ -93,7 +105,7 @@ fn wrong_densities_show() {
 /// relMSE of a picture of `n` emitters with lights by the tree, or by power where there are too few for one, and by
 /// power.
 fn errors(n: u32) -> [f64; 2] {
-    let bytes = blob(&cloud(n, [32, 24]));
+    let bytes = blob(&SceneDescription { camera: at_the_floor([32, 24]), ..cloud(n, [32, 24]) });
     let scene = Scene::from_bytes(&bytes).unwrap();
     let s = Settings { max_depth: 3, seed: 8, ..settings(&bytes, "none") };
     let error = |image: Image| {
@@ -111,12 +123,12 @@ fn errors(n: u32) -> [f64; 2] {
     errors
 }
 
-/// 10,000 emitters are chosen well enough that their picture is far less noisy than by power at equal samples. Killed
+/// 10,000 emitters are chosen well enough that their picture is less noisy than by power at equal samples. Killed
 /// by: a tree whose importance does not fall with distance, or whose parts are not near each other.
 #[test]
 fn ten_thousand_emitters_are_chosen_well() {
     let [tree, power] = errors(10_000);
-    assert!(tree < 0.5 * power, "{tree} {power}");
+    assert!(tree < 0.25 * power, "{tree} {power}");
 }
 
 /// With a single emitter there is no tree, and both ways are one. Killed by: a tree where none is worth it.

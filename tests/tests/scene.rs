@@ -447,7 +447,7 @@ fn every_fault_of_the_frame_has_its_error() {
         b
     };
     let section = |kind, fault| SceneError::Section { kind, fault };
-    expect("kind", &entry(4, |s| s.kind = 21), SceneError::UnknownSection(21));
+    expect("kind", &entry(4, |s| s.kind = 23), SceneError::UnknownSection(23));
     expect("twice", &entry(4, |s| s.kind = 3), section(S::Triangles, SectionFault::Repeated));
     expect("stride", &entry(4, |s| s.stride = 16), section(S::Vertices, SectionFault::Stride(16)));
     expect("stride 0", &entry(4, |s| s.stride = 0), section(S::Vertices, SectionFault::Stride(0)));
