@@ -3,6 +3,7 @@
 use croupier::unstable::bsdf::facts;
 use croupier::unstable::scene::blob::{LightKind, MaterialKind};
 use croupier_benches::micro;
+use croupier_benches::results::Results;
 use std::collections::BTreeSet;
 
 /// Killed by: a kernel whose answer has changed, two with one name, one without a lane in use, a material, light or
@@ -28,4 +29,16 @@ fn kernels_give_their_expected_answers() {
     }
     let lights = names.iter().filter(|n| n.starts_with("light sample: ")).count();
     assert_eq!(lights, LightKind::ALL.len() + 1, "kinds of light; the environment has two");
+}
+
+/// Killed by: a kernel added or renamed without `--bin micro -- --write`.
+#[test]
+fn committed_counts_are_of_these_kernels() {
+    let kernels = micro::all().unwrap_or_else(|e| panic!("{e}"));
+    let committed = Results::read("micro").unwrap();
+    let table = &committed.tables[0];
+    assert_eq!(table.rows.len(), kernels.len());
+    for k in &kernels {
+        assert!(table.row(&[k.group, &*k.name]).is_some(), "{} {} is not in benches/results/micro.md", k.group, k.name);
+    }
 }
