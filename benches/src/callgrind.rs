@@ -127,9 +127,57 @@ fn bench_one_call(call: &mut dyn FnMut()) {
 /// Runs this program with `args` under callgrind; it must print a line for each call of [`bench_collect`]. The lines, each
 /// with the instructions of its call.
 pub fn each_call(folder: &Folder, args: &[&str]) -> Result<Vec<(String, u64)>, Box<dyn Error>> {
+    let calls = profiles(folder, args, &[])?;
+    let counted = calls.into_iter().map(|(line, profile)| match event(&profile, "Ir") {
+        0 => Err("callgrind counted nothing in a call".into()),
+        n => Ok((line, n)),
+    });
+    counted.collect()
+}
+
+/// What callgrind counts with caches: those of [`CACHES`], whatever machine it runs on.
+#[derive(Clone, Copy, Debug)]
+pub struct WithCaches {
+    /// Instructions.
+    pub instructions: u64,
+    /// Reads and writes that miss the first data cache.
+    pub first_misses: u64,
+    /// Reads, writes and instructions that miss the last cache.
+    pub last_misses: u64,
+}
+
+/// The caches that [`each_call_with_caches`] models: first ones of 32 KiB, the last one of 32 MiB.
+pub const CACHES: [&str; 4] = ["--cache-sim=yes", "--I1=32768,8,64", "--D1=32768,8,64", "--LL=33554432,16,64"];
+
+/// [`each_call`] with misses of caches.
+pub fn each_call_with_caches(folder: &Folder, args: &[&str]) -> Result<Vec<(String, WithCaches)>, Box<dyn Error>> {
+    let calls = profiles(folder, args, &CACHES)?;
+    let counted = calls.into_iter().map(|(line, profile)| {
+        let sum = |names: &[&str]| names.iter().map(|n| event(&profile, n)).sum();
+        let with = WithCaches {
+            instructions: sum(&["Ir"]),
+            first_misses: sum(&["D1mr", "D1mw"]),
+            last_misses: sum(&["ILmr", "DLmr", "DLmw"]),
+        };
+        if with.instructions > 0 { Ok((line, with)) } else { Err("callgrind counted nothing in a call".into()) }
+    });
+    counted.collect()
+}
+
+/// Total of an event in a profile, 0 where it is not counted.
+fn event(profile: &str, name: &str) -> u64 {
+    let line = |key: &str| profile.lines().find_map(|l: &str| l.strip_prefix(key));
+    let (Some(names), Some(totals)) = (line("events: "), line("totals: ")) else { return 0 };
+    // zeros at the end are left out
+    let mut both = names.split_whitespace().zip(totals.split_whitespace());
+    both.find(|(n, _)| *n == name).and_then(|(_, total)| total.parse().ok()).unwrap_or(0)
+}
+
+/// The lines that this program prints with `args`, each with the profile of its call of [`bench_collect`].
+fn profiles(folder: &Folder, args: &[&str], options: &[&str]) -> Result<Vec<(String, String)>, Box<dyn Error>> {
     let out = folder.path().join("calls.out");
     let mut valgrind = Command::new("valgrind");
-    valgrind.args(["--tool=callgrind", "--quiet", "--collect-atstart=no", "--dump-line=no"]);
+    valgrind.args(["--tool=callgrind", "--quiet", "--collect-atstart=no", "--dump-line=no"]).args(options);
     valgrind.args(["--toggle-collect=*bench_collect*", "--dump-after=*bench_one_call*"]);
     valgrind.arg(format!("--callgrind-out-file={}", out.display()));
     let output = valgrind.arg(std::env::current_exe()?).args(args).output()?;
@@ -141,9 +189,7 @@ pub fn each_call(folder: &Folder, args: &[&str]) -> Result<Vec<(String, u64)>, B
         let path = folder.path().join(format!("calls.out.{number}"));
         let profile = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
         std::fs::remove_file(&path)?;
-        let total = profile.lines().find_map(|l| l.strip_prefix("totals: ")?.trim().parse::<u64>().ok());
-        let n = total.filter(|&n| n > 0).ok_or("callgrind counted nothing in a call")?;
-        calls.push((line.to_owned(), n));
+        calls.push((line.to_owned(), profile));
     }
     Ok(calls)
 }

@@ -6,6 +6,7 @@ pub mod clock;
 pub mod exit;
 pub mod figures;
 pub mod measure;
+pub mod micro;
 pub mod placed;
 pub mod provenance;
 pub mod results;

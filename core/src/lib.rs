@@ -184,6 +184,10 @@ pub mod unstable {
     pub mod learn {
         pub use crate::learn::*;
     }
+    /// What each sample of a path gave, until it is finished.
+    pub mod ledger {
+        pub use crate::tracer::{Finished, Ledger, NO_RECORD};
+    }
     /// Emission and its sampling.
     pub mod light {
         pub use crate::light::*;

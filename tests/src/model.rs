@@ -16,6 +16,13 @@ impl Case {
 
 /// The kernel of a kernel profile with the parameters of eight cases of one kind.
 pub fn packet(cases: [&Case; 8], active: Mask8, profile: Effects) -> Box<dyn Model> {
+    let (scene, inputs) = inputs(cases, active);
+    dispatch_in(profile, cases[0].kind, Boxed { scene, inputs, active }).unwrap()
+}
+
+/// A scene with the materials of eight cases, and what a kernel gathers its parameters by; lanes outside `active` are
+/// garbage.
+pub fn inputs(cases: [&Case; 8], active: Mask8) -> (Scene<'static>, Inputs8) {
     fn leak<T>(x: T) -> &'static T {
         Box::leak(Box::new(x))
     }
@@ -36,8 +43,7 @@ pub fn packet(cases: [&Case; 8], active: Mask8, profile: Effects) -> Box<dyn Mod
     });
     let garbage = |i: usize| if active.lane(i) { i as u32 + 1 } else { 0xdead_beef };
     let colour = |i: usize| if active.lane(i) { cases[i].material.reflectance } else { [f32::NAN; 3] };
-    let inputs = Inputs8 { material: U32x8::from_fn(garbage), reflectance: Vec3x8::from_fn(colour) };
-    dispatch_in(profile, cases[0].kind, Boxed { scene, inputs, active }).unwrap()
+    (scene, Inputs8 { material: U32x8::from_fn(garbage), reflectance: Vec3x8::from_fn(colour) })
 }
 
 struct Boxed {

@@ -69,14 +69,19 @@ impl Layered {
         .pack()
     }
 
+    /// The scene with the material, and what a kernel gathers its parameters by.
+    pub fn inputs(&self) -> (Scene<'static>, Inputs8) {
+        (self.scene, Inputs8 { material: U32x8::splat(1), reflectance: self.packed() })
+    }
+
     /// The kernel under test in all lanes; samples leave out what passes straight on.
     pub fn model(&self) -> Box<dyn Model> {
         struct Boxed<'a>(&'a Layered);
         impl Visitor<'static> for Boxed<'_> {
             type Out = Box<dyn Model>;
             fn visit<B: Bsdf<'static>>(self) -> Box<dyn Model> {
-                let inputs = Inputs8 { material: U32x8::splat(1), reflectance: self.0.packed() };
-                boxed(B::gather(&self.0.scene, &inputs, Mask8::all_lanes()), Straight::Apart)
+                let (scene, inputs) = self.0.inputs();
+                boxed(B::gather(&scene, &inputs, Mask8::all_lanes()), Straight::Apart)
             }
         }
         dispatch(MaterialKind::Principled, Boxed(self))

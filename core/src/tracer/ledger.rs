@@ -11,11 +11,11 @@
 //! contain it are incomplete, so they are not logged either. Nothing else changes; the image never passes through here.
 
 use super::free_list::FreeList;
-use crate::memory::{Carver, Measure, MemoryError};
+use crate::memory::{Carver, Layout, Measure, MemoryError};
 use bytemuck::{Pod, Zeroable};
 
 /// No record.
-pub(crate) const NO_RECORD: u32 = u32::MAX;
+pub const NO_RECORD: u32 = u32::MAX;
 
 /// Part of a sample's estimate is missing.
 const INCOMPLETE: u32 = 1 << 31;
@@ -52,7 +52,7 @@ struct LedgerRecord {
 
 /// A finished sample on its way to the statistics.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Finished {
+pub struct Finished {
     /// Where it is logged.
     pub bin: u32,
     /// Scaled estimate, rgb.
@@ -65,14 +65,29 @@ pub(crate) struct Finished {
     pub pair: Option<[f32; 3]>,
 }
 
-/// A fixed slab of records; no slot at all if nothing learns.
+/// A fixed slab of records of unfinished samples; no slot at all if nothing learns. Slots are numbers that [`Self::open`]
+/// gave and that were not closed; others name records that may be anyone's.
 #[derive(Debug)]
-pub(crate) struct Ledger<'m> {
+pub struct Ledger<'m> {
     records: &'m mut [LedgerRecord],
     free: FreeList<'m>,
 }
 
 impl<'m> Ledger<'m> {
+    /// Layout of a block for `capacity` records; `None` if that is not addressable.
+    pub fn layout(capacity: usize) -> Option<Layout> {
+        Self::measure(Measure::new(), capacity).layout()
+    }
+
+    /// A ledger of `capacity` records, all free, in the caller's memory.
+    pub fn new(capacity: usize, block: &'m mut [u8]) -> Result<Self, MemoryError> {
+        let unaddressable = MemoryError::TooSmall { needed: usize::MAX, given: block.len() };
+        let layout = Self::layout(capacity).ok_or(unaddressable)?;
+        let mut ledger = Self::carve(&mut Carver::new(block, layout)?, capacity)?;
+        ledger.reset();
+        Ok(ledger)
+    }
+
     pub(crate) fn measure(m: Measure, capacity: usize) -> Measure {
         FreeList::measure(m.add::<LedgerRecord>(capacity), capacity)
     }
@@ -102,7 +117,7 @@ impl<'m> Ledger<'m> {
     }
 
     /// A record for a sample with one open lane, `with_nee` if it draws a light sample; [`NO_RECORD`] if the slab is full.
-    pub(crate) fn open(&mut self, parent: u32, with_nee: bool) -> u32 {
+    pub fn open(&mut self, parent: u32, with_nee: bool) -> u32 {
         let Some(slot) = self.free.take() else { return NO_RECORD };
         let open = if with_nee { 1 | WITH_NEE } else { 1 };
         let Some(record) = self.records.get_mut(slot as usize) else { return NO_RECORD };
@@ -115,15 +130,15 @@ impl<'m> Ledger<'m> {
     }
 
     /// `lanes` samples of the vertex that the sample led to are drawn; `drained` if they are its last.
-    pub(crate) fn draw(&mut self, slot: u32, lanes: u32, drained: bool) {
+    pub fn draw(&mut self, slot: u32, lanes: u32, drained: bool) {
         if let Some(r) = self.get(slot) {
-            r.open += lanes - u32::from(drained);
+            r.open = r.open.wrapping_add(lanes).wrapping_sub(u32::from(drained));
         }
     }
 
     /// Adds to a sample's estimate.
     #[inline(always)]
-    pub(crate) fn accumulate(&mut self, slot: u32, radiance: [f32; 3]) {
+    pub fn accumulate(&mut self, slot: u32, radiance: [f32; 3]) {
         if let Some(r) = self.get(slot) {
             for (sum, x) in r.radiance.iter_mut().zip(radiance) {
                 *sum += x;
@@ -133,7 +148,7 @@ impl<'m> Ledger<'m> {
 
     /// Charges a ray to a sample.
     #[inline(always)]
-    pub(crate) fn charge(&mut self, slot: u32, cost: f32) {
+    pub fn charge(&mut self, slot: u32, cost: f32) {
         if let Some(r) = self.get(slot) {
             r.cost += cost;
         }
@@ -141,7 +156,7 @@ impl<'m> Ledger<'m> {
 
     /// The bounce has ended at a vertex: where its samples are logged, times what, and what they count.
     #[inline(always)]
-    pub(crate) fn arrive(&mut self, slot: u32, bin: u32, scale: [f32; 3], inner: [f32; 3]) {
+    pub fn arrive(&mut self, slot: u32, bin: u32, scale: [f32; 3], inner: [f32; 3]) {
         if let Some(r) = self.get(slot) {
             (r.bin, r.scale, r.inner) = (bin, scale, inner);
         }
@@ -162,9 +177,9 @@ impl<'m> Ledger<'m> {
     /// Closes a lane or a drained vertex of a sample. If that finishes it, and perhaps the samples it is part of, `log`
     /// is called for each.
     #[inline]
-    pub(crate) fn close(&mut self, mut slot: u32, mut log: impl FnMut(Finished)) {
+    pub fn close(&mut self, mut slot: u32, mut log: impl FnMut(Finished)) {
         while let Some(r) = self.records.get_mut(slot as usize) {
-            r.open -= 1;
+            r.open = r.open.wrapping_sub(1);
             if r.open & OPEN > 0 {
                 return;
             }

@@ -60,6 +60,7 @@ mod trace;
 mod vertex;
 
 pub(crate) use job::Job;
+pub use ledger::{Finished, Ledger, NO_RECORD};
 pub(crate) use media_set::media_at;
 pub use occlude::MAX_PASSED;
 pub use save::SavedShardError;
