@@ -51,6 +51,32 @@ impl Table {
     pub fn row(&self, key: &[&str]) -> Option<&[String]> {
         self.rows.iter().find(|r| key.iter().zip(*r).all(|(k, c)| k == c)).map(|r| &**r)
     }
+
+    /// Compares each row with that of a committed table that begins with the same `keys` cells: figures of these columns
+    /// that are more than `percent` above the committed ones, as text.
+    ///
+    /// # Errors
+    /// A row or column that the committed table has not, or a cell that is no number.
+    pub fn risen(&self, old: &Self, keys: usize, columns: &[&str], percent: f64) -> Result<Vec<String>, String> {
+        let mut risen = Vec::new();
+        for row in &self.rows {
+            let key: Vec<&str> = row.iter().take(keys).map(|c| &**c).collect();
+            let old_row = old.row(&key).ok_or_else(|| format!("{key:?}: not in the committed results"))?;
+            for column in columns {
+                let figure = |table: &Self, cells: &[String]| {
+                    let cell = table.column(column).and_then(|k| cells.get(k)).ok_or("there is no such column")?;
+                    cell.parse::<f64>().map_err(|_| format!("'{cell}' is no number"))
+                };
+                let of = |table, cells| figure(table, cells).map_err(|e| format!("{key:?}, '{column}': {e}"));
+                let (new, old) = (of(self, row)?, of(old, old_row)?);
+                if new > old * (1.0 + percent / 100.0) {
+                    let change = 100.0 * (new / old - 1.0);
+                    risen.push(format!("{}, {column}: {old} -> {new} ({change:+.2} %)", key.join(", ")));
+                }
+            }
+        }
+        Ok(risen)
+    }
 }
 
 impl fmt::Display for Table {

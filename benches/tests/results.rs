@@ -35,6 +35,28 @@ fn results_are_read_as_they_were_written() {
 
 /// Every way to write a marker. Killed by: figures that are counted without being compared, rows and columns that are
 /// not exchanged, names that are not replaced.
+/// Killed by: a tolerance on the wrong side, columns or rows that are not looked at or not found, rows that are compared
+/// with others.
+#[test]
+fn figures_that_rise_are_found() {
+    let table = |rows: &[[&str; 4]]| {
+        let mut table = Table::new("", "scene, strategy, rays, instructions");
+        rows.iter().for_each(|r| table.add(*r));
+        table
+    };
+    let old = table(&[["box", "none", "16", "1000"], ["box", "ears", "16", "2000"]]);
+    let risen = |rows: &[[&str; 4]], columns: &[&str]| table(rows).risen(&old, 2, columns, 2.0);
+    let both = ["rays", "instructions"];
+    assert_eq!(risen(&[["box", "ears", "16", "2040"], ["box", "none", "3", "1020"]], &both), Ok(vec![]));
+    let above = risen(&[["box", "none", "16", "1000"], ["box", "ears", "17", "2041"]], &both).unwrap();
+    assert_eq!(above, ["box, ears, rays: 16 -> 17 (+6.25 %)", "box, ears, instructions: 2000 -> 2041 (+2.05 %)"]);
+    assert_eq!(risen(&[["box", "ears", "17", "2041"]], &["rays"]).unwrap().len(), 1);
+    let error = |rows: &[[&str; 4]], column| risen(rows, &[column]).unwrap_err();
+    assert!(error(&[["hall", "ears", "1", "1"]], "rays").contains("hall"));
+    assert!(error(&[["box", "ears", "1", "1"]], "rats").contains("'rats': there is no such column"));
+    assert!(error(&[["box", "ears", "1", "some"]], "instructions").contains("'some' is no number"));
+}
+
 #[test]
 fn figures_that_agree_are_counted() {
     let document = "\

@@ -18,8 +18,14 @@ struct Args {
     /// Folder with the scene `kitchen`; what is not there is skipped.
     #[arg(long, default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/scenes"))]
     scenes: PathBuf,
-    /// Write benches/results/latency.md.
+    /// Only this scene.
     #[arg(long)]
+    only: Option<String>,
+    /// Compare with benches/results/latency.md; exit status 1 if a figure of a row has risen by more than 2 %.
+    #[arg(long)]
+    check: bool,
+    /// Write benches/results/latency.md.
+    #[arg(long, conflicts_with_all = ["check", "only"])]
     write: bool,
     /// Render this blob with `--strategy` and print the rays of each step: what the program runs under valgrind.
     #[arg(long, hide = true, requires = "strategy")]
@@ -36,6 +42,8 @@ const PIXELS: f64 = 1024.0;
 /// Samples per pixel of the iterations. The last, with learned factors, is measured.
 const ITERATIONS: [u32; 3] = [2, 2, 1];
 const COLUMNS: &str = "scene, strategy, steps, rays of the longest, instructions of the longest, of the mean";
+/// Columns that must not rise, and by how many per cent they may.
+const CHECKED: ([&str; 3], f64) = (["rays of the longest", "instructions of the longest", "of the mean"], 2.0);
 
 /// Renders, and prints the rays of each measured step.
 fn render(blob: &Path, strategy: &str) -> Result<(), Box<dyn Error>> {
@@ -73,9 +81,15 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         return Ok(true);
     }
     let mut results = Results::of_this_run(NAME);
+    let committed = if args.check { Some(Results::read(NAME)?) } else { None };
+    let difference = committed.as_ref().and_then(|c| results.differs_in(c, &["instruction set", "arithmetic"]));
+    if let Some(difference) = difference {
+        println!("skipped: the {difference}");
+        return Ok(true);
+    }
     let folder = Folder::new(NAME)?;
     let mut table = Table::new("", COLUMNS);
-    for scene in SCENES {
+    for scene in SCENES.into_iter().filter(|s| args.only.as_deref().is_none_or(|only| only == *s)) {
         let Some(found) = callgrind::description(scene, &args.scenes)? else { continue };
         let blob = folder.bake(scene, &found)?;
         for strategy in STRATEGIES {
@@ -89,7 +103,23 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
             table.add(row);
         }
     }
+    if table.rows.is_empty() {
+        return Err("no row fits".into());
+    }
+    if let Some(committed) = &committed {
+        let old = committed.tables.first().ok_or("no table in the committed results")?;
+        let risen = table.risen(old, 2, &CHECKED.0, CHECKED.1)?;
+        risen.iter().for_each(|figure| println!("RISEN {figure}"));
+        println!("{} rows of benches/results/{NAME}.md checked, {} figures above it", table.rows.len(), risen.len());
+        if !risen.is_empty() {
+            println!("if that is meant: cargo run --release -p croupier-benches --bin {NAME} -- --write");
+        }
+        return Ok(risen.is_empty());
+    }
     if args.write {
+        if table.rows.len() < SCENES.len() * STRATEGIES.len() {
+            return Err("only a run of all scenes may replace the committed results".into());
+        }
         results.header.push(("picture".into(), format!("about {PIXELS} pixels, one shard, budget of one ray")));
         results.header.push(("valgrind".into(), provenance::version_of("valgrind")));
         results.tables.push(table);

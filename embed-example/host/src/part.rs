@@ -15,7 +15,7 @@
 
 use crate::blob::AlignedBytes;
 use crate::checkpoint::{describe, version};
-use crate::drive::{Part, Rendered, planes, save};
+use crate::drive::{Part, Rendered, Target, planes, save};
 use crate::image::{ImageError, write_whole};
 use crate::text;
 use bytemuck::{Pod, Zeroable};
@@ -32,7 +32,7 @@ use std::{error, fmt};
 pub const MAGIC: [u8; 8] = *b"CRPRPART";
 
 /// Version of the layout of this module.
-const LAYOUT: u32 = 1;
+const LAYOUT: u32 = 2;
 
 /// Most bytes of texts that are read.
 const MAX_TEXT: u64 = 1 << 26;
@@ -64,7 +64,8 @@ struct Head {
     bounds: [[f32; 3]; 2],
     /// Exposure of the PNG in stops; NaN for what suits the picture.
     exposure: f32,
-    reserved: u32,
+    /// Samples per pixel of the whole picture; 0 if the target was another.
+    total: u32,
 }
 
 /// Statistics of a pixel in a file.
@@ -111,6 +112,8 @@ pub enum FileError {
     Length(u64, u64),
     /// The bytes are not those that were written.
     Damaged,
+    /// Another file than when its head was read.
+    Replaced,
     /// Written by another version: that of the file, and this one.
     Version(String, String),
 }
@@ -125,6 +128,7 @@ impl fmt::Display for FileError {
             }
             Self::Length(stated, found) => write!(f, "the part has {found} bytes, it states {stated}"),
             Self::Damaged => f.write_str("the part is damaged"),
+            Self::Replaced => f.write_str("the part was replaced while it was merged"),
             Self::Version(there, here) => {
                 write!(f, "the part was written by version {}, this is {here}", text::excerpt(there))
             }
@@ -140,7 +144,8 @@ pub enum MergeError {
     File(PathBuf, FileError),
     /// Two files are of different scenes: their content hashes.
     Scene(PathBuf, u64, PathBuf, u64),
-    /// Two files differ in a setting, or in the number of parts: its name, and values of both.
+    /// Two files differ in a setting, in the number of parts or in the samples of the whole picture: its name, and values
+    /// of both.
     Setting(String, PathBuf, String, PathBuf, String),
     /// Two files hold the same part: its number.
     Twice(u32, PathBuf, PathBuf),
@@ -168,7 +173,7 @@ impl fmt::Display for MergeError {
             }
             Self::Twice(part, a, b) => write!(f, "{} and {} both hold part {part}", name(a), name(b)),
             Self::Overlap(sample, a, b) => {
-                write!(f, "{} and {} both hold sample {sample} of each pixel: other --spp?", name(a), name(b))
+                write!(f, "{} and {} both hold sample {sample} of each pixel", name(a), name(b))
             }
             Self::Missing(first, 1, of) => write!(f, "part {first} of {of} is missing"),
             Self::Missing(first, n, of) => {
@@ -239,8 +244,8 @@ fn head_hash(head: &Head, text: &str, names: &str) -> u64 {
     hash_of([bytemuck::bytes_of(&head), text.as_bytes(), names.as_bytes()].into_iter())
 }
 
-/// Writes a part of a picture. The file appears under its name when it is complete. `exposure` is for the PNG, in stops,
-/// `None` for what suits the picture.
+/// Writes a part of a picture whose target is `target`. The file appears under its name when it is complete. `exposure`
+/// is for the PNG, in stops, `None` for what suits the picture.
 ///
 /// # Errors
 /// Those of writing the file.
@@ -249,6 +254,7 @@ pub fn write(
     scene: &Scene<'_>,
     settings: &Settings,
     part: Part,
+    target: Target,
     rendered: &Rendered,
     exposure: Option<f32>,
 ) -> Result<(), ImageError> {
@@ -275,7 +281,7 @@ pub fn write(
         counters: rendered.counters,
         bounds: [scene.info.bounds_min, scene.info.bounds_max],
         exposure: exposure.unwrap_or(f32::NAN),
-        reserved: 0,
+        total: if let Target::Spp(samples) = target { samples } else { 0 },
     };
     head.hash = head_hash(&head, &text, &names);
     let failed = |e| ImageError::Write(path.into(), e);
@@ -288,16 +294,20 @@ pub fn write(
 /// Pixels, planes and statistics of the scene.
 type Body = (Vec<SavedPixel>, Vec<f32>, Vec<u8>);
 
-/// A file whose head and texts are read and checked.
+/// A file whose head and texts were read and checked. It is closed: there may be more parts than files may be open.
 #[derive(Debug)]
-struct Opened {
+struct Checked {
     path: PathBuf,
     head: Head,
     part: Part,
+}
+
+/// What all parts of a picture have in common.
+#[derive(Debug)]
+struct Common {
     text: String,
     settings: Settings,
     names: Names,
-    rest: BufReader<File>,
 }
 
 /// Text of exactly so many bytes.
@@ -307,8 +317,8 @@ fn read_text(from: &mut impl Read, bytes: u64) -> Result<String, FileError> {
     String::from_utf8(text).map_err(|_| FileError::Damaged)
 }
 
-impl Opened {
-    fn open(path: &Path) -> Result<Self, FileError> {
+impl Checked {
+    fn new(path: &Path) -> Result<(Self, Common), FileError> {
         // Opening a pipe waits for its other end: look first.
         let found = fs::metadata(path)?;
         if !found.is_file() {
@@ -364,19 +374,26 @@ impl Opened {
         if head.pixels != width * height || head.planes != planes.sum::<u64>() {
             return Err(FileError::Damaged);
         }
-        Ok(Self { path: path.into(), head, part, text, settings, names, rest })
+        Ok((Self { path: path.into(), head, part }, Common { text, settings, names }))
     }
 
     /// Reads what follows the texts, and checks it.
-    fn body(&mut self) -> Result<Body, FileError> {
+    fn body(&self) -> Result<Body, FileError> {
         let h = &self.head;
+        let (mut rest, mut head) = (BufReader::new(File::open(&self.path)?), Head::zeroed());
+        let read = rest.read_exact(bytemuck::bytes_of_mut(&mut head));
+        // its hash is that of the texts, too
+        if read.is_err() || bytemuck::bytes_of(&head) != bytemuck::bytes_of(h) {
+            return Err(FileError::Replaced);
+        }
+        rest.seek_relative((h.text_bytes + h.names_bytes) as i64)?;
         // all bounded by the length of the file
         let mut pixels = vec![SavedPixel::zeroed(); h.pixels as usize];
         let mut planes = vec![0.0f32; (h.pixels * h.planes) as usize];
         let mut cache = vec![0; h.cache_bytes as usize];
-        self.rest.read_exact(bytemuck::cast_slice_mut(&mut pixels))?;
-        self.rest.read_exact(bytemuck::cast_slice_mut(&mut planes))?;
-        self.rest.read_exact(&mut cache)?;
+        rest.read_exact(bytemuck::cast_slice_mut(&mut pixels))?;
+        rest.read_exact(bytemuck::cast_slice_mut(&mut planes))?;
+        rest.read_exact(&mut cache)?;
         let rows = planes.chunks_exact((h.pixels as usize).max(1)).map(bytes_of);
         let found = hash_of([bytes_of(&pixels)].into_iter().chain(rows).chain([&cache[..]]));
         if found == h.body_hash { Ok((pixels, planes, cache)) } else { Err(FileError::Damaged) }
@@ -390,19 +407,24 @@ impl Opened {
 }
 
 /// Checks that two files are of one picture.
-fn fit(a: &Opened, b: &Opened) -> Result<(), MergeError> {
+fn fit((a, common): (&Checked, &Common), (b, others): (&Checked, &Common)) -> Result<(), MergeError> {
     let (x, y) = (a.path.clone(), b.path.clone());
     if a.head.scene != b.head.scene {
         return Err(MergeError::Scene(x, a.head.scene, y, b.head.scene));
     }
-    if let Some((line, other)) = a.text.lines().zip(b.text.lines()).find(|(line, other)| line != other) {
+    if let Some((line, other)) = common.text.lines().zip(others.text.lines()).find(|(line, other)| line != other) {
         let [(name, value), (_, other)] = [line, other].map(|l| l.split_once('=').unwrap_or((l, "none")));
         return Err(MergeError::Setting(name.into(), x, value.into(), y, other.into()));
     }
     if a.part.of() != b.part.of() {
         return Err(MergeError::Setting("part".into(), x, a.part.to_string(), y, b.part.to_string()));
     }
-    Ok(())
+    match [a.head.total, b.head.total] {
+        [m, n] if m == n => Ok(()),
+        [0, n] => Err(MergeError::Setting("spp".into(), y, n.to_string(), x, "another target".into())),
+        [m, 0] => Err(MergeError::Setting("spp".into(), x, m.to_string(), y, "another target".into())),
+        [m, n] => Err(MergeError::Setting("spp".into(), x, m.to_string(), y, n.to_string())),
+    }
 }
 
 /// A picture from all of its parts.
@@ -425,10 +447,15 @@ pub struct Merged {
 /// # Errors
 /// Files that are not all parts of one picture, each once; the text names them and what differs.
 pub fn merge(paths: &[PathBuf]) -> Result<Merged, MergeError> {
-    let open = |p: &PathBuf| Opened::open(p).map_err(|e| MergeError::File(p.clone(), e));
-    let mut parts = paths.iter().map(open).collect::<Result<Vec<_>, _>>()?;
-    let (first, others) = parts.split_first().ok_or(MergeError::Nothing)?;
-    others.iter().try_for_each(|other| fit(first, other))?;
+    let check = |p: &PathBuf| Checked::new(p).map_err(|e| MergeError::File(p.clone(), e));
+    let (first, others) = paths.split_first().ok_or(MergeError::Nothing)?;
+    let (first, common) = check(first)?;
+    let mut parts = vec![first];
+    for path in others {
+        let (part, others) = check(path)?;
+        fit((&parts[0], &common), (&part, &others))?;
+        parts.push(part);
+    }
     parts.sort_by_key(|p| p.part.number());
     for pair in parts.windows(2) {
         let (a, b) = (&pair[0], &pair[1]);
@@ -447,12 +474,12 @@ pub fn merge(paths: &[PathBuf]) -> Result<Merged, MergeError> {
     if let Some(n) = missing.first() {
         return Err(MergeError::Missing(*n, missing.len(), of));
     }
-    add(&mut parts)
+    add(&parts, common)
 }
 
 /// Adds parts that fit.
-fn add(parts: &mut [Opened]) -> Result<Merged, MergeError> {
-    let settings = parts[0].settings;
+fn add(parts: &[Checked], common: Common) -> Result<Merged, MergeError> {
+    let Common { settings, names, .. } = common;
     let damaged = |path: &Path| MergeError::File(path.into(), FileError::Damaged);
     let path = parts[0].path.clone();
     let plan = Plan::new(&settings).map_err(|_| damaged(&path))?;
@@ -474,7 +501,7 @@ fn add(parts: &mut [Opened]) -> Result<Merged, MergeError> {
         None => None,
     };
     let (mut counters, mut seconds, mut spp) = (Counters::default(), 0.0, 0u32);
-    for part in parts.iter_mut() {
+    for part in parts {
         let (pixels, planes, saved) = part.body().map_err(|e| MergeError::File(part.path.clone(), e))?;
         let plane = |n: usize, pixel: usize| planes.get(n * pixels.len() + pixel).copied().unwrap_or(0.0);
         film.add(|i| pixels[i].stats(), plane);
@@ -509,5 +536,35 @@ fn add(parts: &mut [Opened]) -> Result<Merged, MergeError> {
     };
     let head = &parts[0].head;
     let exposure = Some(head.exposure).filter(|x| x.is_finite());
-    Ok(Merged { rendered, settings, names: parts[0].names.clone(), exposure, stopped })
+    Ok(Merged { rendered, settings, names, exposure, stopped })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bake::{BakeOptions, bake};
+    use crate::builtin;
+    use crate::drive::{Options, Unobserved, drive_scene};
+
+    /// Killed by: a body that is read without a look at the head before it.
+    #[test]
+    fn a_part_that_is_replaced_is_refused() {
+        let bytes = bake(&builtin::cornell_box(), &BakeOptions::default(), |_, _| {}).unwrap().bytes;
+        let folder = tempfile::tempdir().unwrap();
+        let (scene, path) = (Scene::from_bytes(&bytes).unwrap(), folder.path().join("part"));
+        let settings = Settings { size: [4, 4], ..Settings::for_scene(&scene) };
+        let save = |number| {
+            let (part, target) = (Part::new(number, 2).unwrap(), Target::Spp(2));
+            let options = Options { threads: 1, part: Some(part), ..Options::new(settings, target) };
+            let rendered = drive_scene(scene, &options, &Unobserved).unwrap();
+            write(&path, &scene, &settings, part, target, &rendered, None).unwrap();
+        };
+        save(1);
+        let (checked, _) = Checked::new(&path).unwrap();
+        assert!(checked.body().is_ok());
+        save(2);
+        assert!(matches!(checked.body(), Err(FileError::Replaced)));
+        fs::write(&path, []).unwrap();
+        assert!(matches!(checked.body(), Err(FileError::Replaced)));
+    }
 }

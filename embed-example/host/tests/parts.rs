@@ -15,6 +15,8 @@ use croupier_host::part::{FileError, MergeError, merge, write};
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+#[cfg(unix)]
+use std::process::Command;
 
 fn cornell() -> AlignedBytes {
     bake(&builtin::cornell_blocks(), &BakeOptions::default(), |_, _| {}).unwrap().bytes
@@ -32,10 +34,15 @@ fn part(number: u32, of: u32) -> Option<Part> {
     Part::new(number, of)
 }
 
-fn render(scene: Scene<'_>, settings: Settings, spp: u32, part: Option<Part>) -> Rendered {
+fn render(scene: Scene<'_>, settings: Settings, target: Target, part: Option<Part>) -> Rendered {
     let save_cache = settings.strategy.name() == "ears";
-    let options = Options { threads: 1, part, save_cache, ..Options::new(settings, Target::Spp(spp)) };
+    let options = Options { threads: 1, part, save_cache, ..Options::new(settings, target) };
     drive_scene(scene, &options, &Unobserved).unwrap()
+}
+
+/// Renders and writes a part of a picture.
+fn save(path: &Path, scene: Scene<'_>, settings: Settings, target: Target, part: Part) {
+    write(path, &scene, &settings, part, target, &render(scene, settings, target, Some(part)), None).unwrap();
 }
 
 /// Renders and writes all parts; their files.
@@ -43,7 +50,7 @@ fn parts(folder: &Path, scene: Scene<'_>, settings: Settings, spp: u32, of: u32)
     let one = |number: u32| {
         let path = folder.join(format!("{number}.crpart"));
         let part = Part::new(number, of).unwrap();
-        write(&path, &scene, &settings, part, &render(scene, settings, spp, Some(part)), None).unwrap();
+        save(&path, scene, settings, Target::Spp(spp), part);
         path
     };
     (1..=of).map(one).collect()
@@ -56,7 +63,7 @@ fn parts_have_the_samples_of_one_render() {
     let (bytes, folder) = (cornell(), tempfile::tempdir().unwrap());
     let scene = Scene::from_bytes(&bytes).unwrap();
     let settings = settings(&scene, "none");
-    let whole = render(scene, settings, 17, None);
+    let whole = render(scene, settings, Target::Spp(17), None);
     for of in [1, 5, 17] {
         let merged = merge(&parts(folder.path(), scene, settings, 17, of)).unwrap().rendered;
         assert_eq!((merged.spp, merged.counters.rays()), (17, whole.counters.rays()));
@@ -86,7 +93,7 @@ fn the_mean_of_learning_parts_is_unbiased() {
     let (bytes, folder) = (cornell(), tempfile::tempdir().unwrap());
     let scene = Scene::from_bytes(&bytes).unwrap();
     let settings = settings(&scene, "ears");
-    let reference = render(scene, Settings { seed: 99, ..settings }, 2048, None);
+    let reference = render(scene, Settings { seed: 99, ..settings }, Target::Spp(2048), None);
     let merged = merge(&parts(folder.path(), scene, settings, 128, 8)).unwrap().rendered;
     let mean = |r: &Rendered| r.pixels.iter().flat_map(|p| p.mean()).sum::<f64>() / (3 * r.pixels.len()) as f64;
     let squares: f64 = [&reference, &merged]
@@ -159,8 +166,7 @@ fn parts_that_do_not_fit_are_refused_by_name() {
     let files = parts(folder.path(), scene, plain, 6, 3);
     let other = |name: &str, scene: Scene<'_>, settings: Settings, spp: u32, number: u32, of: u32| {
         let path = folder.path().join(name);
-        let part = Part::new(number, of).unwrap();
-        write(&path, &scene, &settings, part, &render(scene, settings, spp, Some(part)), None).unwrap();
+        save(&path, scene, settings, Target::Spp(spp), Part::new(number, of).unwrap());
         path
     };
     let refused = |files: &[PathBuf]| merge(files).map(|_| ()).unwrap_err().to_string();
@@ -173,14 +179,47 @@ fn parts_that_do_not_fit_are_refused_by_name() {
     assert!(with(files[0].clone()).contains("both hold part 1"));
     let n = with(other("four", scene, plain, 6, 2, 4));
     assert!(n.contains("--part 1/3") && n.contains("with 2/4"), "{n}");
-    let overlap = with(other("spp", scene, plain, 3, 2, 3));
-    assert!(overlap.contains("1.crpart and") && overlap.contains("both hold sample 1"), "{overlap}");
+    // totals with which parts have samples in common, or leave some out
+    for spp in [3, 12] {
+        let e = with(other("spp", scene, plain, spp, 2, 3));
+        assert!(e.contains("1.crpart was rendered with --spp 6, ") && e.ends_with(&format!("spp with {spp}")), "{e}");
+    }
+    let rays = folder.path().join("rays");
+    save(&rays, scene, plain, Target::Rays(1000), Part::new(2, 3).unwrap());
+    for order in [[&files[0], &rays], [&rays, &files[0]]] {
+        let e = refused(&order.map(Clone::clone));
+        assert!(e.contains("1.crpart was rendered with --spp 6, ") && e.ends_with("with another target"), "{e}");
+    }
+    // parts that end by rays have room for 65535 samples where there are 65536 of them
+    let long = [1, 2].map(|number| {
+        let path = folder.path().join(format!("long-{number}"));
+        let (part, target) = (Part::new(number, 1 << 16).unwrap(), Target::Rays(1));
+        let rendered = Rendered { spp: 1 << 16, ..render(scene, plain, target, Some(part)) };
+        write(&path, &scene, &plain, part, target, &rendered, None).unwrap();
+        path
+    });
+    let overlap = refused(&long);
+    assert!(overlap.contains("both hold sample 65535"), "{overlap}");
     let mut description = builtin::cornell_blocks();
     description.camera.vfov_deg += 1.0;
     let moved = bake(&description, &BakeOptions::default(), |_, _| {}).unwrap().bytes;
     let scenes = with(other("moved", Scene::from_bytes(&moved).unwrap(), plain, 6, 2, 3));
     assert!(scenes.contains("are of different scenes"), "{scenes}");
     assert!(matches!(merge(&[]), Err(MergeError::Nothing)));
+}
+
+/// A program may have fewer files open than a picture has parts. Killed by: files that stay open until all are added.
+#[test]
+#[cfg(unix)]
+fn many_parts_need_few_open_files() {
+    let (bytes, folder) = (cornell(), tempfile::tempdir().unwrap());
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    let settings = Settings { size: [4, 4], shards: 1, ..settings(&scene, "none") };
+    parts(folder.path(), scene, settings, 64, 64);
+    let merge = ["-c", "ulimit -n 32 && exec \"$0\" merge *.crpart", env!("CARGO_BIN_EXE_croupier")];
+    let done = Command::new("sh").args(merge).current_dir(folder.path()).output().unwrap();
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    assert!(text(&done.stdout).contains("64 parts: 64.0 samples per pixel"), "{}", text(&done.stdout));
 }
 
 /// Killed by: a length that is believed, bytes that no hash covers.

@@ -190,13 +190,22 @@ export const REFERENCE = {
   iterations: [2, 2, 4],
 };
 
-/** Renders that picture; its hash. */
-export function renderReference(core, blob) {
+/** Renders that picture in short calls, between which it yields; its hash. */
+export function* referenceSteps(core, blob) {
   const picture = new Picture(core, new Scene(core, blob), REFERENCE.settings);
   for (const samples of REFERENCE.iterations) {
     picture.begin(samples);
-    while (!picture.step(1000));
-    while (!picture.finish(1000));
+    while (!picture.step(1000)) yield;
+    while (!picture.finish(1000)) yield;
   }
   return hash(picture.show(PLANE.picture));
+}
+
+/** Renders that picture at once; its hash. */
+export function renderReference(core, blob) {
+  const steps = referenceSteps(core, blob);
+  for (;;) {
+    const { done, value } = steps.next();
+    if (done) return value;
+  }
 }

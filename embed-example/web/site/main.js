@@ -1,7 +1,7 @@
 // The page: canvas, controls, and where rays are traced. Frames and workers share `Engine`; `Crowd` speaks to the
 // workers.
 
-import { Core, PLANE, Painter, renderReference } from './croupier.js';
+import { Core, PLANE, Painter, referenceSteps } from './croupier.js';
 import { Engine } from './engine.js';
 import { Crowd } from './crowd.js';
 import { Composer } from './compose.js';
@@ -32,12 +32,16 @@ const LEARNS = (rrs) => rrs === 'ears' || rrs === 'adrrs';
 const state = {
   scene: null, blob: null, about: '', gain: 1, orbit: null,
   rrs: 'ears', plane: 'picture', depth: 1, workers: 0, target: 0.01,
-  size: [0, 0], moved: 0, moving: false, shownAt: 0, paints: 0,
+  size: [0, 0], moved: 0, moving: false, shownAt: 0, paints: 0, previews: 0,
+  /** Whether the preview does not show the plane that is asked for. */
+  stale: false,
 };
 let module, preview, fine, painter, crowd, composer;
 /** Finished curves of this view by strategy. */
 let curves = {};
 let previewPixels = 9000;
+/** What works in place of the fine picture, up to a time. */
+let aside = null;
 
 // --- what is rendered ---
 
@@ -111,6 +115,8 @@ function frame(now) {
   if (!state.orbit) return;
   try {
     if (state.moving) framePreview(started);
+    else if (state.stale) framePlane();
+    else if (aside) aside(started + SLICE);
     else if (crowd) frameCrowd(started);
     else frameFine(started);
   } catch (error) {
@@ -134,6 +140,11 @@ function framePreview(started) {
   if (resting && preview.samples >= 2) rest();
 }
 
+/** The preview of another plane, before the fine picture goes on. */
+function framePlane() {
+  if (preview.work(SLICE)) paintPreview();
+}
+
 /** As many pixels as can be done in time. */
 function fitPreview() {
   const { rays } = preview.result;
@@ -150,6 +161,8 @@ function paintPreview() {
   const factors = state.plane === 'factors';
   const shown = preview.picture.show(factors ? plane() : PLANE.denoised) ?? preview.picture.show(PLANE.picture);
   put($('preview'), painter.paint([shown], width, height, { factors, gain: state.gain }));
+  state.stale = false;
+  document.documentElement.dataset.previews = ++state.previews;
 }
 
 function frameFine(started) {
@@ -341,8 +354,7 @@ function listen() {
     describe();
     crowd?.show(plane());
     openPreview();
-    while (!preview.work(50));
-    paintPreview();
+    state.stale = true;
     // a plane of the fine picture is there at once, of workers with the next message
     if (!crowd && !state.moving && fine.samples > 0 && fine.showable()) paint([fine.picture.show(plane())]);
     else $('fine').classList.remove('there');
@@ -380,14 +392,43 @@ function listen() {
     }, 200);
   }).observe($('stage'));
 
-  $('check').addEventListener('click', async () => {
+  $('check').addEventListener('click', () => check().catch((e) => problem(e.message)));
+}
+
+/** Renders the picture of every host and compares its hash. */
+async function check() {
+  $('check').disabled = true;
+  $('checked').className = 'note';
+  try {
     const expected = new TextDecoder().decode(await fetched('hashes.txt')).match(/^A (\w+)$/m)[1];
-    const found = renderReference(await Core.create(module), await fetched('scenes/box.crp'));
+    const found = await betweenFrames(referenceSteps(await Core.create(module), await fetched('scenes/box.crp')));
     const same = found === expected;
-    $('checked').className = `note ${same ? 'same' : 'different'}`;
     $('checked').textContent = same
       ? `A picture of 64 × 64 pixels after three iterations of EARS has the hash ${found} here, as on every host.`
       : `Hash ${found}; the native library has ${expected}.`;
+    $('checked').className = `note ${same ? 'same' : 'different'}`;
+  } finally {
+    $('check').disabled = false;
+  }
+}
+
+/** Runs what yields between short calls, in place of the fine picture; what it returns. */
+function betweenFrames(steps) {
+  return new Promise((resolve, reject) => {
+    aside = (end) => {
+      try {
+        for (let step = steps.next(); ; step = steps.next()) {
+          if (step.done) {
+            aside = null;
+            return resolve(step.value);
+          }
+          if (performance.now() >= end) return;
+        }
+      } catch (error) {
+        aside = null;
+        reject(error);
+      }
+    };
   });
 }
 

@@ -20,24 +20,44 @@ let busy = false;
 const channel = new MessageChannel();
 channel.port1.onmessage = slice;
 
-onmessage = async ({ data }) => {
-  try {
-    if (data.module) engine = new Engine(await Core.create(data.module));
-    if (data.plane !== undefined) [plane, shownAt] = [data.plane, 0];
-    if (data.blob) engine.open(data.blob, data.settings);
-    if (data.camera) engine.look(data.camera);
-    if (data.generation !== undefined) [generation, shownAt] = [data.generation, 0];
-    if (data.stop) return close();
-    if (engine?.picture && !busy) {
-      busy = true;
-      channel.port2.postMessage(null);
-    }
-  } catch (error) {
-    postMessage({ error: error.message });
-  }
+// One message after the other, also where one has to wait for the module.
+let turn = Promise.resolve();
+onmessage = ({ data }) => {
+  turn = turn.then(() => take(data)).catch(complain);
 };
 
+function complain(error) {
+  postMessage({ error: error.message });
+}
+
+async function take(data) {
+  if (data.module) engine = new Engine(await Core.create(data.module));
+  if (data.plane !== undefined) [plane, shownAt] = [data.plane, 0];
+  if (data.blob) engine.open(data.blob, data.settings);
+  if (data.camera) engine.look(data.camera);
+  if (data.generation !== undefined) [generation, shownAt] = [data.generation, 0];
+  if (data.stop) return close();
+  if (engine?.picture && !busy) {
+    busy = true;
+    channel.port2.postMessage(null);
+  }
+}
+
 function slice() {
+  try {
+    // no picture: the last scene was refused
+    busy = engine.picture !== null;
+    if (!busy) return;
+    work();
+    channel.port2.postMessage(null);
+  } catch (error) {
+    // the next scene begins anew
+    busy = false;
+    complain(error);
+  }
+}
+
+function work() {
   const ended = engine.work(SLICE);
   const message = { generation, pace: engine.pace.step };
   if (ended) message.result = engine.result;
@@ -47,5 +67,4 @@ function slice() {
     if (shown) [message.shown, message.plane, shownAt] = [shown.slice(), plane, performance.now()];
   }
   if (message.result || message.shown) postMessage(message, message.shown ? [message.shown.buffer] : []);
-  channel.port2.postMessage(null);
 }

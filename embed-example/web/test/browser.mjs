@@ -16,8 +16,15 @@ mkdirSync(shots, { recursive: true });
 const hashes = readFileSync(join(site, 'hashes.txt'), 'utf8');
 const NATIVE = hashes.match(/^A (\w+)$/m)[1];
 
-/** Patience with machines that do other things as well: nothing here is timed. */
+/** Patience with machines that do other things as well. */
 const LONG = { timeout: 240_000 };
+
+/**
+ * Milliseconds of the processor that a task of the page's thread may take: what browsers call long begins there, and
+ * a frame's rays take 11. Time in which the processor did something else is not in it: that is printed only, and so are
+ * frames per second.
+ */
+const LONGEST_TASK = 50;
 
 function expect(holds, what) {
   if (!holds) throw new Error(`not so: ${what}`);
@@ -63,6 +70,40 @@ async function swipe(page) {
   for (let x = 160; x <= 230; x += 10) await touch('touchMove', x);
   await touch('touchEnd');
 }
+
+/** Frames per second and the longest task of the page's thread, while something happens. */
+async function measure(page, what, during) {
+  const cdp = await page.context().newCDPSession(page);
+  const events = [];
+  cdp.on('Tracing.dataCollected', ({ value }) => events.push(...value));
+  const includedCategories = ['devtools.timeline', 'disabled-by-default-devtools.timeline'];
+  const traceConfig = { includedCategories, excludedCategories: ['*'] };
+  await cdp.send('Tracing.start', { transferMode: 'ReportEvents', traceConfig });
+  await during();
+  const complete = new Promise((resolve) => { cdp.once('Tracing.tracingComplete', resolve); });
+  await cdp.send('Tracing.end');
+  await complete;
+  await cdp.detach();
+  // another page, which is empty, is there, too
+  const frames = events.filter((e) => e.name === 'FireAnimationFrame').sort((a, b) => a.ts - b.ts);
+  const { pid, tid } = frames[frames.length >> 1];
+  const tasks = events.filter((e) => e.name === 'RunTask' && e.pid === pid && e.tid === tid && e.tdur);
+  const longest = (key) => Math.max(...tasks.map((e) => e[key])) / 1000;
+  const rate = (frames.length - 1) / (frames.at(-1).ts - frames[0].ts) * 1e6;
+  console.log(`  ${what}: ${rate.toFixed(1)} frames per second, ${longest('dur').toFixed(1)} ms the longest task`);
+  const most = longest('tdur');
+  expect(most > 1 && most < LONGEST_TASK, `${what}: ${most.toFixed(1)} ms of the processor, ${LONGEST_TASK} allowed`);
+}
+
+/** Some seconds. */
+const seconds = (n) => new Promise((resolve) => { setTimeout(resolve, 1000 * n); });
+
+/** Presses a plane's button; whether the page made the preview before it took the next event. */
+const blocks = (page, plane) => page.evaluate((plane) => {
+  const { previews } = document.documentElement.dataset;
+  document.querySelector(`[data-plane=${plane}]`).click();
+  return document.documentElement.dataset.previews !== previews;
+}, plane);
 
 /** A pyramid on a block, faces of three and four corners. */
 const OBJ = `# made by the test
@@ -117,9 +158,31 @@ try {
   expect(/^(in about|reached)/.test(await page.locator('#remaining').textContent()), 'the time to the target is given');
   await page.screenshot({ path: join(shots, 'desktop-knot.png') });
 
+  const checked = page.locator('#checked');
+  const other = NATIVE.replace(/./g, (digit) => (digit === '0' ? '1' : '0'));
+  await page.route('**/hashes.txt', (route) => route.fulfill({ body: `A ${other}\n` }));
   await page.click('#check');
   await page.waitForSelector('#checked.same, #checked.different', LONG);
-  expect((await page.locator('#checked').textContent()).includes(NATIVE), `the hash is the native one, ${NATIVE}`);
+  expect(await checked.getAttribute('class') === 'note different', 'another hash is not taken for the native one');
+  await page.unroute('**/hashes.txt');
+  await page.click('#check');
+  await page.waitForSelector('#checked.same, #checked.different', LONG);
+  const [verdict, said] = [await checked.getAttribute('class'), await checked.textContent()];
+  expect(verdict === 'note same' && said.includes(`the hash ${NATIVE}`), `the hash is the native one, ${NATIVE}`);
+
+  await rendered(page, 16);
+  await measure(page, 'rendering', () => seconds(3));
+  await measure(page, 'turning', async () => {
+    for (let i = 0; i < 6; i++) await drag(page, i % 2 ? -80 : 80, 10);
+  });
+  await rendered(page, 4);
+  await measure(page, 'other planes', async () => {
+    for (const plane of ['factors', 'denoised', 'picture']) {
+      const before = await page.evaluate(() => Number(document.documentElement.dataset.previews));
+      expect(!await blocks(page, plane), `the preview of plane ${plane} is made between frames`);
+      await page.waitForFunction((n) => Number(document.documentElement.dataset.previews) > n, before, LONG);
+    }
+  });
 
   await page.click('[data-scene=box]');
   await begun(page);

@@ -195,7 +195,7 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Result<ExitCode, Box<dy
         let (rendered, _) = render_part(validated, &options, &watch).map_err(failed)?;
         drop(watch);
         let stops = if let Exposure::Stops(stops) = exposure { Some(stops) } else { None };
-        let write = |file: &Path| part::write(file, &validated, &settings, part, &rendered, stops);
+        let write = |file: &Path| part::write(file, &validated, &settings, part, options.target, &rendered, stops);
         let written = outputs.write_part(write, rendered.cache.as_deref());
         return report_part(part, &rendered, &written, &notes, flags.json, &output);
     }
