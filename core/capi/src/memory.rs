@@ -111,7 +111,12 @@ pub(crate) fn apart<T>(
     places: &[(usize, usize)],
     about: &'static str,
 ) -> Result<(), Fault> {
-    let own = (first.addr(), count.saturating_mul(size_of::<T>()));
+    if count == 0 {
+        return Ok(());
+    }
+    // faults that no other place can cure come first
+    let first = in_address_space(first, count, about)?;
+    let own = (first.addr().get(), count.saturating_mul(size_of::<T>()));
     match places.iter().any(|place| overlap(own, *place)) {
         true => Err(Fault::new(CROUPIER_OVERLAP, about)),
         false => Ok(()),
