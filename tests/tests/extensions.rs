@@ -7,7 +7,7 @@ use croupier::unstable::profile::Full;
 use croupier::unstable::rrs::Vertices8;
 use croupier::unstable::scene::blob::Material;
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
-use croupier::unstable::{camera, film::PixelStats, light::PowerSelector};
+use croupier::unstable::{camera, film::PixelStats, light::TreeSelector};
 use croupier::{Budget, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::description::{self, Emitter, Model, Principled, Reflectance, SceneDescription};
@@ -22,7 +22,7 @@ fn render<X: Extension>(bytes: &[u8], s: &Settings, iterations: &[u32], extensio
     let scene = Scene::from_bytes(bytes).unwrap();
     let plan = Plan::new(s).unwrap();
     let [mut shared, mut block] = [plan.session(), plan.shard()].map(|l| AlignedBytes::zeroed(l.size));
-    type Own<'s, 'm, X> = Session<'s, 'm, Full, WideBvh<'s>, PowerSelector<'s>, X>;
+    type Own<'s, 'm, X> = Session<'s, 'm, Full, WideBvh<'s>, TreeSelector<'s>, X>;
     let mut session: Own<'_, '_, X> =
         Session::builder(scene).profile().extension(extension).build(&plan, shared.as_mut()).unwrap();
     let mut shard = Shard::new(&plan, 0, block.as_mut()).unwrap();

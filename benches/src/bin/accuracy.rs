@@ -57,8 +57,9 @@ fn errors() -> Result<Table, Box<dyn Error>> {
     let mut table = Table::new("Error over samples", "samples per pixel, million rays, estimated relMSE, low, high");
     for spp in SAMPLES {
         let s = stats(RenderOptions::default(), spp, 0)?;
-        let [low, high] = s.relmse_interval.ok_or("no interval")?;
-        let error = [s.relmse_estimate.ok_or("no estimate")?, low, high].map(digits);
+        let end = |x: Option<f64>| x.map_or("unresolved".into(), digits);
+        let interval = s.relmse_interval;
+        let error = [s.relmse_estimate, interval.map(|i| i[0]), interval.map(|i| i[1])].map(end);
         let cells = [spp.to_string(), format!("{:.1}", s.rays as f64 * 1e-6)];
         table.add(cells.into_iter().chain(error));
     }

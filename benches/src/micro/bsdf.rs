@@ -128,7 +128,7 @@ fn model_of(k: &mut Kernels, kind: MaterialKind) -> Outcome {
 
 fn principled(k: &mut Kernels) -> Outcome {
     let plain = Principled { base_color: [0.8, 0.5, 0.2], roughness: 0.5, ..Principled::default() };
-    let coated = Principled { coat: 1.0, metalness: 0.5, transmission: 0.5, ..plain.clone() };
+    let coated = Principled { coat: 1.0, metalness: 0.5, transmission: 0.5, ..plain };
     for (name, p) in [("principled", plain), ("principled, all layers", coated)] {
         let layered = Layered::new(p, true);
         let (scene, inputs) = layered.inputs();

@@ -226,7 +226,8 @@ mod tests {
             [(1, ""), (2, "a"), (3, "a"), (4, "aß"), (6, "aß"), (7, "aß€"), (10, "aß€"), (11, "aß€🂡"), (12, "aß€🂡b")]
         {
             let mut buffer = [1; 16];
-            let mut text = Text::new(&mut buffer[..room]);
+            let Some(short) = buffer.get_mut(..room) else { panic!("room in the buffer") };
+            let mut text = Text::new(short);
             text.put("aß");
             text.put("€🂡");
             text.put("b");

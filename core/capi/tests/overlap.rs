@@ -138,7 +138,7 @@ fn edits_with_arrays_inside_the_scene() {
     for inside in [inside, own.object.pointer().wrapping_byte_add(128)] {
         fails!(CROUPIER_OVERLAP, croupier_scene_rebuild(scene, inside, bytes));
         fails!(CROUPIER_OVERLAP, croupier_scene_set_material(scene, 0, &material, inside.cast(), 4));
-        let transform = croupier_transform { to_world: [still.map(|row| row.map(|x| x as f32)); 2] };
+        let transform = croupier_transform { to_world: [still; 2] };
         let (one, done) = ([0u32], ptr::null_mut());
         fails!(CROUPIER_OVERLAP, croupier_scene_set_transforms(scene, inside.cast(), &transform, 1, done));
         fails!(CROUPIER_OVERLAP, croupier_scene_set_transforms(scene, one.as_ptr(), inside.cast(), 1, done));

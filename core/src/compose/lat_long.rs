@@ -90,7 +90,7 @@ impl<'a> LatLong<'a> {
     }
 
     /// Luminance that light samples leave to BSDF samples in every direction: the mean over the sphere; 0 for a map that is
-    /// even but for the share [`EVEN`], whose rest above the mean would be rounding.
+    /// even but for the share `EVEN`, whose rest above the mean would be rounding.
     pub fn shared_luminance<M: Math>(&self) -> f64 {
         let total = self.integral::<M>();
         let mean = total / (2.0 * TAU);
