@@ -218,6 +218,7 @@ mod tests {
             ("seed", "4294967296"),
             ("shards", "2"),
             ("max-depth", "9"),
+            ("sampler", "sobol"),
             ("ring", "64"),
             ("split-budget", "64"),
             ("aovs", "albedo"),

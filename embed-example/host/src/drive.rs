@@ -8,13 +8,15 @@ mod observe;
 mod part;
 mod result;
 pub mod schedule;
+mod target;
 
 pub use calibrate::Calibration;
 pub use error::DriveError;
 pub use forecast::{Forecast, UNKNOWN, forecast};
-pub use observe::{Observer, Progress, Target, Unobserved};
+pub use observe::{Observer, Progress, Unobserved};
 pub use part::{Part, PartError, Share};
 pub use result::{CacheRecord, IterationRecord, Rendered};
+pub use target::Target;
 
 use crate::blob::AlignedBytes;
 use crate::checkpoint::{self, Schedule};

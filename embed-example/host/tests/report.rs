@@ -37,15 +37,15 @@ fn the_page_is_made_of_the_ledger_alone() {
         assert!(files.iter().any(|f| f == name), "no {name} in {files:?}");
         assert!(page.contains(&format!("id=\"{}\"", &name[..name.len() - 4])), "{name} is not in the page");
     }
-    report(dir.path(), &["--from", "a/ledger.json", "--out", "b"]);
+    report(dir.path(), &["--ledger", "a/ledger.json", "--out", "b"]);
     assert_eq!(names("b"), files);
     for name in &files {
         let [a, b] = ["a", "b"].map(|folder| fs::read(dir.path().join(folder).join(name)).unwrap());
         assert!(a == b, "{name:?} differs");
     }
     // beside the ledger, which stays; functions that are there are not joined again
-    report(dir.path(), &["--from", "a/ledger.json", "--out", "a"]);
-    report(dir.path(), &["--from", "a/ledger.json", "--join", "b/ledger.json", "--out", "c"]);
+    report(dir.path(), &["--ledger", "a/ledger.json", "--out", "a"]);
+    report(dir.path(), &["--ledger", "a/ledger.json", "--join", "b/ledger.json", "--out", "c"]);
     let [a, c] = ["a", "c"].map(|folder| fs::read(dir.path().join(folder).join("ledger.json")).unwrap());
     assert!(a == c, "functions were joined twice");
 }
@@ -68,11 +68,11 @@ fn what_is_no_ledger_is_refused() {
     fs::write(dir.path().join("old.json"), ledger(0)).unwrap();
     fs::create_dir(dir.path().join("out")).unwrap();
     fs::write(dir.path().join("out/ledger.json"), ledger(1)).unwrap();
-    fails(&["--from", "missing.json"], "missing.json");
-    fails(&["--from", "none.json"], "none.json: no ledger");
-    fails(&["--from", "old.json"], "old.json: a ledger of format 0");
-    fails(&["--from", "out/ledger.json", "--join", "out/ledger.json", "--out", "out"], "would be written over");
+    fails(&["--ledger", "missing.json"], "missing.json");
+    fails(&["--ledger", "none.json"], "none.json: no ledger");
+    fails(&["--ledger", "old.json"], "old.json: a ledger of format 0");
+    fails(&["--ledger", "out/ledger.json", "--join", "out/ledger.json", "--out", "out"], "would be written over");
     // an empty ledger is a page without figures
-    report(dir.path(), &["--from", "out/ledger.json", "--out", "empty"]);
+    report(dir.path(), &["--ledger", "out/ledger.json", "--out", "empty"]);
     assert!(fs::read_to_string(dir.path().join("empty/index.html")).unwrap().contains("What accuracy costs"));
 }

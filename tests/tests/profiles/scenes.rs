@@ -2,7 +2,7 @@
 
 use croupier::unstable::Effects;
 use croupier::unstable::accel::WideBvh;
-use croupier::unstable::profile::Custom;
+use croupier::unstable::profile::Profile;
 use croupier::{Scene, Settings};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin::sky;
@@ -10,13 +10,21 @@ use croupier_host::description::*;
 use croupier_tests::runner::{Image, Schedule, render_with};
 use croupier_tests::scenes::*;
 
+/// The profile of these effects, which reads light trees as the closed set does: the principled scene has one.
+struct Exactly<const EFFECTS: u32>;
+
+impl<const EFFECTS: u32> Profile for Exactly<EFFECTS> {
+    const EFFECTS: Effects = Effects(EFFECTS);
+    const NAME: &'static str = "exactly";
+}
+
 /// Renders a scene with a profile, settings and numbers of samples.
 pub(crate) type Renderer = fn(Scene<'_>, &Settings, &[u32]) -> Image;
 
 /// Renders with the profile of exactly these effects.
 fn exactly<const EFFECTS: u32>(scene: Scene<'_>, settings: &Settings, samples: &[u32]) -> Image {
     let schedule = Schedule::InOrder(1 << 20);
-    render_with::<Custom<EFFECTS>, _>(scene, WideBvh::new(&scene), settings, samples, schedule)
+    render_with::<Exactly<EFFECTS>, _>(scene, WideBvh::new(&scene), settings, samples, schedule)
 }
 
 /// A scene that calls for some effects.

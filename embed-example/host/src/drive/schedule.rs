@@ -4,7 +4,7 @@
 //! SIGGRAPH 2022, section 5). For strategies that learn, work is counted in rays: when they begin to split, a camera
 //! sample may cost twenty times as much as the one before.
 
-use super::observe::Target;
+use super::target::Target;
 use croupier::ErrorEstimate;
 
 /// Most samples per pixel of an iteration.

@@ -47,20 +47,20 @@ pub(crate) struct Args {
     /// Scenes, as of `render`; three built-in ones if absent
     scenes: Vec<PathBuf>,
     /// Measure less: three minutes on two cores with the built-in scenes
-    #[arg(long, conflicts_with = "from")]
+    #[arg(long, conflicts_with = "ledger")]
     quick: bool,
     /// Folder for the page, its figures, tables and the ledger; it is made
     #[arg(short, long, value_name = "DIR", default_value = "report")]
     out: PathBuf,
     /// Measure nothing: make the page from this ledger
     #[arg(long, value_name = "LEDGER.json", value_parser = json_path, conflicts_with = "scenes")]
-    from: Option<PathBuf>,
+    ledger: Option<PathBuf>,
     /// Add the functions of another ledger, of a build with the feature `fast` or for another instruction set; may be
     /// repeated
     #[arg(long, value_name = "LEDGER.json", value_parser = json_path)]
     join: Vec<PathBuf>,
     /// Measure next to nothing, to see whether a page can be made
-    #[arg(long, hide = true, conflicts_with_all = ["from", "quick"])]
+    #[arg(long, hide = true, conflicts_with_all = ["ledger", "quick"])]
     tiny: bool,
     #[command(flatten)]
     flags: SceneFlags,
@@ -81,7 +81,7 @@ impl Args {
 /// Runs the command.
 pub(crate) fn run(args: &Args) -> Outcome {
     std::fs::create_dir_all(&args.out).map_err(|e| format!("cannot make {}: {e}", text::path(&args.out)))?;
-    let mut ledger = match &args.from {
+    let mut ledger = match &args.ledger {
         Some(path) => read(path)?,
         None => measure(args)?,
     };
@@ -114,9 +114,9 @@ fn read(path: &Path) -> Result<Ledger, Box<dyn Error>> {
 /// Writes ledger, page, figures and tables; the files, the page first. What was read is never written over: a page that
 /// is made again beside its ledger leaves that as it is.
 fn write(args: &Args, ledger: &Ledger) -> Result<Vec<PathBuf>, Box<dyn Error>> {
-    let given = args.from.iter().chain(&args.join).chain(&args.scenes);
+    let given = args.ledger.iter().chain(&args.join).chain(&args.scenes);
     let read: Vec<_> = given.filter_map(|p| p.canonicalize().ok()).collect();
-    let own = args.from.as_ref().filter(|_| args.join.is_empty()).and_then(|p| p.canonicalize().ok());
+    let own = args.ledger.as_ref().filter(|_| args.join.is_empty()).and_then(|p| p.canonicalize().ok());
     let figures = figures::all(ledger)?;
     let mut files = vec![("index.html".to_string(), page::html(ledger, &figures)?)];
     files.push(("ledger.json".into(), serde_json::to_string(ledger)?));
