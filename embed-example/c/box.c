@@ -151,8 +151,11 @@ int main(int argc, char **argv)
         return 1;
     check(croupier_session_rgb(session, rgb, floats, &m), &m);
     check(croupier_session_error_estimate(session, &estimate, &m), &m);
-    fprintf(stderr, "%u x %u pixels, estimated relMSE %.3f (%.3f to %.3f)\n", (unsigned)sizes.width,
-            (unsigned)sizes.height, estimate.rel_mse, estimate.low, estimate.high);
+    fprintf(stderr, "%u x %u pixels, ", (unsigned)sizes.width, (unsigned)sizes.height);
+    if (estimate.resolved)
+        fprintf(stderr, "estimated relMSE %.3f (%.3f to %.3f)\n", estimate.rel_mse, estimate.low, estimate.high);
+    else
+        fprintf(stderr, "relMSE of at least %.3f\n", estimate.rel_mse);
     write_ppm(argv[2], rgb, sizes.width, sizes.height);
     printf("%08lx%08lx\n", (unsigned long)(hash(rgb, floats) >> 32), (unsigned long)(hash(rgb, floats) & 0xffffffffu));
 

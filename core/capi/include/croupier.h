@@ -923,10 +923,11 @@ typedef struct croupier_pixel {
 typedef struct croupier_error_estimate {
   // sizeof(croupier_error_estimate), set by the program.
   uint32_t struct_size;
-  // 0.
-  uint32_t reserved;
-  // Mean over pixels and channels of variance / (mean^2 + 0.01), without the worst 0.01 % of the pixels, times
-  // independence.
+  // 1 if the samples tell the error. 0 if few pixels cause most of it: more of their kind are probably not found yet,
+  // rel_mse is a lower bound then, and the interval means nothing.
+  uint32_t resolved;
+  // Mean over pixels and channels of variance / (expectation^2 + 0.01), without the worst 0.01 % of the pixels, times
+  // independence. The expectation is estimated from the pixel and those around it.
   double rel_mse;
   // Lower end of its 95 % confidence interval.
   double low;

@@ -108,10 +108,11 @@ fn aov_of(number: u32) -> Result<Aov, Fault> {
 pub struct croupier_error_estimate {
     /// sizeof(croupier_error_estimate), set by the program.
     pub struct_size: u32,
-    /// 0.
-    pub reserved: u32,
-    /// Mean over pixels and channels of variance / (mean^2 + 0.01), without the worst 0.01 % of the pixels, times
-    /// independence.
+    /// 1 if the samples tell the error. 0 if few pixels cause most of it: more of their kind are probably not found yet,
+    /// rel_mse is a lower bound then, and the interval means nothing.
+    pub resolved: u32,
+    /// Mean over pixels and channels of variance / (expectation^2 + 0.01), without the worst 0.01 % of the pixels, times
+    /// independence. The expectation is estimated from the pixel and those around it.
     pub rel_mse: f64,
     /// Lower end of its 95 % confidence interval.
     pub low: f64,
@@ -363,6 +364,7 @@ pub unsafe extern "C" fn croupier_session_error_estimate(
         let data = promised!(session_at(session))?.read()?;
         let e = data.state()?.film().error_estimate();
         let shown = croupier_error_estimate {
+            resolved: e.is_resolved().into(),
             rel_mse: e.rel_mse,
             low: e.low,
             high: e.high,

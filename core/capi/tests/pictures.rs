@@ -340,6 +340,8 @@ fn what_sessions_show() {
     let mut estimate = croupier_error_estimate { struct_size: 48, ..bytemuck::Zeroable::zeroed() };
     ok!(croupier_session_error_estimate(render.session, &raw mut estimate));
     assert!(estimate.low < estimate.rel_mse && estimate.rel_mse < estimate.high);
+    assert!(n > 64 || estimate.resolved == 0, "of {n} pixels");
+    assert!(estimate.resolved <= 1);
     let mut iteration = croupier_iteration { struct_size: 32, ..bytemuck::Zeroable::zeroed() };
     ok!(croupier_session_iteration(render.session, &raw mut iteration));
     assert_eq!((iteration.number, iteration.samples, iteration.restarts), (1, 2, 0));

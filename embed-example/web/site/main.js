@@ -225,8 +225,11 @@ function report(result) {
   const known = result?.known;
   $('spp').textContent = result ? +result.spp.toFixed(1) : '0';
   $('relmse').textContent = known ? number(result.relMse) : '–';
+  // without an end: few pixels cause the error, and more of their kind are probably not found yet
+  const interval = () => Number.isFinite(result.high)
+    ? `95 % between ${number(result.low)} and ${number(result.high)}` : 'or more: few pixels cause it';
   $('interval').textContent = known
-    ? `95 % between ${number(result.low)} and ${number(result.high)}, after ${short(result.seconds)}`
+    ? `${interval()}, after ${short(result.seconds)}`
     : crowd ? 'known from four samples per pixel of each worker on' : 'known from four samples per pixel on';
   $('remaining').textContent = known ? remaining(result) : '–';
   chart();

@@ -155,16 +155,17 @@ impl<'m> Picture<'m> {
         });
     }
 
-    /// Estimated relMSE and the ends of its 95 % interval; the same over all pixels, outliers included; finished
-    /// iterations; camera samples per pixel in them; rays, counted cost, splits, paths terminated; columns, rows.
+    /// Estimated relMSE and the ends of its 95 % interval, 0 and infinity where the samples do not tell it; the same
+    /// over all pixels, outliers included; finished iterations; camera samples per pixel in them; rays, counted cost,
+    /// splits, paths terminated; columns, rows.
     pub(crate) fn numbers(&self) -> [f64; NUMBERS] {
         let (film, counters) = (self.state.film(), self.state.counters());
         let (error, [width, height]) = (film.error_estimate(), film.size().map(f64::from));
-        let of = |n: u64| n as f64;
+        let (resolved, of) = (error.is_resolved(), |n: u64| n as f64);
         [
             error.rel_mse,
-            error.low,
-            error.high,
+            if resolved { error.low } else { 0.0 },
+            if resolved { error.high } else { f64::INFINITY },
             error.rel_mse_all,
             of(self.state.iteration().number),
             of(counters.camera_samples) / (width * height).max(1.0),
