@@ -1,0 +1,41 @@
+# Steps of .ci/run: what a browser shows.
+# shellcheck shell=bash
+
+# Chromium, Node and what drives them.
+need_browser() {
+    local missing=()
+    [ -n "${CHROMIUM-}" ] || command -v chromium >/dev/null || missing+=(chromium)
+    command -v node >/dev/null || missing+=(nodejs)
+    command -v npm >/dev/null || missing+=(npm)
+    if [ ${#missing[@]} -gt 0 ]; then
+        packages "${missing[@]}"
+    fi
+    npm ci --prefix embed-example/web --ignore-scripts --no-audit --no-fund
+}
+
+# The page of embed-example/web: sizes, imports and the picture's hash of its modules and its worker in Node; the page itself
+# in headless Chromium, which prints frames per second. Pictures of it, to be looked at, go to target/web-shots.
+step_web() {
+    local programs=(chromium)
+    command -v node >/dev/null || programs+=(nodejs)
+    command -v npm >/dev/null || programs+=(npm)
+    need_debian_rust "${programs[@]}"
+    CARGO_TARGET_DIR=$target/web CROUPIER_WEB_DEBIAN=1 embed-example/web/build
+    node embed-example/web/test/module.mjs
+    node embed-example/web/test/worker.mjs
+    npm ci --prefix embed-example/web --ignore-scripts --no-audit --no-fund
+    node embed-example/web/test/browser.mjs "$target/web-shots"
+}
+
+# The page of `croupier report`, from next to no measurements: made from its ledger it is the same again, and a browser
+# shows all of its figures. Pictures of it, to be looked at, go to target/report-shots.
+step_report() {
+    need_browser
+    local program=(cargo run --release -p croupier-host --bin croupier -- report)
+    rm -rf "$target/report" "$target/report-again"
+    "${program[@]}" --tiny --out "$target/report"
+    "${program[@]}" --ledger "$target/report/ledger.json" --out "$target/report-again"
+    diff -r "$target/report" "$target/report-again"
+    node embed-example/web/test/report.mjs "$target/report" "$target/report-shots/tiny"
+    node embed-example/web/test/report.mjs benches/results/report "$target/report-shots/committed"
+}
