@@ -7,12 +7,39 @@ mod common;
 use common::text;
 use croupier_host::image::Picture;
 use std::io::{BufRead, BufReader, Read};
+use std::ops::{Deref, DerefMut};
 use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
 
-/// A render that has begun and would take weeks, and the lines that it has yet to say.
-fn begin(folder: &Path, size: &str, more: &[&str]) -> (Child, BufReader<ChildStdout>) {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_croupier"))
+/// A render, which ends with the test at the latest.
+struct Render(Child);
+
+impl Deref for Render {
+    type Target = Child;
+
+    fn deref(&self) -> &Child {
+        &self.0
+    }
+}
+
+impl DerefMut for Render {
+    fn deref_mut(&mut self) -> &mut Child {
+        &mut self.0
+    }
+}
+
+impl Drop for Render {
+    fn drop(&mut self) {
+        // an error says that it has ended
+        let _ = self.0.kill();
+    }
+}
+
+/// A render that has begun and would take weeks, and the lines that it has yet to say. It takes signals even if the tests
+/// run in the background of a shell, which ignores some.
+fn begin(folder: &Path, size: &str, more: &[&str]) -> (Render, BufReader<ChildStdout>) {
+    let child = Command::new("env")
+        .args(["--default-signal=INT,HUP,TERM", env!("CARGO_BIN_EXE_croupier")])
         .args(["render", "--size", size, "--threads", "1", "--rrs", "ears", "--seconds", "1000000"])
         .args(more)
         .current_dir(folder)
@@ -20,6 +47,7 @@ fn begin(folder: &Path, size: &str, more: &[&str]) -> (Child, BufReader<ChildStd
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
+    let mut child = Render(child);
     let mut said = BufReader::new(child.stdout.take().unwrap());
     // Scene and memory: from there on a signal saves.
     let mut lines = String::new();
