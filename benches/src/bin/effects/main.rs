@@ -301,12 +301,14 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
     if args.check {
         let risen = check(&bases, &Results::read(NAME)?)?;
         if risen > 0 {
-            println!("if that is meant: cargo run --release -p croupier-benches --bin {NAME} -- --write");
+            println!(
+                "if that is meant: cargo run --release -p croupier-benches --features effects-rows --bin {NAME} -- --write"
+            );
         }
         return Ok(risen == 0);
     }
     if !cfg!(feature = "effects-rows") {
-        return Err("only `--check` works without the feature `effects-rows`".into());
+        return Err("only `--check` works without `--features effects-rows`".into());
     }
     results.tables = vec![effects(&folder, &text, &bases)?, profiles(&text)?, scenes(&folder, args)?];
     if args.write {
