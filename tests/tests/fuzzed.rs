@@ -17,10 +17,10 @@ use inputs::{FORMATS, Workbench};
 use std::path::Path;
 
 /// Inputs of each format of scene files.
-const INPUTS: usize = 2_000;
+const INPUTS: usize = 1_000;
 
 /// Inputs of each format that is rendered from with learned roulette, which takes longer: whole sessions.
-const SESSIONS: usize = 1_000;
+const SESSIONS: usize = 500;
 
 /// Most bytes in use at a time, of all tests of this binary.
 const LIMIT: usize = 1 << 30;
