@@ -20,8 +20,8 @@ struct Args {
     #[arg(long, default_value = "")]
     only: String,
     /// Compare with benches/results/micro.md; exit status 1 if a kernel's instructions have risen by more than
-    /// `--tolerance`, or its misses by a quarter and half a miss per unit: another layout of the same code and data in
-    /// memory changes them by up to 14 %.
+    /// `--tolerance`, or its first-level misses by a quarter and half a miss per unit: another layout of the same code and
+    /// data in memory changes them by up to 8 %, and last-level ones, which are not compared, by two thirds.
     #[arg(long)]
     check: bool,
     /// Per cent by which instructions may rise.
@@ -37,7 +37,7 @@ struct Args {
 
 const NAME: &str = "micro";
 const COLUMNS: &str = "group, kernel, per, lanes used, instructions, first-level misses, last-level misses";
-/// Misses per unit by which they may rise in any case, and per cent.
+/// First-level misses per unit by which they may rise in any case, and per cent.
 const MISSES: (f64, f64) = (0.5, 25.0);
 
 /// Calls kernels, prints a line for each.
@@ -80,7 +80,7 @@ fn check(table: &Table, tolerance: f64, results: &Results) -> Result<usize, Box<
             continue;
         };
         // columns of the figures, by how much the rounded one may rise in any case, and per cent
-        for (k, (slack, percent)) in [(4, (0.1, tolerance)), (5, MISSES), (6, MISSES)] {
+        for (k, (slack, percent)) in [(4, (0.1, tolerance)), (5, MISSES)] {
             let [new, old]: [f64; 2] = [row[k].parse()?, before[k].parse()?];
             let too_much = new > old * (1.0 + percent / 100.0) + slack;
             if too_much || (k == 4 && (new - old).abs() > old * 0.005 + slack) {
