@@ -20,8 +20,8 @@ struct Args {
     #[arg(long, default_value = "")]
     only: String,
     /// Compare with benches/results/micro.md; exit status 1 if a kernel's instructions have risen by more than
-    /// `--tolerance`, or its first-level misses by a quarter and half a miss per unit: another layout of the same code and
-    /// data in memory changes them by up to 8 %, and last-level ones, which are not compared, by two thirds.
+    /// `--tolerance`, or its first-level misses by a quarter and half a miss per unit: another layout of the same code
+    /// and data in memory changes them by up to 8 %, and last-level ones, which are not compared, by two thirds.
     #[arg(long)]
     check: bool,
     /// Per cent by which instructions may rise.
