@@ -15,7 +15,8 @@ debian_cargo() { RUSTC_BOOTSTRAP=1 RUSTC=/usr/bin/rustc RUSTDOC=/usr/bin/rustdoc
 
 # What this machine computes in place of the firmware, without building the tests.
 numbers() {
-    CARGO_TARGET_DIR=$target/numbers cargo run --quiet --locked --manifest-path embed-example/firmware/Cargo.toml --example firmware_probe -- "$@"
+    CARGO_TARGET_DIR=$target/numbers cargo run --quiet --locked --manifest-path embed-example/firmware/Cargo.toml \
+        --example firmware_probe -- "$@"
 }
 
 # Path of an emulator of a whole Cortex-M7 machine; fails if there is none. The release's package is unpacked where it

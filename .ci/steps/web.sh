@@ -7,23 +7,18 @@ need_browser() {
     [ -n "${CHROMIUM-}" ] || command -v chromium >/dev/null || missing+=(chromium)
     command -v node >/dev/null || missing+=(nodejs)
     command -v npm >/dev/null || missing+=(npm)
-    if [ ${#missing[@]} -gt 0 ]; then
-        packages "${missing[@]}"
-    fi
+    [ ${#missing[@]} -eq 0 ] || packages "${missing[@]}"
     npm ci --prefix embed-example/web --ignore-scripts --no-audit --no-fund
 }
 
 # The page of embed-example/web: sizes, imports and the picture's hash of its modules and its worker in Node; the page itself
 # in headless Chromium, which prints frames per second. Pictures of it, to be looked at, go to target/web-shots.
 step_web() {
-    local programs=(chromium)
-    command -v node >/dev/null || programs+=(nodejs)
-    command -v npm >/dev/null || programs+=(npm)
-    need_debian_rust "${programs[@]}"
+    need_debian_rust
+    need_browser
     CARGO_TARGET_DIR=$target/web CROUPIER_WEB_DEBIAN=1 embed-example/web/build
     node embed-example/web/test/module.mjs
     node embed-example/web/test/worker.mjs
-    npm ci --prefix embed-example/web --ignore-scripts --no-audit --no-fund
     node embed-example/web/test/browser.mjs "$target/web-shots"
 }
 

@@ -19,7 +19,8 @@ type Tracer<'s, 'm, P> = Session<'s, 'm, P>;
 /// Renders one iteration for each number of samples per pixel; counters of the whole render, and the seconds of its
 /// iterations.
 pub fn render(scene: Scene<'_>, plan: &Plan, iterations: &[u32]) -> Result<(Counters, f64), Box<dyn Error>> {
-    AnyProfile::smallest(scene.effects).dispatch(Render { scene, plan, iterations })
+    let guided = plan.settings().guides();
+    AnyProfile::smallest(scene.effects).dispatch_guided(guided, Render { scene, plan, iterations })
 }
 
 /// A render whose profile is to be chosen.

@@ -1,13 +1,14 @@
 //! What a row of a table renders with: a roulette strategy, and perhaps other choices.
 
 use croupier::unstable::Sampler;
-use croupier::unstable::learn::{ControlVariate, Learning, PixelEstimator};
+use croupier::unstable::learn::{ControlVariate, Guiding, Learning, PixelEstimator};
 use croupier::{Settings, Strategy};
 
 /// Other choices by name, and what they are.
 pub const MODIFIERS: &[(&str, &str)] = &[
     ("adaptive", "adaptive sampling"),
     ("shadow", "roulette of light samples and their rays"),
+    ("guided", "path guiding that learns from 64 samples per pixel and iteration"),
     ("constant", "the cached mean as control variate of roulette"),
     ("small", "one shard, and less than 256 KiB for all that is learned"),
     ("sobol", "Sobol' points in place of hashed numbers"),
@@ -56,6 +57,9 @@ impl Variant {
         s.shadow_roulette |= self.has("shadow");
         if self.has("sobol") {
             s.sampler = Sampler::Sobol;
+        }
+        if self.has("guided") {
+            (s.learning.guiding, s.learning.samples) = (Guiding::On, 64);
         }
         if self.has("constant") {
             s.control_variate = ControlVariate::Cached;

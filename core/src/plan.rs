@@ -31,7 +31,8 @@ impl Plan {
         let session = Measure::new().add::<SessionRecord>(1);
         let session = Film::measure(session.add::<u32>(DIGITS), &s.film_layout());
         let session = LearnedState::measure(session, &s.needs(cache));
-        let job = Job { settings: s, tiles: Tiles::new(s.size, s.shards), cache, fingerprint: fingerprint(settings) };
+        let (tiles, guide) = (Tiles::new(s.size, s.shards), s.guide_size());
+        let job = Job { settings: s, tiles, cache, guide, fingerprint: fingerprint(settings) };
         Ok(Self {
             job,
             session: session.layout().ok_or(SettingsError::Memory)?,

@@ -32,6 +32,8 @@ pub trait Profile {
     /// Do the kernels choose lights by the tree of scenes that have one? Without it they choose by power: pictures are as
     /// right, with more noise under many lights.
     const LIGHT_TREES: bool = true;
+    /// Do the kernels contain path guiding ([`Learning::guiding`](crate::unstable::learn::Learning::guiding))?
+    const GUIDING: bool = false;
 }
 
 /// The profile `P` with [`Sampler::Sobol`](crate::unstable::Sampler::Sobol).
@@ -43,6 +45,7 @@ impl<P: Profile> Profile for WithSobol<P> {
     const NAME: &'static str = P::NAME;
     const SOBOL: bool = true;
     const LIGHT_TREES: bool = P::LIGHT_TREES;
+    const GUIDING: bool = P::GUIDING;
 }
 
 /// The profile of exactly these effects, given by [`Effects`]' bits, without light trees.
@@ -53,6 +56,18 @@ impl<const EFFECTS: u32> Profile for Custom<EFFECTS> {
     const EFFECTS: Effects = Effects(EFFECTS);
     const NAME: &'static str = "custom";
     const LIGHT_TREES: bool = false;
+}
+
+/// The profile `P` with path guiding.
+#[derive(Clone, Copy, Debug)]
+pub struct Guided<P>(PhantomData<P>);
+
+impl<P: Profile> Profile for Guided<P> {
+    const EFFECTS: Effects = P::EFFECTS;
+    const NAME: &'static str = P::NAME;
+    const SOBOL: bool = P::SOBOL;
+    const LIGHT_TREES: bool = P::LIGHT_TREES;
+    const GUIDING: bool = true;
 }
 
 /// Code to run with a profile that is chosen at run time; see [`AnyProfile::dispatch`].
@@ -117,6 +132,17 @@ impl AnyProfile {
         }
         Self::Full
     }
+
+    /// [`Self::dispatch`] with path guiding if it is asked for: then the profile is [`Surfaces`] or [`Full`], so that
+    /// a host has two more kernels and not one for each profile.
+    #[inline(always)]
+    pub fn dispatch_guided<V: ProfileVisitor>(self, guided: bool, v: V) -> V::Out {
+        match self {
+            _ if !guided => self.dispatch(v),
+            Self::DiffuseOnly | Self::Surfaces => v.visit::<Guided<Surfaces>>(),
+            Self::Full => v.visit::<Guided<Full>>(),
+        }
+    }
 }
 
 // A profile after one that contains it would never be chosen, and some profile must hold every scene.
@@ -140,7 +166,8 @@ profiles! {
         .with(Effects::CONSTANT)
         .with(Effects::SMOOTH_NORMALS)
         .with(Effects::TEXTURES);
-    /// Every material but the principled one, every light, textures, lens: light that travels straight from one surface to the next.
+    /// Every material but the principled one, every light, textures, lens: light that travels straight from one
+    /// surface to the next.
     Surfaces = "surfaces", Effects::ALL_MATERIALS
         .without(Effects::PRINCIPLED)
         .with(Effects::TEXTURES)

@@ -235,6 +235,9 @@ mod tests {
             ("pixel-estimator", "blocks"),
             ("objective", "absolute"),
             ("norm", "max"),
+            ("guiding", "auto"),
+            ("guiding", "on"),
+            ("guide-bytes", "300000"),
             ("factors", "0.5:2"),
             ("factors", "0.05:2"),
         ] {

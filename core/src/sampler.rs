@@ -48,6 +48,7 @@ const TIME_BLOCK: u32 = 1;
 const SCATTER_BLOCK: u32 = 0;
 const LIGHT_BLOCK: u32 = 1;
 const SHADOW_BLOCK: u32 = 2;
+const GUIDE_BLOCK: u32 = 3;
 /// Dimension blocks of a vertex's key.
 const STRAIGHT_BLOCK: u32 = 0;
 const JITTER_BLOCK: u32 = 1;
@@ -134,6 +135,12 @@ impl Key8 {
     pub(crate) fn shadow_roulette(self) -> F32x8 {
         let [u, ..] = self.uniforms(SHADOW_BLOCK);
         u
+    }
+
+    /// Words of a sample's guided direction; see [`crate::learn::guiding::Guide::sample`].
+    #[inline(always)]
+    pub(crate) fn guided_direction(self) -> [U32x8; 4] {
+        self.words(GUIDE_BLOCK)
     }
 
     /// Does light pass the surface at which the vertex of this key would be?

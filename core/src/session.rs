@@ -1,107 +1,31 @@
 //! What all shards share: frozen while they work, changed between iterations.
 
+mod error;
 mod finish;
+
+pub use error::SessionError;
 
 use crate::accel::{Intersector, WideBvh};
 use crate::counters::Counters;
 use crate::extension::Extension;
 use crate::film::{DIGITS, Film};
-use crate::instructions::{INSTRUCTION_SET, missing_instructions};
+use crate::instructions::missing_instructions;
 use crate::learn::cache::Cache;
+use crate::learn::guiding::{Guide, GuideUse};
 use crate::learn::{LearnedScalars, LearnedState, PictureStatistics};
 use crate::light::{LightSelector, TreeSelector};
-use crate::memory::{Carver, MemoryError};
+use crate::memory::Carver;
 use crate::plan::Plan;
 use crate::profile::{Full, Profile};
-use crate::record::{Finishing, ResumeError, SessionRecord, SessionScalars};
+use crate::record::{Finishing, SessionRecord, SessionScalars};
 use crate::sampler::Sampler;
 use crate::scene::{Effects, Scene};
 use crate::settings::MAX_PATH_LENGTH;
 use crate::tracer::media_at;
 use crate::world::sealed::Sealed;
 use crate::world::{Identity, Iteration, World};
-use core::fmt;
 use core::marker::PhantomData;
 use core::ops::{Deref, DerefMut};
-
-/// Why a session cannot start or an iteration cannot end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum SessionError {
-    /// The processor lacks instructions that this build uses ([`crate::INSTRUCTION_SET`]).
-    Instructions {
-        /// The first set that is missing.
-        missing: &'static str,
-    },
-    /// The shared block does not fit.
-    Memory(MemoryError),
-    /// The scene calls for effects that the profile was compiled without.
-    Profile {
-        /// The missing effects.
-        missing: Effects,
-    },
-    /// The settings call for a sampler that the profile was compiled without
-    /// ([`WithSobol`](crate::unstable::profile::WithSobol)).
-    Sampler {
-        /// The sampler.
-        missing: Sampler,
-    },
-    /// The shards are not all of the plan's, in order.
-    Shards {
-        /// Index expected next.
-        expected: u32,
-    },
-    /// This shard has not finished the iteration.
-    Unfinished {
-        /// Index of the shard.
-        shard: u32,
-    },
-    /// This shard was made for other settings.
-    Plan {
-        /// Index of the shard.
-        shard: u32,
-    },
-    /// No iteration has begun.
-    NoIteration,
-    /// The block cannot be resumed.
-    Resume(ResumeError),
-    /// An estimate of the pixels that does not fit.
-    Estimate {
-        /// Number of values given.
-        given: usize,
-    },
-}
-
-impl fmt::Display for SessionError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Instructions { missing } => {
-                write!(f, "this build needs a processor with {INSTRUCTION_SET}; this one lacks {missing}")
-            }
-            Self::Memory(e) => write!(f, "session: {e}"),
-            Self::Profile { missing } => {
-                f.write_str("the scene calls for effects outside the kernel profile:")?;
-                let mut names = missing.names().enumerate();
-                names.try_for_each(|(i, name)| write!(f, "{}{name}", if i == 0 { " " } else { ", " }))
-            }
-            Self::Sampler { missing } => {
-                write!(f, "the settings call for the sampler {}, which the kernel profile lacks", missing.name())
-            }
-            Self::Shards { expected } => {
-                write!(f, "the end of an iteration needs every shard in order; shard {expected} is missing")
-            }
-            Self::Unfinished { shard } => write!(f, "shard {shard} has not finished the iteration"),
-            Self::Plan { shard } => write!(f, "shard {shard} was made for another plan"),
-            Self::Estimate { given } => {
-                write!(f, "an estimate of {given} values does not fit the settings, or comes while an iteration runs")
-            }
-            Self::Resume(e) => write!(f, "session: {e}"),
-            Self::NoIteration => f.write_str("no iteration has begun"),
-        }
-    }
-}
-
-impl core::error::Error for SessionError {}
 
 /// What the end of an iteration consists of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -252,6 +176,7 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector, X: Extension> SessionBuil
         let scene = with_surfaces::<I>(scene);
         check_effects::<P, X>(&scene)?;
         check_sampler::<P>(plan)?;
+        check_guiding::<P>(plan)?;
         let camera_media = || camera_media::<P, I>(&scene, &intersector);
         let mut c = Carver::new(block, plan.session()).map_err(SessionError::Memory)?;
         let s = plan.settings();
@@ -302,6 +227,7 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector, X: Extension> SessionBuil
         let scene = with_surfaces::<I>(scene);
         check_effects::<P, X>(&scene)?;
         check_sampler::<P>(&state.plan)?;
+        check_guiding::<P>(&state.plan)?;
         let same = state.scene == scene.hash;
         let camera_media = if same { state.camera_media } else { camera_media::<P, I>(&scene, &intersector) };
         Ok(SessionView { scene, intersector, selector, extension, state, camera_media, profile })
@@ -330,6 +256,10 @@ fn check_sampler<P: Profile>(plan: &Plan) -> Result<(), SessionError> {
         missing @ Sampler::Sobol if !P::SOBOL => Err(SessionError::Sampler { missing }),
         _ => Ok(()),
     }
+}
+
+fn check_guiding<P: Profile>(plan: &Plan) -> Result<(), SessionError> {
+    if P::GUIDING || !plan.settings().guides() { Ok(()) } else { Err(SessionError::Guiding) }
 }
 
 /// Bits of the media that the camera is inside of.
@@ -371,6 +301,7 @@ macro_rules! worlds {
         impl<P: Profile, I: Intersector, L: LightSelector, X: Extension> World for $World {
             const EFFECTS: Effects = effects::<P, X>();
             const LIGHT_TREES: bool = P::LIGHT_TREES;
+            const GUIDING: bool = P::GUIDING;
             type Intersector = I;
             type Lights = L;
             type Extension = X;
@@ -573,6 +504,22 @@ impl<'m> SessionState<'m> {
     /// See [`Self::cache`]. Whatever is loaded changes efficiency only. Not while an iteration runs: `None` then.
     pub fn cache_mut(&mut self) -> Option<&mut Cache<'m>> {
         if self.running { None } else { self.learned.cache_mut() }
+    }
+
+    /// The distributions of path guiding, if it is on.
+    pub fn guide(&self) -> Option<&Guide<'m>> {
+        self.learned.guide()
+    }
+
+    /// Whether path guiding pays, if the settings leave that to the render
+    /// ([`Guiding::Auto`](crate::unstable::learn::Guiding::Auto)).
+    pub fn guide_use(&self) -> Option<GuideUse> {
+        self.learned.guide_use()
+    }
+
+    /// See [`Self::guide`]. Whatever is loaded changes efficiency only. Not while an iteration runs: `None` then.
+    pub fn guide_mut(&mut self) -> Option<&mut Guide<'m>> {
+        if self.running { None } else { self.learned.guide_mut() }
     }
 
     /// The estimate of the pixels that the strategy works with, rgb planes; `None` if it needs none, or before the end

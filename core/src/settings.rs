@@ -2,7 +2,8 @@
 
 use crate::film::{Aov, AovSet, FilmLayout};
 use crate::learn::cache::CacheSize;
-use crate::learn::{ControlVariate, Learning, Needs};
+use crate::learn::guiding::GuideSize;
+use crate::learn::{ControlVariate, Guiding, Learning, Needs};
 use crate::rrs::{Space, Strategy};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
@@ -95,12 +96,31 @@ impl Settings {
             }
         }
         self.check_control_variate()?;
+        self.check_guiding()?;
         if self.strategy.space().is_none() {
             return Ok(None);
         }
         let needed = CacheSize::SMALLEST.bytes(self.shards).ok_or(SettingsError::Memory)?;
         let given = self.learning.cache_bytes;
         CacheSize::within(given, self.shards).map(Some).ok_or(SettingsError::Cache { needed, given })
+    }
+
+    /// Room for path guiding, if it is on; [`Self::check`] has seen that it fits.
+    pub(crate) fn guide_size(&self) -> Option<GuideSize> {
+        self.guides().then(|| GuideSize::within(self.learning.guide_bytes, self.shards)).flatten()
+    }
+
+    /// Is path guiding on?
+    pub fn guides(&self) -> bool {
+        self.learning.guiding != Guiding::Off
+    }
+
+    fn check_guiding(&self) -> Result<(), SettingsError> {
+        let given = self.learning.guide_bytes;
+        if !self.guides() || GuideSize::within(given, self.shards).is_some() {
+            return Ok(());
+        }
+        Err(SettingsError::Guide { needed: GuideSize::least(self.shards).ok_or(SettingsError::Memory)?, given })
     }
 
     fn check_control_variate(&self) -> Result<(), SettingsError> {
@@ -124,11 +144,13 @@ impl Settings {
 
     /// What these settings have the render learn, with room for `cache`.
     pub(crate) fn needs(&self, cache: Option<CacheSize>) -> Needs {
-        let pixels = self.strategy.needs_image() || self.shadow_roulette || self.adaptive;
+        let tries = self.learning.guiding == Guiding::Auto;
+        let pixels = self.strategy.needs_image() || self.shadow_roulette || self.adaptive || tries;
         Needs {
             size: self.size,
             space: self.strategy.space(),
             cache,
+            guide: self.guide_size(),
             pixels: pixels.then_some(self.learning.pixel_estimator),
             adaptive: self.adaptive,
             learning: self.learning,
@@ -154,6 +176,13 @@ pub enum SettingsError {
         /// Bytes given.
         given: usize,
     },
+    /// Fewer bytes for path guiding than its smallest trees need in the session and in every shard.
+    Guide {
+        /// Bytes needed.
+        needed: usize,
+        /// Bytes given.
+        given: usize,
+    },
     /// A control variate with `threshold`, or the cached mean with a strategy that learns nothing of the scene.
     ControlVariate,
     /// More memory than can be addressed.
@@ -167,6 +196,9 @@ impl fmt::Display for SettingsError {
                 write!(f, "{name} {value}: need {range}")
             }
             Self::Cache { needed, given } => write!(f, "cache of {given} bytes: with so many shards it needs {needed}"),
+            Self::Guide { needed, given } => {
+                write!(f, "guide of {given} bytes: with so many shards it needs {needed}")
+            }
             Self::ControlVariate => f.write_str(
                 "a control variate cannot serve threshold, and the cached mean needs ear, ears, adrr or adrrs",
             ),

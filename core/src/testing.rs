@@ -178,6 +178,7 @@ impl Sealed for TestWorld<'_> {}
 
 impl<'a> World for TestWorld<'a> {
     const EFFECTS: Effects = Effects(u32::MAX);
+    const GUIDING: bool = false;
     const LIGHT_TREES: bool = true;
     type Intersector = BruteForce<'a>;
     type Lights = PowerSelector<'a>;

@@ -41,6 +41,8 @@ pub trait World: sealed::Sealed {
     const EFFECTS: Effects;
     /// See [`Profile::LIGHT_TREES`](crate::profile::Profile::LIGHT_TREES).
     const LIGHT_TREES: bool;
+    /// Do the kernels contain path guiding?
+    const GUIDING: bool;
     /// What finds hits.
     type Intersector: Intersector;
     /// What chooses lights.

@@ -74,6 +74,17 @@ impl Image {
     }
 }
 
+/// Samples of iterations that double up to 256 samples, `spp` in all.
+pub fn doubling(spp: u32) -> Vec<u32> {
+    let (mut all, mut left) = (vec![], spp);
+    while left > 0 {
+        let n = (spp - left).clamp(8, 256).min(left);
+        all.push(n);
+        left -= n;
+    }
+    all
+}
+
 /// Settings for a scene's own camera, `strategy` in the words of the program.
 pub fn settings(scene: &[u8], strategy: &str) -> Settings {
     let scene = Scene::from_bytes(scene).expect("a valid scene");
@@ -100,7 +111,7 @@ pub fn learning(
 ) -> Image {
     let scene = Scene::from_bytes(scene).expect("a valid scene");
     let smallest = AnyProfile::smallest(scene.effects);
-    smallest.dispatch(Render { scene, settings, iterations, schedule, before })
+    smallest.dispatch_guided(settings.guides(), Render { scene, settings, iterations, schedule, before })
 }
 
 /// A render whose profile is to be chosen.
@@ -128,6 +139,13 @@ pub trait Learned {
 
     /// Loads saved statistics.
     fn load(&mut self, bytes: &[u8]) -> Result<(), CacheError>;
+
+    /// The distributions of path guiding as bytes, the mean share of guided samples, and the directions that logs had
+    /// no room for; `None` if it is off.
+    fn guide(&self) -> Option<(Vec<u8>, f64, u64)>;
+
+    /// Loads saved distributions.
+    fn load_guide(&mut self, bytes: &[u8]) -> Result<(), CacheError>;
 
     /// Gives an estimate of the pixels.
     fn give(&mut self, rgb: &[[f32; 3]]) -> Result<(), SessionError>;
@@ -159,6 +177,17 @@ impl<P: Profile, I: Intersector> Learned for Session<'_, '_, P, I> {
 
     fn load(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
         self.cache_mut().expect("a cache").load(bytes)
+    }
+
+    fn guide(&self) -> Option<(Vec<u8>, f64, u64)> {
+        let guide = SessionState::guide(self)?;
+        let mut bytes = vec![0; guide.saved_len()];
+        guide.save(&mut bytes).expect("room for the guide");
+        Some((bytes, guide.mean_fraction(), guide.thinned()))
+    }
+
+    fn load_guide(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
+        self.guide_mut().expect("a guide").load(bytes)
     }
 
     fn give(&mut self, rgb: &[[f32; 3]]) -> Result<(), SessionError> {

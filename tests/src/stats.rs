@@ -147,28 +147,35 @@ pub struct ChiSquare {
 /// Compares counts with expected counts of the same total. Cells expected to hold fewer than `pool_below` are pooled
 /// into one. `p` is 0 if a cell expected to stay empty is not, or if the pooled cell alone is impossible.
 pub fn chi_square(observed: &[u64], expected: &[f64], pool_below: f64) -> ChiSquare {
-    assert_eq!(observed.len(), expected.len());
+    chi_square_within(observed, expected, &vec![0.0; expected.len()], pool_below)
+}
+
+/// As [`chi_square`], with expected counts that are known within `uncertainty` only, as those from quadrature are: its
+/// squares add to the variances of the cells. Those of pooled cells add up.
+pub fn chi_square_within(observed: &[u64], expected: &[f64], uncertainty: &[f64], pool_below: f64) -> ChiSquare {
+    assert_eq!([observed.len(), uncertainty.len()], [expected.len(); 2]);
     let (mut statistic, mut cells) = (0.0, 0usize);
-    let (mut pool_o, mut pool_e) = (0.0, 0.0);
-    let mut add = |o: f64, e: f64| {
-        statistic += (o - e) * (o - e) / e;
+    let (mut pool_o, mut pool_e, mut pool_u) = (0.0, 0.0, 0.0);
+    let mut add = |o: f64, e: f64, u: f64| {
+        statistic += (o - e) * (o - e) / (e + u * u);
         cells += 1;
     };
     let mut impossible = false;
-    for (&o, &e) in observed.iter().zip(expected) {
+    for ((&o, &e), &u) in observed.iter().zip(expected).zip(uncertainty) {
         if e >= pool_below {
-            add(o as f64, e);
+            add(o as f64, e, u);
         } else {
             impossible |= e <= 0.0 && o > 0;
             pool_o += o as f64;
             pool_e += e;
+            pool_u += u;
         }
     }
     if pool_e >= pool_below {
-        add(pool_o, pool_e);
+        add(pool_o, pool_e, pool_u);
     } else {
         // too few to join the sum: Poisson tail P(X >= o) against 1e-12
-        impossible |= pool_o > 0.0 && 1.0 - gamma_q(pool_o, pool_e.max(1e-300)) < 1e-12;
+        impossible |= pool_o > 0.0 && 1.0 - gamma_q(pool_o, (pool_e + pool_u).max(1e-300)) < 1e-12;
     }
     let dof = cells.saturating_sub(1);
     let p = match (impossible, dof) {

@@ -119,10 +119,11 @@ fn the_error_estimate_is_right_with_roulette_after_iterations() {
     }
 }
 
-/// With Sobol' points samples of an iteration are spread evenly, so that one iteration states more than the true error, as
-/// with combs; from the second on the film measures how independent they are. Intervals miss on the low side as above: after four iterations of 64
-/// samples 83 of 100 of `classic` hold the true error; their limits were set after runs had shown this. Killed by:
-/// iterations that go on with a sequence, whose differences are larger than their errors.
+/// With Sobol' points samples of an iteration are spread evenly, so that one iteration states more than the true error,
+/// as with combs; from the second on the film measures how independent they are. Intervals miss on the low side as
+/// above: after four iterations of 64 samples 83 of 100 of `classic` hold the true error; their limits were set after
+/// runs had shown this. Killed by: iterations that go on with a sequence, whose differences are larger than their
+/// errors.
 #[test]
 fn the_error_estimate_is_right_with_sobol_points() {
     let scene = blob(&cornell([16, 16]));

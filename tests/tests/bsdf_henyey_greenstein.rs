@@ -3,14 +3,12 @@
 use croupier::unstable::bsdf::{Bsdf, HenyeyGreenstein, Inputs8};
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_tests::bsdf::{at_angle, lane, splat, unit};
+use croupier_tests::hard::sampling::{ALBEDO, MEAN_COSINES, UPWARDS as WO, phase_function, with_phase_function};
 use croupier_tests::jacobian::deviation;
 use croupier_tests::media_oracle::*;
-use croupier_tests::quadrature::{midpoint, tanh_sinh};
+use croupier_tests::quadrature::tanh_sinh;
 use croupier_tests::stats::*;
 use std::f64::consts::{PI, TAU};
-
-const ALBEDO: [f32; 3] = [0.9, 0.5, 0.0];
-const WO: Vec3x8 = Vec3x8::splat(0.0, 0.0, 1.0);
 
 /// Mean cosines: evenly spread, and those at which forms of the inversion change or lose their digits.
 fn mean_cosines() -> Vec<f32> {
@@ -19,16 +17,6 @@ fn mean_cosines() -> Vec<f32> {
     let special = [1e-7, 1e-4, below_half, 0.5, above_half, 0.99, 1e-30];
     let spread = (-16..=16).map(|k| k as f32 * 0.06);
     spread.chain(special).chain(special.map(|g| -g)).chain([0.0, -0.0]).collect()
-}
-
-/// Calls `f` with the model of a mean cosine.
-fn with_model<R>(g: f32, f: impl FnOnce(HenyeyGreenstein) -> R) -> R {
-    let mut medium = homogeneous([0.0; 3], [1.0; 3], [0.0; 3]);
-    medium.g = g;
-    // the medium under test is not the first
-    let scene = MediaScene::default().with(homogeneous([0.0; 3], [1.0; 3], [0.0; 3])).with(medium);
-    let inputs = Inputs8 { material: U32x8::splat(1), reflectance: Vec3x8::splat(ALBEDO[0], ALBEDO[1], ALBEDO[2]) };
-    f(HenyeyGreenstein::gather(&scene.scene(), &inputs, Mask8::all_lanes()))
 }
 
 /// A direction whose cosine to the direction of propagation, -z, is 1 - `q` or (`backwards`) -1 + `q`, exactly so in
@@ -46,7 +34,7 @@ fn direction(q: f64, phi: f64, backwards: bool) -> ([f64; 3], f64) {
 fn values_are_the_oracles() {
     let mut worst = 0.0f64;
     for g in mean_cosines() {
-        with_model(g, |model| {
+        with_phase_function(g, |model| {
             for step in 0..200 {
                 let q = 2.0 * (1e-6f64).powf(1.0 - f64::from(step) / 199.0).min(0.5);
                 for backwards in [false, true] {
@@ -81,7 +69,7 @@ fn values_are_the_oracles() {
 #[test]
 fn densities_integrate_to_one_with_mean_cosine_g() {
     for g in mean_cosines() {
-        with_model(g, |model| {
+        with_phase_function(g, |model| {
             let at = |q: f64, backwards: bool| {
                 let (w, cos) = direction(q, 0.3, backwards);
                 (f64::from(model.eval(WO, splat(w)).pdf.lane(0)) * TAU, cos)
@@ -105,7 +93,7 @@ fn samples_invert_the_distribution() {
     let mut worst = 0.0f64;
     for g in mean_cosines() {
         let g64 = f64::from(g);
-        with_model(g, |model| {
+        with_phase_function(g, |model| {
             for k in 0..512u32 {
                 let u = match k {
                     0 => 0.0,
@@ -153,7 +141,7 @@ fn samples_invert_the_distribution() {
 #[test]
 fn jacobian_of_the_sampling_is_the_density() {
     for g in [-0.9f32, -0.5, 0.0, 1e-7, 0.3, 0.7, 0.95] {
-        with_model(g, |model| {
+        with_phase_function(g, |model| {
             let draw = |u: f64, v: f64| model.sample(WO, [u as f32, v as f32, 0.5].map(F32x8::splat));
             let d = deviation(16, 1.0 / 64.0, &|u, v| lane(draw(u, v).wi, 0), &|u, v| {
                 Some(f64::from(draw(u, v).pdf.lane(0)))
@@ -167,35 +155,9 @@ fn jacobian_of_the_sampling_is_the_density() {
 /// Killed by: one lane's numbers used in another; the azimuth from the number of the cosine.
 #[test]
 fn samples_follow_the_density() {
-    const CELLS: [usize; 2] = [24, 16];
-    const SAMPLES: usize = 1 << 20;
-    let cases = [-0.99f32, -0.6, -1e-7, 0.0, 0.1, 0.5, 0.8, 0.99];
-    for (seed, g) in cases.into_iter().enumerate() {
-        let mut rng = SplitMix(77 + seed as u64);
-        let mut counts = vec![0u64; CELLS[0] * CELLS[1]];
-        let cell = |x: f64, n: usize| ((x * n as f64) as usize).min(n - 1);
-        // even in the fourth root of 1 - cos towards the peak, so that narrow peaks have cells
-        let band = |cos: f64| cell(((1.0 - cos * f64::from(g.signum())) / 2.0).max(0.0).powf(0.25), CELLS[0]);
-        with_model(g, |model| {
-            for _ in 0..SAMPLES / 8 {
-                let s = model.sample(WO, std::array::from_fn(|_| F32x8::from_fn(|_| rng.f32())));
-                for i in 0..8 {
-                    let wi = lane(s.wi, i);
-                    let phi = wi[1].atan2(wi[0]) / TAU;
-                    counts[band(-wi[2]) * CELLS[1] + cell(phi.rem_euclid(1.0), CELLS[1])] += 1;
-                }
-            }
-        });
-        let expected: Vec<f64> = (0..counts.len())
-            .map(|c| {
-                let edge = |k: usize| 2.0 * (k as f64 / CELLS[0] as f64).powi(4);
-                let (a, b) = (edge(c / CELLS[1]), edge(c / CELLS[1] + 1));
-                let at = |q: f64| henyey_greenstein(f64::from(g), f64::from(g.signum()) * (1.0 - q)) * TAU;
-                midpoint(2000, a, b, at) / CELLS[1] as f64 * SAMPLES as f64
-            })
-            .collect();
-        let r = chi_square(&counts, &expected, 20.0);
-        assert!(r.p > sidak(FAMILY_ALPHA, cases.len()), "g {g}: {r:?}");
+    for (seed, g) in (77..).zip(MEAN_COSINES) {
+        let r = phase_function(g, seed, 1 << 20);
+        assert!(r.p > sidak(FAMILY_ALPHA, MEAN_COSINES.len()), "g {g}: {r:?}");
     }
 }
 

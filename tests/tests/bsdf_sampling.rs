@@ -2,103 +2,14 @@
 //! the oracle says.
 
 use croupier::unstable::scene::blob::MaterialKind;
-use croupier::unstable::simd::{F32x8, Mask8};
 use croupier_tests::bsdf::*;
 use croupier_tests::furnace::{energy, mean_weight};
+use croupier_tests::hard::sampling::{configurations, surface};
 use croupier_tests::quadrature::jittered;
 use croupier_tests::stats::*;
-use std::f64::consts::TAU;
 
-/// Cells in the two coordinates.
-const CELLS: [usize; 2] = [12, 16];
-/// Quadrature points per cell and coordinate.
-const POINTS: usize = 32;
 /// Samples per configuration.
-const SAMPLES: usize = 1 << 20;
-
-/// Coordinates of the upper hemisphere with the cosine density uniform.
-fn cosine_coordinates(wi: V) -> (f64, f64) {
-    let t = wi[1].atan2(wi[0]) / TAU;
-    (wi[0] * wi[0] + wi[1] * wi[1], if t < 0.0 { t + 1.0 } else { t })
-}
-
-/// Cells of the directions of one configuration: half-vector coordinates for reflection and for transmission where the
-/// case is narrow, or hemisphere coordinates; a last cell for "no sample".
-struct Cells<'c> {
-    case: &'c Case,
-    by_facet: bool,
-}
-
-impl Cells<'_> {
-    const COUNT: usize = 2 * CELLS[0] * CELLS[1] + 1;
-
-    fn index(&self, wo: V, wi: V) -> usize {
-        let (s, t, upper) = if self.by_facet {
-            self.case.facet_coordinates(wo, wi)
-        } else {
-            let (s, t) = cosine_coordinates(wi);
-            (s, t, true)
-        };
-        let cell = |x: f64, n: usize| ((x * n as f64) as usize).min(n - 1);
-        (usize::from(!upper) * CELLS[0] + cell(s, CELLS[0])) * CELLS[1] + cell(t, CELLS[1])
-    }
-
-    fn probabilities(&self, wo: V) -> Vec<f64> {
-        let mut p = vec![0.0; Self::COUNT];
-        let (ns, nt) = (CELLS[0] * POINTS, CELLS[1] * POINTS);
-        for ([i, j], [s, t]) in jittered(ns, nt) {
-            let cell = i / POINTS * CELLS[1] + j / POINTS;
-            if self.by_facet {
-                let (m, dm) = self.case.facet(s, t);
-                for reflect in [true, false] {
-                    let Some((wi, d)) = self.case.through_facet(wo, m, reflect) else { continue };
-                    let add = usize::from(!reflect) * CELLS[0] * CELLS[1];
-                    p[cell + add] += self.case.eval(wo, wi).pdf * d * dm / (ns * nt) as f64;
-                }
-            } else {
-                let wi = [s.sqrt() * (TAU * t).cos(), s.sqrt() * (TAU * t).sin(), (1.0 - s).sqrt()];
-                // d wi = ds dt pi / cos
-                p[cell] += self.case.eval(wo, wi).pdf * (TAU / 2.0) / wi[2] / (ns * nt) as f64;
-            }
-        }
-        // quadrature misses slivers of cells at the horizon
-        p.iter_mut().for_each(|p| *p = p.max(1e-8));
-        // and cannot tell a loss below 1e-5 from none
-        p[Self::COUNT - 1] = (1.0 - p.iter().sum::<f64>()).max(1e-5);
-        p
-    }
-}
-
-fn configurations() -> Vec<(Case, V)> {
-    use MaterialKind::*;
-    let (grey, gold, gold_k) = ([0.6, 0.5, 0.1], [0.143, 0.375, 1.442], [3.983, 2.386, 1.603]);
-    let mut all = vec![];
-    let mut add = |case: Case, angles: &[f64]| {
-        for (k, &a) in angles.iter().enumerate() {
-            all.push((case.clone(), unit(lane(splat(at_angle(a, 0.7 + k as f64)), 0))));
-        }
-    };
-    add(Case::new(Diffuse, grey, [0.0; 3], [0.0; 3], 0.0), &[30.0]);
-    for alpha in [1e-3, 0.02, 0.125, 0.5, 1.0] {
-        add(Case::new(RoughConductor, grey, gold, gold_k, alpha), &[0.0, 30.0, 80.0, 89.0]);
-    }
-    add(Case::new(RoughConductor, grey, gold, gold_k, 0.1), &[89.99]);
-    for (alpha, eta) in [(0.01, 1.5), (0.1, 1.5), (0.5, 1.5), (0.3, 1.0 / 1.5), (1.0, 2.4), (0.2, 1.05)] {
-        add(Case::new(RoughDielectric, [0.0; 3], [eta; 3], [0.0; 3], alpha), &[0.0, 50.0, 85.0, 120.0, 150.0]);
-    }
-    for eta in [1.5, 1.0 / 1.5] {
-        add(Case::new(Plastic, grey, [eta; 3], [0.0; 3], 0.0), &[20.0, 85.0]);
-    }
-    for (alpha, eta) in [(0.1, 1.5), (0.3, 1.5), (1.0, 1.5), (0.3, 2.4)] {
-        add(Case::new(RoughPlastic, grey, [eta; 3], [0.0; 3], alpha), &[20.0, 60.0, 85.0]);
-    }
-    for alpha in [0.1, 0.6] {
-        add(Case::new(RoughConductor, grey, gold, gold_k, alpha).compensated(), &[30.0, 85.0]);
-        add(Case::new(RoughDielectric, [0.0; 3], [1.5; 3], [0.0; 3], alpha).compensated(), &[50.0, 120.0]);
-        add(Case::new(RoughPlastic, grey, [1.5; 3], [0.0; 3], alpha).compensated(), &[20.0, 85.0]);
-    }
-    all
-}
+const SAMPLES: u64 = 1 << 20;
 
 /// 2^20 samples of each configuration against cell probabilities from quadrature of the oracle's density; lost and
 /// delta samples are a cell of their own, so that the total is tested as well. One false alarm in 1e6 runs of all.
@@ -111,21 +22,7 @@ fn samples_follow_the_density() {
     let level = sidak(FAMILY_ALPHA, configurations.len());
     let mut smallest = 1.0f64;
     for (seed, (case, wo)) in configurations.iter().enumerate() {
-        let by_facet = case.alpha() > 0.0;
-        let cells = Cells { case, by_facet };
-        let model = case.model(Mask8::all_lanes());
-        let mut rng = SplitMix(1000 + seed as u64);
-        let mut counts = vec![0u64; Cells::COUNT];
-        for _ in 0..SAMPLES / 8 {
-            let s = model.sample(splat(*wo), std::array::from_fn(|_| F32x8::from_fn(|_| rng.f32())));
-            let scattered = s.valid.and_not(s.delta);
-            counts[Cells::COUNT - 1] += u64::from(8 - scattered.count());
-            for l in scattered.lanes() {
-                counts[cells.index(*wo, lane(s.wi, l))] += 1;
-            }
-        }
-        let expected: Vec<f64> = cells.probabilities(*wo).iter().map(|p| p * SAMPLES as f64).collect();
-        let r = chi_square(&counts, &expected, 20.0);
+        let r = surface(case, *wo, 1000 + seed as u64, SAMPLES, 32);
         smallest = smallest.min(r.p);
         let angle = wo[2].acos().to_degrees();
         assert!(r.p > level, "{} at {angle:.2} degrees: {r:?}", case.name());

@@ -7,6 +7,7 @@ use croupier::unstable::scene::blob::NONE;
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_host::description::{Instance, SceneDescription, Vertex};
 use croupier_tests::geometry::{Mesh, Ray, Rng, Tri, Verdict, judge, packet, soup, star};
+use croupier_tests::hard::spawned::{needle, weights};
 use croupier_tests::placed::{Kind, Map, add_prototype, apply, flatten, translation, turn};
 use croupier_tests::scenes::{blob, grey};
 
@@ -258,22 +259,6 @@ fn closed_instances_do_not_leak() {
     }
     assert!(rays > 1_000_000);
     assert_eq!(leaks, 0, "of {rays} rays");
-}
-
-/// Eight random barycentric weights (u, v).
-fn weights(r: &mut Rng) -> (F32x8, F32x8) {
-    let pairs: [(f32, f32); 8] = std::array::from_fn(|_| {
-        let (s, t) = (r.unit().sqrt(), r.unit());
-        (s * (1.0 - t), s * t)
-    });
-    (F32x8::from_fn(|i| pairs[i].0), F32x8::from_fn(|i| pairs[i].1))
-}
-
-fn needle(r: &mut Rng, size: f32, aspect: f32, offset: f32) -> Tri {
-    let (a, e, f, o) = (r.cube(), r.cube(), r.cube(), r.cube());
-    let at = |x: [f32; 3]| [0, 1, 2].map(|k| offset * o[k] + size * x[k]);
-    let b = [0, 1, 2].map(|k| a[k] + e[k]);
-    [at(a), at(b), at([0, 1, 2].map(|k| b[k] + f[k] / aspect))]
 }
 
 /// Points with weights `u`, `v` on triangle `triangle` in the instances `path`.

@@ -12,7 +12,7 @@ use croupier::unstable::rrs::Norm;
 use croupier::{Settings, Strategy};
 use croupier_host::builtin;
 use croupier_host::description::*;
-use croupier_tests::runner::{Image, Learned, Schedule, learning, poison, render, scheduled, settings};
+use croupier_tests::runner::{Image, Learned, Schedule, doubling, learning, poison, render, scheduled, settings};
 use croupier_tests::scenes::*;
 use croupier_tests::stats::{Mean, SplitMix, equivalent};
 
@@ -57,17 +57,6 @@ fn learns(scene: &[u8], strategy: &str, max_depth: u32) -> Settings {
     let s = settings(scene, strategy);
     let learning = Learning { cache_bytes: 1 << 20, subdivide_count: 2000.0, ..s.learning };
     Settings { max_depth, learning, ..s }
-}
-
-/// Iterations that double up to 256 samples, `spp` in all.
-fn doubling(spp: u32) -> Vec<u32> {
-    let (mut all, mut left) = (vec![], spp);
-    while left > 0 {
-        let n = (spp - left).clamp(8, 256).min(left);
-        all.push(n);
-        left -= n;
-    }
-    all
 }
 
 /// As many samples as [`TARGET`] takes, by a pilot with another seed.

@@ -1,83 +1,14 @@
 //! Environment maps and the constant environment against the f64 oracle.
 
-use croupier::unstable::light::{LightSample8, PowerSelector, environment_pdf, environment_radiance};
+use croupier::unstable::light::{PowerSelector, environment_pdf, environment_radiance};
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier_tests::environment::{HERE, SCALE, cases, random_words};
+use croupier_tests::hard::sampling::{Environments, environment};
 use croupier_tests::hit::sample;
-use croupier_tests::light_oracle::{Map, V, dot, length, luminance, wide};
+use croupier_tests::light_oracle::{Map, V, length, luminance, wide};
 use croupier_tests::light_scene::{IDENTITY, LightScene};
 use croupier_tests::stats::{SplitMix, chi_square_in_order};
 use std::f64::consts::{PI, TAU};
-
-const SCALE: f32 = 1.5;
-const HERE: Vec3x8 = Vec3x8::ZERO;
-/// A rotation that moves every axis, with entries that f32 rounds.
-const TURNED: [[f32; 3]; 3] = [[0.0, 0.6, 0.8], [0.0, -0.8, 0.6], [1.0, 0.0, 0.0]];
-
-struct Case {
-    name: &'static str,
-    owner: LightScene,
-    map: Map,
-    to_local: [[f32; 3]; 3],
-}
-
-impl Case {
-    fn new(
-        name: &'static str,
-        w: usize,
-        h: usize,
-        to_local: [[f32; 3]; 3],
-        mut f: impl FnMut(usize, usize) -> [f32; 3],
-    ) -> Self {
-        let texels: Vec<_> = (0..w * h).map(|k| f(k % w, k / w)).collect();
-        let map = Map::new(&texels, w, h);
-        // Another light, so that the selection probability is not 1.
-        let owner = LightScene::default()
-            .delta(croupier::unstable::scene::blob::LightKind::Point, [5.0, 0.0, 0.0], [1.0; 3])
-            .map(texels, [w as u32, h as u32], SCALE, to_local)
-            .select_by(&[1.0, 3.0]);
-        Self { name, owner, map, to_local }
-    }
-
-    /// World to map space in f64.
-    fn local(&self, d: [f32; 3]) -> V {
-        self.to_local.map(|r| dot(wide(r), wide(d)))
-    }
-
-    fn world(&self, d: V) -> [f32; 3] {
-        std::array::from_fn(|c| (0..3).map(|r| f64::from(self.to_local[r][c]) * d[r]).sum::<f64>() as f32)
-    }
-
-    fn pdf(&self, d: Vec3x8) -> F32x8 {
-        let scene = self.owner.scene();
-        environment_pdf(&scene, &PowerSelector(scene), HERE, HERE, d, Mask8::all_lanes())
-    }
-
-    fn radiance(&self, d: Vec3x8) -> Vec3x8 {
-        environment_radiance(&self.owner.scene(), d, Mask8::all_lanes())
-    }
-
-    /// A sample of the environment: the first word set so that the selector cannot pick the other light.
-    fn draw(&self, words: [U32x8; 4]) -> LightSample8 {
-        let scene = self.owner.scene();
-        sample(&scene, &PowerSelector(scene), HERE, HERE, words, Mask8::all_lanes())
-    }
-}
-
-fn cases() -> Vec<Case> {
-    let mut rng = SplitMix(30);
-    let mut noise = move |n: i32| -> [f32; 3] { std::array::from_fn(|_| rng.f64().powi(n) as f32) };
-    let mut hot = SplitMix(31);
-    let mut dim = move || -> [f32; 3] { [(0.1 + 0.1 * hot.f64()) as f32; 3] };
-    vec![
-        Case::new("noise", 16, 9, TURNED, |_, _| noise(2)),
-        Case::new("sun", 32, 17, TURNED, |i, j| if (i, j) == (31, 5) { [5e4, 4e4, 3e4] } else { dim() }),
-        Case::new("polar suns", 8, 5, IDENTITY, |i, j| if i == 3 && j % 4 == 0 { [900.0; 3] } else { [1.0; 3] }),
-        Case::new("half black", 12, 7, IDENTITY, |i, j| if i < 6 && j > 2 { [0.0, 0.7, 0.1] } else { [0.0; 3] }),
-        Case::new("smallest", 1, 2, IDENTITY, |_, j| [1.0, 2.0 + j as f32, 0.0]),
-        Case::new("even", 64, 2, TURNED, |_, _| [0.25; 3]),
-        Case::new("fine", 2048, 1024, IDENTITY, |i, j| [((i * 7 + j * 13) % 31) as f32; 3]),
-    ]
-}
 
 /// Directions in map space, the hard ones first.
 fn directions(rng: &mut SplitMix, n: usize) -> Vec<V> {
@@ -218,43 +149,13 @@ fn density_is_accurate_near_the_poles_of_a_fine_map() {
     println!("largest relative error {worst:.1e}");
 }
 
-fn random_words(rng: &mut SplitMix) -> [U32x8; 4] {
-    std::array::from_fn(|_| U32x8::from_fn(|_| rng.word()))
-}
-
 /// Samples over 3 x 3 parts of every cell against the oracle's probabilities. Killed by: sampling uniformly in a cell,
 /// exchanging its corners, the wrong pole in `Band`, tables of another row.
 #[test]
 fn samples_follow_the_density() {
-    let mut rng = SplitMix(33);
-    let parts = 3usize;
     for case in cases().iter().filter(|c| c.name != "fine") {
-        let [w, h] = case.map.cells();
-        let mut counts = vec![0u64; w * h * parts * parts];
-        let mut total = 0u64;
-        for _ in 0..80_000 {
-            let s = case.draw(random_words(&mut rng));
-            for i in (s.valid & s.infinite).lanes() {
-                let at = case.map.at(case.local(s.wi.lane(i)));
-                let part = |x: f64| ((x * parts as f64) as usize).min(parts - 1);
-                counts[((at.row * w + at.column) * parts + part(at.t)) * parts + part(at.x)] += 1;
-                total += 1;
-            }
-        }
-        let mut expected = vec![0.0; counts.len()];
-        for (k, p) in case.map.probabilities().into_iter().enumerate().filter(|(_, p)| *p > 0.0) {
-            for n in 0..parts * parts {
-                // The middle of a part has the mean of what is bilinear.
-                let [x, t] = [n % parts, n / parts].map(|m| (m as f64 + 0.5) / parts as f64);
-                let share = case.map.inside(k % w, k / w, x, t) / (parts * parts) as f64;
-                expected[k * parts * parts + n] = p * share * total as f64;
-            }
-        }
-        // A direction on the edge of a cell may round across it, into a cell at or below the mean.
-        let strays: u64 = counts.iter().zip(&expected).filter(|(_, e)| **e == 0.0).map(|(c, _)| c).sum();
+        let Environments { p, strays, total } = environment(case, 33, 80_000);
         assert!(strays <= total / 50_000, "{}: {strays} samples in cells that are never picked", case.name);
-        counts.iter_mut().zip(&expected).filter(|(_, e)| **e == 0.0).for_each(|(c, _)| *c = 0);
-        let p = chi_square_in_order(&counts, &expected);
         println!("{}: {total} samples, p = {p:.3}", case.name);
         assert!(p > 1e-6, "{}: p = {p}", case.name);
         // Three quarters choose the environment, and every one of these gives a sample.

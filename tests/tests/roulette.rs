@@ -2,20 +2,8 @@
 
 use croupier::unstable::rrs::{COMB_ONE, Learned8, Local8, MAX_FACTOR, MIN_FACTOR, Norm, Strategy, Vertices8, comb};
 use croupier::unstable::simd::{F32x8, U32x8, Vec3x8};
+use croupier_tests::hard::comb::{exact, sums};
 use croupier_tests::stats::SplitMix;
-
-/// Mean of n over all u on a grid of `m` equally spaced values that includes 0: exact for a comb in fixed point whose
-/// prefix sums are multiples of 2^32 / m.
-fn comb_means(s: [f32; 8], m: u64) -> [f64; 8] {
-    let mut sum = [0u64; 8];
-    for k in 0..m {
-        let u = (k * ((1u64 << 32) / m)) as u32;
-        for (t, n) in sum.iter_mut().zip(comb(F32x8::new(s), u)) {
-            *t += u64::from(n);
-        }
-    }
-    sum.map(|t| t as f64 / m as f64)
-}
 
 /// Killed by: rounding in f32, `u` drawn per lane from the same word, dividing by n.
 #[test]
@@ -27,12 +15,15 @@ fn the_comb_is_exact_on_average() {
         [0.7, 3.3, 0.25, 0.125, 1.75, 12.5, 0.3, 0.9],
     ];
     for s in cases {
-        let means = comb_means(s, 1 << 16);
-        for (mean, s) in means.into_iter().zip(s) {
+        let (sums, _) = sums(s, 16);
+        for (sum, s) in sums.into_iter().zip(s) {
+            let mean = sum as f64 / 65536.0;
             // the grid's own discretisation
             assert!((mean - f64::from(s)).abs() <= 2.0 / 65536.0, "{mean} for {s}");
         }
     }
+    // on the grid to the last sample
+    exact(1, 64, 14).assert_none("counts of the comb");
 }
 
 /// Killed by: a comb whose lanes are rounded up independently.

@@ -35,7 +35,7 @@ struct Args {
     call: bool,
 }
 
-const NAME: &str = "micro";
+const NAME: &str = if croupier::unstable::simd::REPRODUCIBLE { "micro" } else { "micro-fast" };
 const COLUMNS: &str = "group, kernel, per, lanes used, instructions, first-level misses, last-level misses";
 /// First-level misses per unit by which they may rise in any case, and per cent.
 const MISSES: (f64, f64) = (0.5, 25.0);

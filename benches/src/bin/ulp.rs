@@ -1,13 +1,16 @@
 //! Error of every elementary function over all 2^32 arguments, as a table; for two arguments over 10^8 random pairs.
 //!
-//! One to two core-minutes per function. `--features fast` measures fused arithmetic. `--write` puts the tables of all
+//! One to two core-minutes per function. The exit status is 0 only if all promises hold. `--features fast` measures fused arithmetic. `--write` puts the tables of all
 //! functions into `benches/results/ulp.md`, those of fused arithmetic into `ulp-fast.md`.
 
 use clap::Parser;
+use croupier_benches::exit::exit_code;
+use croupier_benches::hard::{broken_promises, swept};
 use croupier_benches::results::{Results, Table};
-use croupier_tests::math::{BINARY, Sweep, UNARY, Unary, sweep, sweep_pairs};
+use croupier_tests::math::{BINARY, UNARY, sweep_pairs};
 
 use std::error::Error;
+use std::process::ExitCode;
 
 #[derive(Parser)]
 #[command(about = "Errors of the elementary functions in units in the last place")]
@@ -21,35 +24,16 @@ struct Args {
 }
 
 const NAME: &str = if croupier::unstable::simd::REPRODUCIBLE { "ulp" } else { "ulp-fast" };
-const PARTS: u64 = 64;
-
-fn exhaustive(f: &'static Unary) -> Sweep {
-    let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u64);
-    let size = (1u64 << 32) / PARTS;
-    let handles: Vec<_> = (0..threads)
-        .map(|t| {
-            std::thread::spawn(move || {
-                let part = |p: u64| sweep(f, (p * size) as u32, (p * size + size - 1) as u32, 8);
-                let mut s = Sweep::default();
-                (t..PARTS).step_by(threads as usize).for_each(|p| s.merge(&part(p)));
-                s
-            })
-        })
-        .collect();
-    let mut s = Sweep::default();
-    handles.into_iter().for_each(|h| s.merge(&h.join().expect("a sweep panicked")));
-    s
-}
-
-fn main() -> Result<(), Box<dyn Error>> {
-    let args = Args::parse();
+fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
     let mut results = Results::of_this_run("ulp");
     let wanted = |name: &str| args.names.is_empty() || args.names.iter().any(|n| n == name);
 
     let mut table = Table::new("One argument", "function, max ULP, at, mean ULP, unordered neighbours");
+    let mut broken = Vec::new();
     print!("{}", table.head());
     for f in UNARY.iter().filter(|f| wanted(f.name)) {
-        let s = exhaustive(f);
+        let s = swept(f, 8);
+        broken.extend(broken_promises(f, &s));
         table.add([
             f.name.to_string(),
             format!("{:.4}", s.max.0),
@@ -67,6 +51,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     print!("\n{}", table.head());
     for f in BINARY.iter().filter(|f| wanted(f.name)) {
         let s = sweep_pairs(f, 12_500_000, 2);
+        if s.ratio.0 > 1.0 {
+            broken.push(format!("{}: {} of the promise", f.name, s.ratio.0));
+        }
         table.add([
             f.name.to_string(),
             format!("{:.4}", s.near.0),
@@ -82,5 +69,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     if args.write {
         println!("wrote {}", results.write(NAME)?.display());
     }
-    Ok(())
+    broken.iter().for_each(|b| println!("broken: {b}"));
+    Ok(broken.is_empty())
+}
+
+fn main() -> ExitCode {
+    exit_code("ulp", run(&Args::parse()))
 }

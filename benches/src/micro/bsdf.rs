@@ -6,7 +6,7 @@ use croupier::unstable::bsdf::{Bsdf, HenyeyGreenstein, Inputs8, Lobes, Visitor, 
 use croupier::unstable::scene::blob::MaterialKind;
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier_host::description::Principled;
-use croupier_tests::bsdf::{Case, V, Value, combine, lane, splat};
+use croupier_tests::bsdf::{Case, Lobe, V, Value, combine, lane, splat};
 use croupier_tests::media_oracle::{MediaScene, henyey_greenstein, homogeneous};
 use croupier_tests::model;
 use croupier_tests::principled::Layered;
@@ -20,6 +20,10 @@ trait Expected {
     fn two_sided(&self) -> bool;
     /// Relative error that the model may have; that of tables and of parameters in few bits, where there are any.
     fn tolerance(&self) -> f64;
+    /// Delta lobes: directions and weights.
+    fn lobes(&self, _wo: V) -> Vec<Lobe> {
+        vec![]
+    }
     /// Share of the light that passes straight on.
     fn straight(&self, _wo: V) -> f64 {
         0.0
@@ -43,8 +47,12 @@ impl Expected for Case {
         2e-3
     }
 
+    fn lobes(&self, wo: V) -> Vec<Lobe> {
+        Case::lobes(self, wo)
+    }
+
     fn straight(&self, wo: V) -> f64 {
-        let through = self.lobes(wo).into_iter().filter(|l| l.wi == wo.map(|x| -x));
+        let through = Case::lobes(self, wo).into_iter().filter(|l| l.wi == wo.map(|x| -x));
         through.map(|l| l.weight[0]).sum()
     }
 }
@@ -180,7 +188,7 @@ impl<E: Expected> Visitor<'static> for Rows<'_, E> {
         let model = B::gather(&scene, &inputs, Mask8::all_lanes());
         let mut rng = SplitMix(2);
         let (two_sided, tolerance) = (expected.two_sided(), expected.tolerance());
-        let draws: Vec<Draw> = (0..PACKETS)
+        let draws: Vec<Draw> = (0..k.compared)
             .map(|_| {
                 let wo = Vec3x8::from_fn(|_| {
                     let [x, y, z] = rng.direction();
@@ -198,13 +206,23 @@ impl<E: Expected> Visitor<'static> for Rows<'_, E> {
                 let v = expected.value(lane(*wo, i), lane(s.wi, i));
                 let (pdf, weight) = (f64::from(s.pdf.lane(i)), s.weight.lane(i));
                 close(format_args!("{name}: density of a sample"), pdf / v.pdf, 1.0, tolerance)?;
+                k.note(("bsdf sample", name), pdf, v.pdf);
                 for (f, weight) in v.f.into_iter().zip(weight) {
                     close(format_args!("{name}: weight of a sample"), f64::from(weight), f / v.pdf, tolerance)?;
+                    k.note(("bsdf sample", name), f64::from(weight), f / v.pdf);
+                }
+            }
+            for i in (s.valid & s.delta).lanes() {
+                let (wi, lobes) = (lane(s.wi, i), expected.lobes(lane(*wo, i)));
+                let apart = |l: &Lobe| combine(l.wi, 1.0, wi, -1.0).iter().fold(0.0f64, |m, x| m.max(x.abs()));
+                if let Some(off) = lobes.iter().map(apart).reduce(f64::min) {
+                    // a direction is of length 1
+                    k.note(("bsdf sample", name), 1.0 + off, 1.0);
                 }
             }
             expect(s.weight.is_finite().all(), format_args!("{name}: a weight that is not finite"))?;
         }
-        let lanes = mean_lanes(samples.iter().map(|s| s.valid.count() as usize));
+        let lanes = mean_lanes(samples.iter().take(PACKETS).map(|s| s.valid.count() as usize));
         k.packets(("bsdf gather", name), 8.0, vec![inputs; PACKETS], move |inputs| {
             B::gather(&scene, inputs, Mask8::all_lanes())
         });
@@ -214,18 +232,19 @@ impl<E: Expected> Visitor<'static> for Rows<'_, E> {
                 for i in 0..8 {
                     let want = expected.straight(lane(*wo, i));
                     close(format_args!("{name}: share that passes"), f64::from(got.lane(i)), want, 1e-5)?;
+                    k.note(("bsdf straight", name), f64::from(got.lane(i)), want);
                 }
             }
-            k.packets(("bsdf straight", name), 8.0, draws.clone(), move |(wo, _)| model.straight(*wo));
+            k.packets(("bsdf straight", name), 8.0, draws[..PACKETS].to_vec(), move |(wo, _)| model.straight(*wo));
         }
         // what lets all pass has no samples
         if lanes > 0.0 {
-            k.packets(("bsdf sample", name), lanes, draws.clone(), move |(wo, u)| model.sample(*wo, *u));
+            k.packets(("bsdf sample", name), lanes, draws[..PACKETS].to_vec(), move |(wo, u)| model.sample(*wo, *u));
         }
         if B::DELTA {
             return Ok(());
         }
-        let pairs: Vec<_> = draws.iter().zip(&samples).map(|((wo, _), s)| (*wo, s.wi)).collect();
+        let mut pairs: Vec<_> = draws.iter().zip(&samples).map(|((wo, _), s)| (*wo, s.wi)).collect();
         let mut used = vec![];
         for (wo, wi) in &pairs {
             let e = model.eval(*wo, *wi);
@@ -233,13 +252,16 @@ impl<E: Expected> Visitor<'static> for Rows<'_, E> {
                 let v = expected.value(lane(*wo, i), lane(*wi, i));
                 let what = format_args!("{name}: density from {:?} to {:?}", lane(*wo, i), lane(*wi, i)).to_string();
                 close(what, f64::from(e.pdf.lane(i)), v.pdf, tolerance)?;
+                k.note(("bsdf pdf", name), f64::from(e.pdf.lane(i)), v.pdf);
                 for (f, got) in v.f.into_iter().zip(e.f.lane(i)) {
                     close(format_args!("{name}: value"), f64::from(got), f, tolerance)?;
+                    k.note(("bsdf eval", name), f64::from(got), f);
                 }
             }
             used.push(e.pdf.gt(F32x8::ZERO).count() as usize);
         }
-        let lanes = mean_lanes(used);
+        let lanes = mean_lanes(used.into_iter().take(PACKETS));
+        pairs.truncate(PACKETS);
         k.packets(("bsdf eval", name), lanes, pairs.clone(), move |(wo, wi)| model.eval(*wo, *wi));
         k.packets(("bsdf pdf", name), lanes, pairs, move |(wo, wi)| model.eval(*wo, *wi).pdf);
         Ok(())

@@ -57,7 +57,7 @@ fn rows(k: &mut Kernels, kind: LightKind) -> Outcome {
     };
     let owner = leak(scene.finish());
     let scene = owner.scene();
-    let (draws, samples) = sampled(owner);
+    let (draws, samples) = sampled(owner, k.compared);
     let expected: Expected = match kind {
         LightKind::Area => |p, s, i| {
             let [a, b, c] = CORNERS.map(wide);
@@ -77,24 +77,36 @@ fn rows(k: &mut Kernels, kind: LightKind) -> Outcome {
             (Some(1.0 / (TAU * (1.0 - (1.0 - s * s).sqrt()))), wide(EMISSION))
         },
         LightKind::Rectangle => |p, _, _| (Some(1.0 / rectangle(*p)), wide(EMISSION)),
-        // near and far have densities of their own; compared with what a ray is told below
-        LightKind::Disk | LightKind::Environment => |_, s, i| (Some(f64::from(s.pdf.lane(i))), wide(EMISSION)),
+        // from afar, as all of the points are, uniform over its area
+        LightKind::Disk => |p, s, i| {
+            let offset = sub(wide(s.point.lane(i)), *p);
+            let r2 = dot(offset, offset);
+            let cos = offset[1] / r2.sqrt();
+            (Some(r2 / (PI * f64::from(0.8f32).powi(2) * cos)), wide(EMISSION))
+        },
+        LightKind::Environment => |_, s, i| (Some(f64::from(s.pdf.lane(i))), wide(EMISSION)),
     };
     for ((p, _), s) in draws.iter().zip(&samples) {
         for i in s.valid.lanes() {
             let (pdf, radiance) = expected(&wide(p.lane(i)), s, i);
             close(format_args!("{name}: density"), f64::from(s.pdf.lane(i)), pdf.unwrap_or(1.0), 2e-5)?;
+            if let Some(pdf) = pdf {
+                k.note(("light sample", name), f64::from(s.pdf.lane(i)), pdf);
+            }
             for (got, want) in s.radiance.lane(i).into_iter().zip(radiance) {
                 close(format_args!("{name}: radiance"), f64::from(got), want, 2e-5)?;
+                k.note(("light sample", name), f64::from(got), want);
             }
         }
     }
-    let lanes = mean_lanes(samples.iter().map(|s| s.valid.count() as usize));
+    let lanes = used(&samples);
     expect(lanes > 4.0, format_args!("{name}: {lanes} of 8 lanes have a sample"))?;
     sample_row(k, name, lanes, scene, &draws);
     match kind {
-        LightKind::Area => area_rows(k, scene, &draws, &samples),
-        LightKind::Sphere | LightKind::Rectangle | LightKind::Disk => shape_rows(k, name, scene, &draws, &samples),
+        LightKind::Area => area_rows(k, scene, &draws, &samples, expected),
+        LightKind::Sphere | LightKind::Rectangle | LightKind::Disk => {
+            shape_rows(k, name, scene, (&draws, &samples), expected)
+        }
         _ => Ok(()),
     }
 }
@@ -110,10 +122,10 @@ fn rectangle(p: V) -> f64 {
 type Draw = (Vec3x8, [U32x8; 4]);
 
 /// Reference points below the light, random words, and the samples from there.
-fn sampled(owner: &'static LightScene) -> (Vec<Draw>, Vec<LightSample8>) {
+fn sampled(owner: &'static LightScene, packets: usize) -> (Vec<Draw>, Vec<LightSample8>) {
     let mut rng = SplitMix(3);
     let scene = owner.scene();
-    let draws: Vec<Draw> = (0..PACKETS)
+    let draws: Vec<Draw> = (0..packets)
         .map(|_| {
             let p = Vec3x8::from_fn(|_| [-2.0, -1.0, -2.0].map(|x| rng.range(x, x + 2.0 * x.abs()) as f32 * 0.6));
             (p, std::array::from_fn(|_| U32x8::from_fn(|_| rng.word())))
@@ -125,19 +137,44 @@ fn sampled(owner: &'static LightScene) -> (Vec<Draw>, Vec<LightSample8>) {
 }
 
 fn sample_row(k: &mut Kernels, name: &str, lanes: f64, scene: Scene<'static>, draws: &[Draw]) {
-    k.packets(("light sample", name), lanes, draws.to_vec(), move |(p, words)| {
+    k.packets(("light sample", name), lanes, draws[..PACKETS].to_vec(), move |(p, words)| {
         hit::sample(&scene, &PowerSelector(scene), *p, UP, *words, Mask8::all_lanes())
     });
 }
 
-fn area_rows(k: &mut Kernels, scene: Scene<'static>, draws: &[Draw], samples: &[LightSample8]) -> Outcome {
+/// Lanes that have a sample, of the packets of a kernel.
+fn used(samples: &[LightSample8]) -> f64 {
+    mean_lanes(samples.iter().take(PACKETS).map(|s| s.valid.count() as usize))
+}
+
+/// Densities that rays are told, beside those that their samples must have.
+fn told(k: &mut Kernels, name: &str, draws: &[Draw], told: &[F32x8], samples: &[LightSample8], expected: Expected) {
+    for (((p, _), pdf), s) in draws.iter().zip(told).zip(samples) {
+        for i in s.valid.lanes() {
+            if let Some(want) = expected(&wide(p.lane(i)), s, i).0 {
+                k.note(("light pdf", name), f64::from(pdf.lane(i)), want);
+            }
+        }
+    }
+}
+
+fn area_rows(
+    k: &mut Kernels,
+    scene: Scene<'static>,
+    draws: &[Draw],
+    samples: &[LightSample8],
+    expected: Expected,
+) -> Outcome {
     let first = U32x8::splat(0);
     let pdf = move |(p, wi, t): &(Vec3x8, Vec3x8, F32x8)| {
         hit::area_pdf(&scene, &PowerSelector(scene), *p, UP, first, *wi, *t, Mask8::all_lanes())
     };
-    let rays: Vec<_> = draws.iter().zip(samples).map(|((p, _), s)| (*p, s.wi, (s.point - *p).length())).collect();
-    agree("area", &rays.iter().map(pdf).collect::<Vec<_>>(), samples)?;
-    let lanes = mean_lanes(samples.iter().map(|s| s.valid.count() as usize));
+    let mut rays: Vec<_> = draws.iter().zip(samples).map(|((p, _), s)| (*p, s.wi, (s.point - *p).length())).collect();
+    let densities: Vec<_> = rays.iter().map(pdf).collect();
+    agree("area", &densities, samples)?;
+    told(k, "area", draws, &densities, samples, expected);
+    let lanes = used(samples);
+    rays.truncate(PACKETS);
     k.packets(("light pdf", "area"), lanes, rays, pdf);
     Ok(())
 }
@@ -153,7 +190,13 @@ fn agree(name: &str, told: &[F32x8], samples: &[LightSample8]) -> Outcome {
     Ok(())
 }
 
-fn shape_rows(k: &mut Kernels, name: &str, scene: Scene<'static>, draws: &[Draw], samples: &[LightSample8]) -> Outcome {
+fn shape_rows(
+    k: &mut Kernels,
+    name: &str,
+    scene: Scene<'static>,
+    (draws, samples): (&[Draw], &[LightSample8]),
+    expected: Expected,
+) -> Outcome {
     let pdf = move |rays: &ShapeRays8| {
         let mut found = F32x8::ZERO;
         meet_shapes(&scene, &PowerSelector(scene), rays, UP, Mask8::all_lanes(), |lanes, _, pdf| {
@@ -169,23 +212,27 @@ fn shape_rows(k: &mut Kernels, name: &str, scene: Scene<'static>, draws: &[Draw]
         camera: Mask8::NONE,
         mask: Mask8::all_lanes(),
     };
-    let rays: Vec<_> = draws.iter().zip(samples).map(|((p, _), s)| ray((*p, s.wi))).collect();
-    agree(name, &rays.iter().map(pdf).collect::<Vec<_>>(), samples)?;
-    let lanes = mean_lanes(samples.iter().map(|s| s.valid.count() as usize));
+    let mut rays: Vec<_> = draws.iter().zip(samples).map(|((p, _), s)| ray((*p, s.wi))).collect();
+    let densities: Vec<_> = rays.iter().map(pdf).collect();
+    agree(name, &densities, samples)?;
+    told(k, name, draws, &densities, samples, expected);
+    let lanes = used(samples);
+    rays.truncate(PACKETS);
     k.packets(("light pdf", name), lanes, rays, pdf);
     Ok(())
 }
 
 fn environment(k: &mut Kernels, name: &str, owner: &'static LightScene, map: Option<&'static Map>) -> Outcome {
     let scene = owner.scene();
-    let (draws, samples) = sampled(owner);
+    let (draws, samples) = sampled(owner, k.compared);
     let pdf = move |(p, wi): &(Vec3x8, Vec3x8)| {
         environment_pdf(&scene, &PowerSelector(scene), *p, UP, *wi, Mask8::all_lanes())
     };
-    let rays: Vec<_> = draws.iter().zip(&samples).map(|((p, _), s)| (*p, s.wi)).collect();
-    agree(name, &rays.iter().map(pdf).collect::<Vec<_>>(), &samples)?;
+    let mut rays: Vec<_> = draws.iter().zip(&samples).map(|((p, _), s)| (*p, s.wi)).collect();
+    let densities: Vec<_> = rays.iter().map(pdf).collect();
+    agree(name, &densities, &samples)?;
     let cells = map.map(Map::probabilities);
-    for s in &samples {
+    for (s, told) in samples.iter().zip(&densities) {
         for i in s.valid.lanes() {
             let want = match map.zip(cells.as_ref()) {
                 None => 1.0 / (4.0 * PI),
@@ -198,10 +245,13 @@ fn environment(k: &mut Kernels, name: &str, owner: &'static LightScene, map: Opt
             };
             let got = f64::from(s.pdf.lane(i));
             close(format_args!("{name}: density"), got / want, 1.0, if map.is_some() { 0.02 } else { 1e-6 })?;
+            k.note(("light sample", name), got, want);
+            k.note(("light pdf", name), f64::from(told.lane(i)), want);
         }
     }
-    let lanes = mean_lanes(samples.iter().map(|s| s.valid.count() as usize));
+    let lanes = used(&samples);
     sample_row(k, name, lanes, scene, &draws);
+    rays.truncate(PACKETS);
     k.packets(("light pdf", name), lanes, rays, pdf);
     Ok(())
 }

@@ -50,6 +50,9 @@ fn rows(
         let (f, t) = (flight(n), passing(n));
         for i in 0..8 {
             passed[i].add(f64::from(t.lane(i)[0]));
+            if name == "homogeneous" {
+                k.note(("medium transmittance", name), f64::from(t.lane(i)[0]), (-tau(lines[i])).exp());
+            }
             // a flight that goes on elsewhere has neither passed nor collided: only whole ones are told apart
             flown[i].add(if f.passed.lane(i) { f64::from(f.weight.lane(i)[0]) } else { 0.0 });
         }
@@ -57,9 +60,13 @@ fn rows(
     for (i, line) in lines.iter().enumerate() {
         let want = (-tau(*line)).exp();
         let passes = passed[i];
+        if name != "homogeneous" {
+            k.note_mean(("medium transmittance", name), passes.mean(), passes.error(), want);
+        }
         close(format_args!("{name}: transmittance of line {i}"), passes.mean(), want, 5.0 * passes.error() + 1e-6)?;
         if name == "homogeneous" {
             let flies = flown[i];
+            k.note_mean(("medium flight", name), flies.mean(), flies.error(), want);
             close(format_args!("{name}: flights along line {i}"), flies.mean(), want, 5.0 * flies.error() + 1e-6)?;
         }
     }

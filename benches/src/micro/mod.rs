@@ -17,6 +17,7 @@ mod media;
 mod picture;
 mod tree;
 
+use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::hint::black_box;
 
@@ -39,10 +40,31 @@ pub struct Kernel {
 /// Packets of a kernel's inputs.
 const PACKETS: usize = 64;
 
+/// How far a kernel's results are from those of its f64 twin, relative to the twin's, or to [`FLOOR`] where that is
+/// larger.
+#[derive(Clone, Debug, Default)]
+pub struct Deviation {
+    /// Largest one.
+    pub max: f64,
+    /// Sum of all.
+    pub sum: f64,
+    /// How many results were compared.
+    pub count: u64,
+    /// Largest relative standard error of what is random on purpose, such as the share of light that passes a cloud:
+    /// means are compared there, and are off by some of these.
+    pub noise: f64,
+}
+
+/// Size of an exact value below which errors are no longer relative to it.
+pub const FLOOR: f64 = 1e-3;
+
 /// Kernels so far.
-#[derive(Default)]
 pub struct Kernels {
     list: Vec<Kernel>,
+    /// By group and name.
+    deviations: BTreeMap<(&'static str, String), Deviation>,
+    /// Packets that scattering models and lights are compared with their twins for, [`PACKETS`] at least.
+    compared: usize,
 }
 
 /// An answer that is not the expected one, as text.
@@ -82,14 +104,39 @@ impl Kernels {
     ) {
         self.list.push(Kernel { group, name: name.into(), unit, units, lanes: None, call: Box::new(call) });
     }
+
+    /// Notes a result of a kernel beside the exact one.
+    fn note(&mut self, (group, name): (&'static str, &str), got: f64, want: f64) {
+        let d = self.deviations.entry((group, name.into())).or_default();
+        let off = (got - want).abs() / want.abs().max(FLOOR);
+        d.max = d.max.max(off);
+        d.sum += off;
+        d.count += 1;
+    }
+
+    /// Notes a mean of random results with its standard error.
+    fn note_mean(&mut self, kernel: (&'static str, &str), mean: f64, error: f64, want: f64) {
+        self.note(kernel, mean, want);
+        if let Some(d) = self.deviations.get_mut(&(kernel.0, kernel.1.to_string())) {
+            d.noise = d.noise.max(error / want.abs().max(FLOOR));
+        }
+    }
 }
 
 /// All kernels, each compared with its expected answer.
 pub fn all() -> Result<Vec<Kernel>, String> {
-    let mut kernels = Kernels::default();
+    let mut kernels = Kernels { list: vec![], deviations: BTreeMap::new(), compared: PACKETS };
     let groups = [math::add, bsdf::add, light::add, media::add, camera::add, tree::add, learn::add, picture::add];
     each(groups, |add| add(&mut kernels))?;
     Ok(kernels.list)
+}
+
+/// How far scattering models, lights and media are from their f64 twins over so many packets, by group and name of the
+/// kernels.
+pub fn deviations(packets: usize) -> Result<BTreeMap<(&'static str, String), Deviation>, String> {
+    let mut kernels = Kernels { list: vec![], deviations: BTreeMap::new(), compared: packets.max(PACKETS) };
+    each([bsdf::add, light::add, media::add], |add| add(&mut kernels))?;
+    Ok(kernels.deviations)
 }
 
 /// Calls `f` with all `items`, also behind one that fails; the errors, one a line.

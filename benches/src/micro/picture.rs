@@ -1,8 +1,9 @@
 //! What works on whole pictures and scenes: the denoiser, validation of blobs, baking.
 
 use super::{Kernels, Outcome, close, expect};
-use croupier::Scene;
 use croupier::unstable::denoise::{Noisy, denoise, scratch_len};
+use croupier::unstable::film::{FilmSum, PixelStats};
+use croupier::{Plan, Scene, Settings};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin;
@@ -11,6 +12,7 @@ use std::hint::black_box;
 
 pub(super) fn add(k: &mut Kernels) -> Outcome {
     denoiser(k)?;
+    film(k)?;
     blobs(k)
 }
 
@@ -49,6 +51,28 @@ fn denoiser(k: &mut Kernels) -> Outcome {
     k.whole(("picture", "denoise 48 x 32"), ("8 pixels", pixels / 8), move || {
         black_box(run().is_ok());
     });
+    Ok(())
+}
+
+/// One more iteration of a small picture, added to those before: sums, deviations, what they say of the error.
+fn film(k: &mut Kernels) -> Outcome {
+    let size = [16, 16];
+    let plan = Plan::new(&Settings { size, max_depth: 1, ..Settings::default() }).map_err(|e| e.to_string())?;
+    let block: &'static mut AlignedBytes = Box::leak(Box::new(AlignedBytes::zeroed(plan.film_sum().size)));
+    let mut sum = FilmSum::new(&plan, block.as_mut()).map_err(|e| e.to_string())?;
+    let sample = |i: usize| PixelStats {
+        sum: [0.1 * i as f64; 3],
+        weight: 1.0,
+        weight_sqr: 1.0,
+        samples: 1,
+        ..PixelStats::default()
+    };
+    (0..8).for_each(|_| sum.add(sample, |_, _| 0.0));
+    for (i, p) in sum.finish().pixels().enumerate() {
+        close("mean of a pixel", p.mean()[0], 0.1 * i as f64, 1e-15)?;
+        expect(p.samples == 8, "samples of a pixel")?;
+    }
+    k.whole(("film", "add an iteration of 16 x 16"), ("8 pixels", 32), move || sum.add(black_box(sample), |_, _| 0.0));
     Ok(())
 }
 

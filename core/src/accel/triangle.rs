@@ -149,14 +149,23 @@ fn beyond(p: &Vertices, s: &Setup, axes: [usize; 3], lane: Option<usize>, limit:
 }
 
 /// Distance of the plane of the triangle in lane `i` from the origin, and component of the direction towards it, both
-/// times twice the area.
+/// times twice the area. From the two shorter edges and the vertex between them: with the long edges of a needle of
+/// 1e8 : 1 even `f64` loses the side on which an origin is.
 fn plane(p: &Vertices, s: &Setup, axes: [usize; 3], lane: Option<usize>, i: usize) -> (f64, f64) {
     let at = |v: &[F32x8; 3]| v.map(|x| f64::from(x.lane(i)));
     let from = |rays: &[[f32; 8]; 3]| axes.map(|k| f64::from(rays[k.min(2)][lane.unwrap_or(i) & 7]));
     let sub = |p: [f64; 3], q: [f64; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
     let dot = |p: [f64; 3], q: [f64; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
     let (a, b, c) = (at(&p[0]), at(&p[1]), at(&p[2]));
-    let (e, f) = (sub(b, a), sub(c, a));
+    let (ab, bc, ca) = (sub(b, a), sub(c, b), sub(a, c));
+    let (x, y, z) = (dot(ab, ab), dot(bc, bc), dot(ca, ca));
+    let (v, e, f) = if x >= y && x >= z {
+        (c, bc, ca)
+    } else if y >= z {
+        (a, ca, ab)
+    } else {
+        (b, ab, bc)
+    };
     let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
-    (dot(sub(a, from(&s.o)), n), dot(from(&s.d), n))
+    (dot(sub(v, from(&s.o)), n), dot(from(&s.d), n))
 }

@@ -39,7 +39,7 @@ use aov::AovPlanes;
 use bytemuck::{Pod, Zeroable};
 use independence::{Differences, Independence};
 use pixel::PixelWeights;
-use surroundings::{Block, SIDE};
+use surroundings::{Block, SIDE, UNSURE_SHARE};
 
 /// What a film holds of each pixel besides its mean and error.
 #[derive(Clone, Copy, Debug)]
@@ -266,8 +266,8 @@ impl<'m> Film<'m> {
             let own = || self.block(at + blocks).map(|(place, i)| (place, self.pixel(i)));
             let block = Block::of(own());
             for (place, p) in own() {
-                let [error, other] = block.relative_errors(place, &p);
-                s.show_pair(error, other, counters);
+                let e = block.relative_error(place, &p);
+                s.show_with(e.error, [e.other, e.unsure], counters);
                 pixels += 1;
             }
             blocks += 1;
@@ -288,8 +288,9 @@ impl<'m> Film<'m> {
         let spread = (t.sum_sqr / m - mean * mean).max(0.0) / m;
         let spread = ratio * ratio * spread + noise * noise * mean * mean;
         // how much depends on the estimated expectations
-        let doubt = ratio * (t.sum_other / m - mean);
-        let half = (1.96 * 1.96 * spread + doubt * doubt).sqrt_newton();
+        let [other, unsure] = t.sum_beside.map(|x| ratio * x / m);
+        let (doubt, unsure) = (other - ratio * mean, UNSURE_SHARE * unsure);
+        let half = (1.96 * 1.96 * spread + doubt * doubt + unsure * unsure).sqrt_newton();
         self.scalars.error = ErrorEstimate {
             rel_mse: ratio * mean,
             low: (ratio * mean - half).max(0.0),

@@ -20,8 +20,8 @@ pub(crate) struct Selection {
     pub sum: f64,
     /// Sum of their squares.
     pub sum_sqr: f64,
-    /// Sum of the values that were shown beside them.
-    pub sum_other: f64,
+    /// Sums of the values that were shown beside them.
+    pub sum_beside: [f64; 2],
     /// Sum of the largest values, which are left out of `sum`: nothing is ever subtracted (NUMERICS STA-4).
     pub rest: f64,
     /// Number of values that were shown in one visit.
@@ -52,12 +52,12 @@ impl Selection {
     /// Takes the next value of the visit that is under way.
     #[inline(always)]
     pub(crate) fn show(&mut self, x: f64, counters: &mut [u32]) {
-        self.show_pair(x, 0.0, counters);
+        self.show_with(x, [0.0; 2], counters);
     }
 
-    /// Takes the next value of the visit that is under way, with another that is summed where it is.
+    /// Takes the next value of the visit that is under way, with others that are summed where it is.
     #[inline(always)]
-    pub(crate) fn show_pair(&mut self, x: f64, other: f64, counters: &mut [u32]) {
+    pub(crate) fn show_with(&mut self, x: f64, beside: [f64; 2], counters: &mut [u32]) {
         let short = x as f32;
         let bits = short.to_bits() & 0x7fff_ffff;
         if let Some([shift, width]) = SHIFTS.get(self.visit as usize) {
@@ -79,7 +79,7 @@ impl Selection {
             self.count += 1;
             self.sum += x;
             self.sum_sqr += x * x;
-            self.sum_other += other;
+            self.sum_beside = [self.sum_beside[0] + beside[0], self.sum_beside[1] + beside[1]];
         }
     }
 

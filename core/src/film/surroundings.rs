@@ -17,6 +17,10 @@
 //! that stand out beyond their own noise (the positive part of James and Stein, "Estimation with quadratic loss", 1961). The
 //! others are those of other parity in column or row: the pixel is in none of their sums, and nothing is subtracted
 //! (NUMERICS STA-4). k = 1 is the estimate; k = [`DOUBT`] says how much depends on this choice, which widens the interval.
+//!
+//! So does what a pixel's own noise makes of its denominator: where q = v / D is large, at the edges of lamps, in
+//! caustics, D is hardly known. Each pixel adds q^2 / (q + [`UNSURE`]), all of q where it is large, next to nothing where
+//! it is small, and [`UNSURE_SHARE`] of the sum counts. Both numbers were found with the benchmark `intervals`.
 
 use super::error::{REL_MSE_EPSILON, relative_denominator};
 use super::pixel::PixelStats;
@@ -27,6 +31,10 @@ pub(super) const SIDE: u32 = 16;
 const ENOUGH: f64 = 8.0;
 /// The other k.
 const DOUBT: f64 = 4.0;
+/// Relative squared error of a pixel of which half is unsure.
+const UNSURE: f64 = 0.25;
+/// Part of what is unsure by which an interval is widened to both sides.
+pub(super) const UNSURE_SHARE: f64 = 0.5;
 
 /// Sums over some pixels of a block, or their means, by channel.
 #[derive(Clone, Copy, Default)]
@@ -71,6 +79,17 @@ struct Others {
     noise: [f64; 3],
 }
 
+/// Relative squared errors of a pixel, means over channels.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct PixelError {
+    /// Variance over the denominator.
+    pub error: f64,
+    /// The same with the other k.
+    pub other: f64,
+    /// What of it is unsure because of the pixel's own noise.
+    pub unsure: f64,
+}
+
 /// A block of pixels.
 pub(super) struct Block([Others; 4]);
 
@@ -97,20 +116,21 @@ impl Block {
         }))
     }
 
-    /// relMSE of a pixel of the block, mean over channels of variance / denominator, and the same with the other k.
-    pub(super) fn relative_errors(&self, [x, y]: [u32; 2], p: &PixelStats) -> [f64; 2] {
+    /// Relative squared error of a pixel of the block, and how well it is known.
+    pub(super) fn relative_error(&self, [x, y]: [u32; 2], p: &PixelStats) -> PixelError {
         let (m, v) = (p.mean(), p.variance_of_mean());
         let others = &self.0[parity(x, y) & 3];
-        let mut errors = [0.0; 2];
+        let mut sum = PixelError::default();
         for c in 0..3 {
-            for (error, k) in errors.iter_mut().zip([1.0, DOUBT]) {
-                // without an error there is nothing to divide
-                if v[c] > 0.0 {
-                    *error += v[c] / others.denominator(c, [m[c], v[c]], k) / 3.0;
-                }
+            // without an error there is nothing to divide
+            if v[c] > 0.0 {
+                let [q, other] = [1.0, DOUBT].map(|k| v[c] / others.denominator(c, [m[c], v[c]], k));
+                sum.error += q / 3.0;
+                sum.other += other / 3.0;
+                sum.unsure += q * (q / (q + UNSURE)) / 3.0;
             }
         }
-        errors
+        sum
     }
 }
 
@@ -143,12 +163,13 @@ mod tests {
         PixelStats { sum: [mean * w; 3], spread: [spread; 3], weight: w, weight_sqr: w, samples: n, rays: 0 }
     }
 
-    /// Mean of both errors over a block of 16 x 16 pixels.
-    fn errors(pixels: &[PixelStats]) -> [f64; 2] {
+    /// Means of error, other error and what is unsure over a block of 16 x 16 pixels.
+    fn errors(pixels: &[PixelStats]) -> [f64; 3] {
         let placed = || pixels.iter().enumerate().map(|(i, p)| ([i as u32 % 16, i as u32 / 16], *p));
         let block = Block::of(placed());
-        let sum = placed().map(|(place, p)| block.relative_errors(place, &p));
-        sum.fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]).map(|x| x / pixels.len() as f64)
+        let each = placed().map(|(place, p)| block.relative_error(place, &p));
+        let sum = each.fold([0.0; 3], |[a, b, c], e| [a + e.error, b + e.other, c + e.unsure]);
+        sum.map(|x| x / pixels.len() as f64)
     }
 
     /// Uniform numbers in [0, 1).
@@ -192,7 +213,7 @@ mod tests {
     fn what_stands_out_counts_by_itself() {
         let mut pixels = [pixel(16, 1e-3, 1e-8); 256].to_vec();
         pixels[100] = pixel(16, 100.0, 100.0);
-        let [error, other] = errors(&pixels);
+        let [error, other, _] = errors(&pixels);
         let truth = 0.01 / 256.0;
         assert!((error / truth - 1.0).abs() < 0.1 && (other / truth - 1.0).abs() < 0.2, "{error} {other} {truth}");
     }
@@ -204,8 +225,23 @@ mod tests {
         let pixels: Vec<_> =
             (0..256).map(|i| if i % 16 < 8 { pixel(64, 10.0, 0.01) } else { pixel(64, 0.1, 1e-4) }).collect();
         let truth = 0.5 * (0.01 / 100.01 + 1e-4 / 0.02);
-        let [error, _] = errors(&pixels);
+        let [error, ..] = errors(&pixels);
         assert!((error / truth - 1.0).abs() < 0.05, "{error} {truth}");
+    }
+
+    /// What is unsure is all of the error where pixels are noise, and a small part of it where they are not. Killed by: a
+    /// pixel's error that counts by its variance, not by its relative one.
+    #[test]
+    fn noisy_pixels_are_unsure() {
+        let [error, _, unsure] = errors(&rare(8, 0.01, 5));
+        assert!(unsure > 0.9 * error, "{unsure} of {error}");
+        for scale in [1.0, 1e-6, 1e6] {
+            let [error, _, unsure] = errors(&[pixel(64, 10.0, scale)].repeat(256));
+            let q = scale / 100.01;
+            // noise that is larger than the mean leaves less than its square to divide by
+            let least = q / (q + UNSURE) - 1e-3;
+            assert!(unsure / error > least && (q > 1.0 || unsure / error < least + 2e-3), "{unsure} of {error}");
+        }
     }
 
     /// Nothing that is finite makes an error that is not: pixels alone, black, huge, of one sample. Killed by: a division
@@ -216,11 +252,11 @@ mod tests {
             [pixel(4, 0.0, 0.0), pixel(4, 1e30, 1e60), pixel(1, 5.0, 0.0), pixel(4, 1e-30, 1e-62), pixel(0, 0.0, 0.0)]
         {
             for n in [1, 2, 256] {
-                let [a, b] = errors(&[p].repeat(n));
-                assert!(a.is_finite() && b.is_finite() && a >= 0.0 && b >= 0.0, "{p:?} {n}");
+                let all = errors(&[p].repeat(n));
+                assert!(all.iter().all(|e| e.is_finite() && *e >= 0.0), "{p:?} {n}");
             }
         }
-        let [a, _] = errors(&[pixel(4, 2.0, 0.1)]);
+        let [a, ..] = errors(&[pixel(4, 2.0, 0.1)]);
         assert!((a - 0.1 / (4.0 - 0.1 + 0.01)).abs() < 1e-12);
     }
 }

@@ -3,9 +3,10 @@
 use super::adaptive::{AllocationScalars, SampleAllocation};
 use super::cache::{BINS, Cache, CacheScalars, NO_BIN, Training, VertexKind8};
 use super::estimate::{EstimateScalars, PixelEstimates};
+use super::guiding::{Guide, GuideLog, GuideScalars, GuideUse, Lot, Trial, Watch};
 use super::needs::Needs;
 use super::picture::{Picture, PictureStatistics, error_of, outliers};
-use super::settings::{Learning, Objective};
+use super::settings::{Guiding, Learning, Objective};
 use crate::cost::COST_BOUNCE;
 use crate::counters::Counters;
 use crate::film::{Film, PixelSums, Selection};
@@ -24,6 +25,9 @@ pub struct LearnedState<'m> {
     learning: Learning,
     size: [u32; 2],
     cache: Option<Cache<'m>>,
+    guide: Option<Guide<'m>>,
+    /// Whether guiding pays, if the settings leave that open.
+    watch: Watch,
     /// Side of the pixel blocks of statistics over the picture.
     block: u32,
     pixels: PixelEstimates<'m>,
@@ -39,6 +43,8 @@ pub struct LearnedState<'m> {
 pub(crate) struct LearnedScalars {
     picture: Picture,
     cache: CacheScalars,
+    guide: GuideScalars,
+    watch: Watch,
     estimate: EstimateScalars,
     allocation: AllocationScalars,
 }
@@ -49,6 +55,8 @@ impl LearnedScalars {
         Self {
             picture: Picture::default(),
             cache: CacheScalars::new(bounds),
+            guide: GuideScalars::new(bounds),
+            watch: Watch::default(),
             estimate: EstimateScalars::default(),
             allocation: AllocationScalars::new(),
         }
@@ -56,13 +64,14 @@ impl LearnedScalars {
 
     /// Do these belong to a render with such needs?
     pub(crate) fn fit(&self, needs: &Needs) -> bool {
-        needs.cache.is_none_or(|size| self.cache.fit(size))
+        needs.cache.is_none_or(|size| self.cache.fit(size)) && needs.guide.is_none_or(|size| self.guide.fit(size))
     }
 }
 
 impl<'m> LearnedState<'m> {
     pub(crate) fn measure(m: Measure, needs: &Needs) -> Measure {
         let m = needs.cache.map_or(m, |size| Cache::measure(m, size));
+        let m = needs.guide.map_or(m, |size| Guide::measure(m, size));
         let m = PixelEstimates::measure(m, needs.size, needs.pixels);
         SampleAllocation::measure(m, needs.size, needs.adaptive)
     }
@@ -84,6 +93,8 @@ impl<'m> LearnedState<'m> {
             learning: n.learning,
             size: n.size,
             cache,
+            guide: n.guide.map(|size| Guide::carve(c, size, &scalars.guide)).transpose()?,
+            watch: scalars.watch,
             block,
             pixels: PixelEstimates::carve(c, n.size, n.pixels, &n.learning, scalars.estimate)?,
             allocation: SampleAllocation::carve(c, n.size, n.adaptive, scalars.allocation)?,
@@ -102,6 +113,10 @@ impl<'m> LearnedState<'m> {
         if let Some(cache) = &mut self.cache {
             cache.forget();
         }
+        if let Some(guide) = &mut self.guide {
+            guide.reset();
+        }
+        self.watch = Watch::default();
         self.pixels.clear();
         self.picture = Picture::default();
         self.allocation.begin_densities();
@@ -112,6 +127,8 @@ impl<'m> LearnedState<'m> {
         LearnedScalars {
             picture: self.picture,
             cache: self.cache.as_ref().map_or(fresh.cache, Cache::scalars),
+            guide: self.guide.as_ref().map_or(fresh.guide, Guide::scalars),
+            watch: self.watch,
             estimate: self.pixels.scalars(),
             allocation: self.allocation.scalars(),
         }
@@ -124,6 +141,92 @@ impl<'m> LearnedState<'m> {
 
     pub(crate) fn cache_mut(&mut self) -> Option<&mut Cache<'m>> {
         self.cache.as_mut().filter(|c| !c.is_flat())
+    }
+
+    /// Distributions of path guiding, if it is on.
+    #[inline(always)]
+    pub(crate) fn guide(&self) -> Option<&Guide<'m>> {
+        self.guide.as_ref()
+    }
+
+    pub(crate) fn guide_mut(&mut self) -> Option<&mut Guide<'m>> {
+        self.guide.as_mut()
+    }
+
+    /// Is the guide watched, whether it pays?
+    #[inline(always)]
+    pub(crate) fn watches(&self) -> bool {
+        self.learning.guiding == Guiding::Auto
+    }
+
+    /// Are most samples guided?
+    #[inline(always)]
+    pub(crate) fn guides_most(&self) -> bool {
+        !self.watches() || self.watch.awake()
+    }
+
+    /// What becomes of sample `sample` of the pixel in column and row `at` in iteration `iteration`.
+    #[inline(always)]
+    pub(crate) fn lot(&self, iteration: u64, at: [u32; 2], sample: u32) -> Lot {
+        if self.watches() { self.watch.lot(iteration, at, sample) } else { Lot { guided: true, tried: false } }
+    }
+
+    /// How many samples of a pixel are learned from in an iteration.
+    #[inline(always)]
+    pub(crate) fn learned_samples(&self, lot: Lot) -> u32 {
+        if !self.watches() {
+            return self.learning.samples;
+        }
+        // without a cache nothing but the guide learns
+        self.watch.learned(if self.cache.is_some() { self.learning.samples } else { 0 }, lot)
+    }
+
+    /// Whether guiding pays, if the settings leave that open.
+    pub(crate) fn guide_use(&self) -> Option<GuideUse> {
+        self.watches().then(|| GuideUse { awake: self.watch.awake(), gain: self.watch.gain() })
+    }
+
+    /// Begins to learn from the logs of path guiding; `false` if it is off.
+    pub(crate) fn begin_guide(&mut self) -> bool {
+        let (keep, most) = (self.learning.decay, self.guides_most());
+        self.guide.as_mut().map(|g| g.begin_learning(keep, most)).is_some()
+    }
+
+    /// Adds what a shard has measured of guiding.
+    pub(crate) fn add_trial(&mut self, trial: &Trial) {
+        self.watch.add(trial);
+    }
+
+    /// Are the shards' logs to be replayed next?
+    pub(crate) fn guide_wants_logs(&self) -> bool {
+        self.guide.as_ref().is_some_and(Guide::wants_logs)
+    }
+
+    /// Are the logs replayed for the first time?
+    pub(crate) fn is_first_replay(&self) -> bool {
+        self.guide.as_ref().is_some_and(Guide::is_first_replay)
+    }
+
+    /// Replays a log from entry `at` on, `limit` at most; their number, and `true` after the last.
+    pub(crate) fn replay(&mut self, log: &GuideLog<'_>, at: usize, limit: usize) -> (usize, bool) {
+        self.guide.as_mut().map_or((0, true), |g| g.replay(log, at, limit))
+    }
+
+    /// All logs were replayed.
+    pub(crate) fn end_replay(&mut self) {
+        if let Some(g) = &mut self.guide {
+            g.end_replay();
+        }
+    }
+
+    /// Goes on to learn where no logs are wanted; work done, in units of about a ray, and `true` after the last.
+    pub(crate) fn learn_guide(&mut self) -> (u64, bool) {
+        let Some(guide) = &mut self.guide else { return (0, true) };
+        let (work, done) = guide.learn_some();
+        if done && self.learning.guiding == Guiding::Auto {
+            self.watch.decide(guide.is_useful(), self.learning.decay.into());
+        }
+        (work, done)
     }
 
     /// Bins that shards may log to in this iteration.
@@ -326,7 +429,10 @@ impl<'m> LearnedState<'m> {
 
     /// Discounts statistics of the scene from bin `at` on, `limit` at most; their number, and `true` after the last.
     pub(crate) fn discount(&mut self, at: usize, limit: usize) -> (usize, bool) {
-        let keep = f64::from(self.learning.decay);
+        // the variance in a bin is that of the guide that was: factors must not lag behind
+        let guided = self.guide.is_some() && self.guides_most();
+        let again = if guided { self.learning.decay } else { 1.0 };
+        let keep = f64::from(self.learning.decay) * f64::from(again);
         self.cache.as_mut().map_or((0, true), |c| c.discount(keep, at, limit))
     }
 

@@ -9,6 +9,7 @@
 mod adaptive;
 pub mod cache;
 mod estimate;
+pub mod guiding;
 mod learned_state;
 mod needs;
 mod picture;
@@ -18,4 +19,4 @@ pub(crate) use learned_state::LearnedScalars;
 pub use learned_state::LearnedState;
 pub(crate) use needs::Needs;
 pub use picture::PictureStatistics;
-pub use settings::{ControlVariate, Learning, Objective, PixelEstimator};
+pub use settings::{ControlVariate, Guiding, Learning, Objective, PixelEstimator};

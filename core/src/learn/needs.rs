@@ -1,6 +1,7 @@
 //! Statistics that a render has to learn, as the settings ask for it.
 
 use super::cache::CacheSize;
+use super::guiding::GuideSize;
 use super::settings::{Learning, PixelEstimator};
 use crate::rrs::Space;
 
@@ -13,6 +14,8 @@ pub(crate) struct Needs {
     pub space: Option<Space>,
     /// Room for local statistics, if there are any.
     pub cache: Option<CacheSize>,
+    /// Room for path guiding, if it is on.
+    pub guide: Option<GuideSize>,
     /// Estimator of the pixels, if anything needs it.
     pub pixels: Option<PixelEstimator>,
     /// Adaptive sampling is on.

@@ -94,6 +94,22 @@ impl Value for ControlVariate {
     }
 }
 
+/// Use of path guiding.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Guiding {
+    /// None.
+    #[default]
+    Off,
+    /// While it is worth its cost, as measured by guiding a few samples and by not guiding a few. Needs kernels with it
+    /// ([`crate::unstable::profile::Profile::GUIDING`]), and an estimate of the pixels.
+    Auto,
+    /// Wherever the statistics promise a gain. Needs kernels with it ([`crate::unstable::profile::Profile::GUIDING`]).
+    On,
+}
+
+names!(Guiding: Off = "off", Auto = "auto", On = "on");
+named_values!(Guiding);
+
 settings! {
     /// Settings of the strategies that learn.
     pub struct Learning {
@@ -120,6 +136,11 @@ settings! {
             "objective", "Error of the picture to minimise: relative to the pixel (relMSE), or absolute (MSE)";
         norm: Norm = Norm::Mean =>
             "norm", "Norm of the errors of the three channels";
+        guiding: Guiding = Guiding::Off =>
+            "guiding", "Path guiding: scattering by learned distributions of directions, besides the materials' own";
+        /// Shards also need the ledger then, with 16 bytes more for each record, whatever the strategy.
+        guide_bytes: usize = 8 << 20 =>
+            "guide-bytes", "Memory for path guiding, the session's and the logs of all shards together";
         factors: [f32; 2] = [MIN_FACTOR, MAX_FACTOR] =>
             "factors", "Smallest and largest factor of roulette and splitting that is learned",
             SettingRange::Pair { first: [MIN_FACTOR, 1.0], second: [1.0, MAX_FACTOR] };

@@ -7,6 +7,7 @@
 //! | refresh | film | estimate of the pixels: denoised row by row, or means of blocks |
 //! | measure first | pixels of all shards, four times | as `measure`, of the first iteration, against its own estimate |
 //! | discount, absorb, freeze | training of all shards | statistics of the scene, their tree, what look-ups read |
+//! | guide | logs of all shards | distributions of path guiding |
 //! | densities | film, estimate | where adaptive sampling wants samples |
 //! | error | film, four times | estimated error of the picture |
 //!
@@ -28,9 +29,10 @@ const MEASURE_FIRST: u32 = 4;
 const DISCOUNT: u32 = 5;
 const ABSORB: u32 = 6;
 const FREEZE: u32 = 7;
-const DENSITIES: u32 = 8;
-const ERROR: u32 = 9;
-const DONE: u32 = 10;
+const GUIDE: u32 = 8;
+const DENSITIES: u32 = 9;
+const ERROR: u32 = 10;
+const DONE: u32 = 11;
 
 /// Pixels whose errors are computed in the time of a ray.
 const MEASURED_PER_RAY: u64 = 1;
@@ -44,6 +46,8 @@ const LOADED_PER_RAY: u64 = 6;
 const DISCOUNTED_PER_RAY: u64 = 8;
 /// Bins that are absorbed in the time of a ray.
 const ABSORBED_PER_RAY: u64 = 4;
+/// Directions that path guiding learns from in the time of a ray.
+const REPLAYED_PER_RAY: u64 = 4;
 /// Rays in the time of which the density of a tile is computed.
 const RAYS_PER_DENSITY: u64 = 24;
 /// Pixels whose contribution to the error is computed in the time of a ray.
@@ -142,7 +146,7 @@ impl SessionState<'_> {
             let before = self.finishing.stage;
             let done = self.finish_iteration(shards.clone(), Budget { rays: 1 << 14 })? == StepResult::Done;
             let now = if done { DONE } else { self.finishing.stage };
-            for (end, phase) in [(MERGE, Phase::Merged), (MEASURE_FIRST, Phase::Estimated), (FREEZE, Phase::Learned)] {
+            for (end, phase) in [(MERGE, Phase::Merged), (MEASURE_FIRST, Phase::Estimated), (GUIDE, Phase::Learned)] {
                 if before <= end && now > end {
                     passed(phase);
                 }
@@ -164,6 +168,7 @@ impl SessionState<'_> {
             DISCOUNT => "discount",
             ABSORB => "absorb",
             FREEZE => "freeze",
+            GUIDE => "guide",
             DENSITIES => "densities",
             ERROR => "error",
             _ => "done",
@@ -243,9 +248,13 @@ impl SessionState<'_> {
                 let (work, done) = self.learned.freeze_some();
                 if done {
                     self.next_stage();
+                    if !self.learned.begin_guide() {
+                        self.next_stage();
+                    }
                 }
                 work.max(1)
             }
+            GUIDE => self.learn_guide(shards, rays),
             DENSITIES => {
                 if self.learned.density_of_next(&self.film) {
                     self.finishing.selection.begin(self.digits);
@@ -329,6 +338,33 @@ impl SessionState<'_> {
             (f.shard, f.at) = (f.shard + 1, 0);
         }
         1 + n as u64 / ABSORBED_PER_RAY
+    }
+
+    /// Learns the distributions of path guiding from the logs of the shards.
+    fn learn_guide<'a, 'b: 'a>(&mut self, shards: &mut Walk<'a, 'b, impl Shards<'a, 'b>>, rays: u64) -> u64 {
+        if !self.learned.guide_wants_logs() {
+            let (work, done) = self.learned.learn_guide();
+            if done {
+                self.next_stage();
+            }
+            return work.max(1);
+        }
+        let f = &mut self.finishing;
+        let Some(s) = shards.shard(f.shard) else {
+            (f.shard, f.at) = (0, 0);
+            self.learned.end_replay();
+            return 1;
+        };
+        if let Some(trial) = s.guide_trial().filter(|_| f.at == 0 && self.learned.is_first_replay()) {
+            self.learned.add_trial(trial);
+        }
+        let limit = rays.saturating_mul(REPLAYED_PER_RAY) as usize;
+        let (n, done) = s.guide_log().map_or((0, true), |log| self.learned.replay(log, f.at as usize, limit));
+        f.at += n as u64;
+        if done {
+            (f.shard, f.at) = (f.shard + 1, 0);
+        }
+        1 + n as u64 / REPLAYED_PER_RAY
     }
 
     /// Estimates the error of the film.

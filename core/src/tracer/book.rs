@@ -9,8 +9,9 @@
 //! | pixels, AOVs | sums per pixel | the session's film |
 //! | counters | what happened | the session's counters |
 
+use super::guide_notes::{GuideNote8, GuideNotes};
 use super::job::Job;
-use super::ledger::{Ledger, NO_RECORD};
+use super::ledger::{Finished, Ledger, NO_RECORD};
 use super::packets::{Contribution8, Samples8, ShadowRays8};
 use super::path::Path8;
 use super::root::{PixelTarget, Roots};
@@ -21,9 +22,11 @@ use crate::film::{Aov, AovLayout, AovSet, AovSums, PixelSums, REL_MSE_EPSILON};
 use crate::learn::LearnedState;
 use crate::learn::cache::NO_BIN;
 use crate::learn::cache::Training;
+use crate::learn::guiding::{self, GuideLog};
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::rrs::Norm;
 use crate::settings::{MAX_PATH_LENGTH, Settings};
+use crate::world::World;
 use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
@@ -44,6 +47,7 @@ pub(crate) struct Bookkeeping<'m> {
     pub(super) roots: Roots<'m>,
     pub(super) ledger: Ledger<'m>,
     pub(crate) training: Option<Training<'m>>,
+    pub(super) guide: GuideNotes<'m>,
     /// Sums of the shard's pixels in this iteration, tile by tile in Morton order, as far as they are begun.
     pixels: &'m mut [PixelSums],
     /// Rays of those pixels, if anything needs them.
@@ -69,7 +73,8 @@ pub(crate) struct BookRecord {
     clear_bins: u64,
     begun: u64,
     outlier: f32,
-    reserved: u32,
+    /// Directions offered to the log of path guiding.
+    guide_offered: u32,
 }
 
 /// Camera samples in flight: every waiting vertex may have its own, and so may the lanes of a packet.
@@ -79,7 +84,7 @@ fn roots_capacity(settings: &Settings) -> usize {
 
 /// Records of samples in flight, if anything is learned from them.
 fn ledger_capacity(settings: &Settings) -> usize {
-    if settings.strategy.space().is_some() { settings.learning.ledger as usize } else { 0 }
+    if settings.strategy.space().is_some() || settings.guides() { settings.learning.ledger as usize } else { 0 }
 }
 
 impl<'m> Bookkeeping<'m> {
@@ -88,6 +93,7 @@ impl<'m> Bookkeeping<'m> {
         let s = &job.settings;
         let m = Ledger::measure(Roots::measure(m, roots_capacity(s)), ledger_capacity(s));
         let m = job.cache.map_or(m, |size| Training::measure(m, size));
+        let m = GuideNotes::measure(m, job, ledger_capacity(s));
         m.add::<PixelSums>(pixels)
             .add::<u32>(if s.counts_rays() { pixels } else { 0 })
             .add::<f32>(pixels.saturating_mul(AovLayout::new(s.aovs).planes))
@@ -100,6 +106,7 @@ impl<'m> Bookkeeping<'m> {
             roots: Roots::carve(c, roots_capacity(s))?,
             ledger: Ledger::carve(c, ledger_capacity(s))?,
             training: job.cache.map(|size| Training::carve(c, size)).transpose()?,
+            guide: GuideNotes::carve(c, job, ledger_capacity(s))?,
             pixels: c.take_unset(pixels)?,
             rays: c.take_unset(if s.counts_rays() { pixels } else { 0 })?,
             aovs: AovSums::new(aovs, c.take_unset(pixels.saturating_mul(aovs.planes))?),
@@ -121,7 +128,7 @@ impl<'m> Bookkeeping<'m> {
             clear_bins: bins[1],
             begun: self.begun as u64,
             outlier: self.outlier,
-            reserved: 0,
+            guide_offered: self.guide.log.as_ref().map_or(0, GuideLog::offered),
         }
     }
 
@@ -132,6 +139,9 @@ impl<'m> Bookkeeping<'m> {
         if let Some(training) = &mut self.training {
             training.resume([r.used_bins, r.clear_bins])?;
         }
+        if let Some(log) = &mut self.guide.log {
+            log.resume(r.guide_offered);
+        }
         self.begun = usize::try_from(r.begun).ok().filter(|&begun| begun <= self.pixels.len())?;
         (self.counters, self.outlier) = (r.counters, r.outlier);
         Some(())
@@ -141,6 +151,7 @@ impl<'m> Bookkeeping<'m> {
     pub(crate) fn reset(&mut self) {
         self.roots.reset();
         self.ledger.reset();
+        self.guide.clear();
         self.counters = Counters::default();
         self.begun = 0;
     }
@@ -236,7 +247,7 @@ impl<'m> Bookkeeping<'m> {
 
     /// A ledger record for each of the first `lanes` samples of vertices with the records `parents`, as long as there
     /// are any.
-    pub(super) fn open_samples(&mut self, parents: U32x8, lanes: usize, with_nee: bool) -> U32x8 {
+    pub(super) fn open_samples<W: World>(&mut self, parents: U32x8, lanes: usize, with_nee: bool) -> U32x8 {
         let mut out = [NO_RECORD; 8];
         if self.ledger.is_on() {
             let parents = parents.to_array();
@@ -248,11 +259,16 @@ impl<'m> Bookkeeping<'m> {
                 if *record == NO_RECORD {
                     self.counters.ledger_full += 1;
                     self.ledger.mark_incomplete(parent);
-                    self.close_record(parent);
+                    self.close_record::<W>(parent);
                 }
             }
         }
         U32x8::new(out)
+    }
+
+    /// The samples of these records begin without a direction that path guiding would learn from.
+    pub(super) fn open_directions(&mut self, records: U32x8) {
+        records.to_array().into_iter().for_each(|record| self.guide.open(record));
     }
 
     /// Adds radiance to the roots and ledger records of the lanes in `mask`; `beyond` says by which part of the path. What is not finite is counted, not added.
@@ -387,6 +403,15 @@ impl<'m> Bookkeeping<'m> {
         }
     }
 
+    /// Notes the directions that the bounces of eight samples took, after their next event estimation.
+    #[inline(never)]
+    pub(super) fn note_directions(&mut self, note: &GuideNote8, path: &Path8) {
+        for i in note.lanes.and_not(path.record.eq(U32x8::splat(NO_RECORD))).lanes() {
+            let slot = path.record.lane(i);
+            self.guide.note(slot, note, i, self.ledger.radiance(slot));
+        }
+    }
+
     /// Counts the lanes of `ended`, whose paths are as long as paths can be, if the settings ask for longer ones.
     #[inline(always)]
     pub(super) fn count_longest(&mut self, settings: &Settings, ended: Mask8) {
@@ -396,22 +421,29 @@ impl<'m> Bookkeeping<'m> {
     }
 
     /// Ends the paths of the lanes in `mask`.
-    pub(super) fn close_lanes(&mut self, mask: Mask8, path: &Path8) {
+    pub(super) fn close_lanes<W: World>(&mut self, mask: Mask8, path: &Path8) {
         let (root, record, depth) = (path.root.to_array(), path.record.to_array(), path.depth.to_array());
         for i in mask.lanes() {
-            self.close(root[i], record[i], depth[i]);
+            self.close::<W>(root[i], record[i], depth[i]);
         }
     }
 
     /// Ends a path of `depth` segments: closes a lane or a drained vertex of `root` and `record`. A finished camera
     /// sample goes to its pixel.
     #[inline]
-    pub(super) fn close(&mut self, root: u32, record: u32, depth: u32) {
+    pub(super) fn close<W: World>(&mut self, root: u32, record: u32, depth: u32) {
         self.counters.path_segments += u64::from(depth);
-        self.close_record(record);
+        self.close_record::<W>(record);
         if let Some(done) = self.roots.close(root) {
             self.counters.camera_samples += 1;
             let pixel = done.target.pixel();
+            if W::GUIDING
+                && done.target.is_tried()
+                && let [[off, on], ..] = &mut *self.guide.trial
+            {
+                let error = guiding::error_of(done.radiance, done.target.weight(), self.norm, self.outlier);
+                if done.target.is_guided() { on } else { off }.add(error, done.rays);
+            }
             if let Some(p) = self.pixels.get_mut(pixel) {
                 p.add(done.radiance);
             }
@@ -426,16 +458,28 @@ impl<'m> Bookkeeping<'m> {
 
     /// Closes a lane or a drained vertex of a ledger record and logs what that finishes.
     #[inline]
-    fn close_record(&mut self, record: u32) {
-        let (training, counters) = (&mut self.training, &mut self.counters);
-        self.ledger.close(record, |f| {
-            let Some(t) = training.as_mut().filter(|_| f.bin != NO_BIN) else { return };
-            counters.samples_logged += 1;
-            if !t.log(f.bin, f.value, f.cost) {
-                counters.samples_refused += 1;
-            } else if let Some(d) = f.pair {
-                t.log_pair(f.bin, d);
-            }
-        });
+    fn close_record<W: World>(&mut self, record: u32) {
+        let (training, counters, guide) = (&mut self.training, &mut self.counters, &mut self.guide);
+        // two copies of the code: renders without a guide do not even read what it learns from
+        if !W::GUIDING || guide.log.is_none() {
+            self.ledger.close(record, |f| log(training, counters, &f));
+        } else {
+            self.ledger.close(record, |f| {
+                guide.close(f.slot, f.radiance);
+                log(training, counters, &f);
+            });
+        }
+    }
+}
+
+/// Logs a finished sample.
+#[inline(always)]
+fn log(training: &mut Option<Training<'_>>, counters: &mut Counters, f: &Finished) {
+    let Some(t) = training.as_mut().filter(|_| f.bin != NO_BIN) else { return };
+    counters.samples_logged += 1;
+    if !t.log(f.bin, f.value, f.cost) {
+        counters.samples_refused += 1;
+    } else if let Some(d) = f.pair {
+        t.log_pair(f.bin, d);
     }
 }

@@ -142,8 +142,14 @@ pub(super) fn camera_samples<W: World>(
             book.begin_pixel(slot);
         }
         let (error_weight, share) = learned.error_weight(film);
-        let target = PixelTarget::numbered(error_weight, share, film, slot, s);
-        let Some(opened) = book.open_camera_sample(target, s < settings.learning.samples) else { break };
+        let mut target = PixelTarget::numbered(error_weight, share, film, slot, s);
+        let mut learning = settings.learning.samples;
+        if W::GUIDING {
+            let lot = learned.lot(iteration.number, p, s);
+            target = target.with_lot(lot);
+            learning = learned.learned_samples(lot);
+        }
+        let Some(opened) = book.open_camera_sample(target, s < learning) else { break };
         [x[lanes], y[lanes]] = p;
         pixel[lanes] = film;
         sample[lanes] = s;
@@ -199,7 +205,7 @@ pub(crate) fn camera_rays<W: World>(
     };
     let (o, d, active) = (source.origin, source.direction, source.active);
     if W::Extension::RAYS {
-        book.close_lanes(s.asked.and_not(active), &s.path);
+        book.close_lanes::<W>(s.asked.and_not(active), &s.path);
     }
     book.counters.camera_rays += s.count;
     RayState8 {

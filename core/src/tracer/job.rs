@@ -1,6 +1,7 @@
 //! What all shards of a render have in common.
 
 use crate::learn::cache::CacheSize;
+use crate::learn::guiding::GuideSize;
 use crate::settings::Settings;
 use crate::tiles::Tiles;
 
@@ -11,6 +12,8 @@ pub(crate) struct Job {
     pub tiles: Tiles,
     /// Room for statistics of the scene, if they are wanted.
     pub cache: Option<CacheSize>,
+    /// Room for path guiding, if it is on.
+    pub guide: Option<GuideSize>,
     /// Hash of the settings, which tells blocks of other plans.
     pub fingerprint: u64,
 }

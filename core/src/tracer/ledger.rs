@@ -53,8 +53,12 @@ struct LedgerRecord {
 /// A finished sample on its way to the statistics.
 #[derive(Clone, Copy, Debug)]
 pub struct Finished {
+    /// Slot that it had.
+    pub slot: u32,
     /// Where it is logged.
     pub bin: u32,
+    /// Estimate, rgb.
+    pub radiance: [f32; 3],
     /// Scaled estimate, rgb.
     pub value: [f32; 3],
     /// Counted cost.
@@ -167,6 +171,11 @@ impl<'m> Ledger<'m> {
         self.records.get(slot as usize).map_or([0.0; 3], |r| r.scale)
     }
 
+    /// A sample's estimate so far.
+    pub(crate) fn radiance(&self, slot: u32) -> [f32; 3] {
+        self.records.get(slot as usize).map_or([0.0; 3], |r| r.radiance)
+    }
+
     /// Part of a sample's estimate is lost to the ledger.
     pub(crate) fn mark_incomplete(&mut self, slot: u32) {
         if let Some(r) = self.get(slot) {
@@ -204,7 +213,7 @@ impl<'m> Ledger<'m> {
                 for c in 0..3 {
                     p.radiance[c] += p.inner[c] * done.radiance[c];
                 }
-                log(Finished { bin: p.bin, value, cost: done.cost, pair });
+                log(Finished { slot, bin: p.bin, radiance: done.radiance, value, cost: done.cost, pair });
             }
             slot = done.parent;
         }

@@ -72,7 +72,7 @@ pub(crate) fn cross_media<W: World>(
         wait(ring, rays, unfinished, (o, rays.travelled + flight.t, rays.media), world.sampler());
     }
     let ended = inside.and_not((flight.collided | flight.passed | flight.unfinished) & goes_on);
-    book.close_lanes(ended, &rays.path);
+    book.close_lanes::<W>(ended, &rays.path);
     rays.active = rays.active.and_not(ended | unfinished | stopped);
     let mask = inside & flight.collided & goes_on;
     hit.hit &= rays.active.and_not(mask);

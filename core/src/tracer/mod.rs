@@ -31,6 +31,8 @@ mod crossing;
 mod emission;
 mod first_surfaces;
 mod free_list;
+mod guide_notes;
+mod guided;
 mod job;
 mod ledger;
 mod media_set;

@@ -27,6 +27,10 @@ pub(crate) struct Samples8 {
     pub key: Key8,
     /// Times of the paths.
     pub time: F32x8,
+    /// Lanes that are guided, where the guide asks for it; all where the kernels contain no guiding.
+    pub guided: Mask8,
+    /// Lanes that path guiding learns from, if they have a record.
+    pub taught: Mask8,
 }
 
 /// One ray per lane, from the camera or from a vertex.

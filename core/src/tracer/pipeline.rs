@@ -79,8 +79,11 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
                     book.accumulate(visible, &shadow.path, &shadow.found, Beyond::ShadowRay);
                 }
             }
+            if W::GUIDING {
+                book.note_directions(&scattered.note, &samples.path);
+            }
             book.break_lanes(scattered.broken, &samples.path);
-            book.close_lanes(samples.active.and_not(scattered.rays.active), &samples.path);
+            book.close_lanes::<W>(samples.active.and_not(scattered.rays.active), &samples.path);
             scattered.rays
         }
     };
@@ -111,7 +114,7 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
         if let Some(found) = emission::environment(world, &rays, escaped) {
             book.accumulate(escaped, &rays.path, &found, Beyond::Ray);
         }
-        book.close_lanes(escaped, &rays.path);
+        book.close_lanes::<W>(escaped, &rays.path);
     }
     if (traced.hit | collision.mask).none() {
         return true;
@@ -136,7 +139,7 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
     let may_pass = may_pass::<W>(world.scene());
     if alive.none() && !wants_aovs && !may_pass {
         book.count_longest(settings, met);
-        book.close_lanes(met, &rays.path);
+        book.close_lanes::<W>(met, &rays.path);
         return true;
     }
 
@@ -151,7 +154,7 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
     if W::EFFECTS.contains(Effects::MEDIA) && collision.mask.any() {
         arrive_in_media(&rays, &collision, &mut arrival);
     }
-    let needs_albedo = settings.strategy.needs_albedo();
+    let needs_albedo = settings.strategy.needs_albedo() || W::GUIDING && settings.guides();
     let first = first & met;
     let seen = if wants_aovs && book.wants_albedo() { first & arrival.active } else { Mask8::NONE };
     arrival.active &= alive;
@@ -171,13 +174,13 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
         }
     }
     arrival.albedo = if needs_albedo { albedo } else { Vec3x8::ZERO };
-    book.close_lanes(met.and_not(arrival.active), &rays.path);
+    book.close_lanes::<W>(met.and_not(arrival.active), &rays.path);
     if arrival.active.none() {
         return true;
     }
 
     let decision = roulette(world, settings, book, comb, ring.free(), &mut arrival);
-    settle(book, ring, &arrival, &decision);
+    settle::<W>(book, ring, &arrival, &decision);
     book.counters.ring_peak = book.counters.ring_peak.max(ring.waiting() as u64);
     true
 }

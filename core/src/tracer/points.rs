@@ -38,7 +38,7 @@ pub(super) fn begin_at_points<W: World>(world: &W, job: &Job, index: u32, state:
     }
     arrival.active &= path.depth.lt(U32x8::splat(world.max_depth()));
     book.count_longest(settings, first.and_not(arrival.active));
-    book.close_lanes(samples.asked.and_not(arrival.active), path);
+    book.close_lanes::<W>(samples.asked.and_not(arrival.active), path);
     if arrival.active.none() {
         return;
     }
@@ -46,7 +46,7 @@ pub(super) fn begin_at_points<W: World>(world: &W, job: &Job, index: u32, state:
         arrival.albedo = Vec3x8::ONE;
     }
     let decision = roulette(world, settings, book, comb, ring.free(), &mut arrival);
-    settle(book, ring, &arrival, &decision);
+    settle::<W>(book, ring, &arrival, &decision);
     book.counters.ring_peak = book.counters.ring_peak.max(ring.waiting() as u64);
 }
 

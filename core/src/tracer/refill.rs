@@ -53,12 +53,23 @@ pub(crate) fn samples<W: World>(world: &W, ring: &Ring<'_>, book: &mut Bookkeepi
     let (class, with_nee) = (taken.queue.class(), taken.queue.with_nee());
     book.counters.scatter.count(taken.lanes as u32);
     book.counters.vertex_samples += taken.lanes as u64;
+    let (mut guided, mut taught) = (active, active);
+    if W::GUIDING && world.learned().watches() {
+        let [chosen, tried] = book.roots.lots(vertex.path.root, active);
+        (guided, taught) = (chosen, if world.learned().guides_most() { active } else { tried });
+    }
+    let record = book.open_samples::<W>(vertex.path.record, taken.lanes, with_nee);
+    if W::GUIDING {
+        book.open_directions(record);
+    }
     Samples8 {
         active,
+        guided,
+        taught,
         continues: active & vertex.path.depth.lt(U32x8::splat(world.max_depth())),
         class,
         with_nee,
-        path: Path8 { record: book.open_samples(vertex.path.record, taken.lanes, with_nee), ..vertex.path },
+        path: Path8 { record, ..vertex.path },
         key: vertex.key.sample(world.sampler(), taken.sample),
         time: if moves::<W>(world.scene()) { book.roots.times(vertex.path.root, active) } else { F32x8::ZERO },
         vertex,

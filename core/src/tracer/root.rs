@@ -1,6 +1,7 @@
 //! One record per camera sample in flight: what its whole tree of paths has found.
 
 use super::free_list::FreeList;
+use crate::learn::guiding::Lot;
 use crate::memory::{Carver, Measure, MemoryError};
 use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -34,24 +35,54 @@ pub(crate) struct PixelTarget {
     pub share: f32,
     /// Film index.
     pub film: u32,
-    /// Number of the pixel in the shard, below 2^31, and in the highest bit whether the sample is its first of the
-    /// iteration; see [`Self::numbered`].
+    /// Number of the pixel in the shard, below 2^29, and in the highest bits whether the sample is its first of the
+    /// iteration, and its [`Lot`]; see [`Self::numbered`].
     pixel: u32,
 }
 
 /// Bit of a pixel's first sample.
 const FIRST: u32 = 1 << 31;
+/// Bit of a guided sample.
+const GUIDED: u32 = 1 << 30;
+/// Bit of a sample that is compared with others.
+const TRIED: u32 = 1 << 29;
+/// All of them.
+const BITS: u32 = FIRST | GUIDED | TRIED;
 
 impl PixelTarget {
     /// The target of sample `sample`, of this iteration, of pixel `pixel` of the shard.
     pub(crate) fn numbered(error_weight: [f32; 3], share: f32, film: u32, pixel: u32, sample: u32) -> Self {
-        Self { error_weight, share, film, pixel: pixel & !FIRST | if sample == 0 { FIRST } else { 0 } }
+        Self { error_weight, share, film, pixel: pixel & !BITS | if sample == 0 { FIRST } else { 0 } }
+    }
+
+    /// The same of a sample with this lot.
+    #[inline(always)]
+    pub(crate) fn with_lot(self, lot: Lot) -> Self {
+        let bits = if lot.guided { GUIDED } else { 0 } | if lot.tried { TRIED } else { 0 };
+        Self { pixel: self.pixel | bits, ..self }
+    }
+
+    /// Is the sample compared with others?
+    #[inline(always)]
+    pub(crate) fn is_tried(&self) -> bool {
+        self.pixel & TRIED != 0
+    }
+
+    /// Is the sample guided?
+    #[inline(always)]
+    pub(crate) fn is_guided(&self) -> bool {
+        self.pixel & GUIDED != 0
     }
 
     /// Number of the pixel in the shard.
     #[inline(always)]
     pub(crate) fn pixel(&self) -> usize {
-        (self.pixel & !FIRST) as usize
+        (self.pixel & !BITS) as usize
+    }
+
+    /// What a squared error of the pixel counts in the error of the picture, per channel.
+    pub(crate) fn weight(&self) -> [f32; 3] {
+        self.error_weight.map(|x| x * (self.share * self.share))
     }
 
     /// Is it the pixel's first sample of the iteration?
@@ -140,6 +171,16 @@ impl<'m> Roots<'m> {
     pub(crate) fn times(&self, slots: U32x8, mask: Mask8) -> F32x8 {
         let slots = U32x8::select(mask, slots, U32x8::splat(u32::MAX)).to_array();
         F32x8::from_fn(|i| self.slots.get(slots[i] as usize).map_or(0.0, |root| root.time))
+    }
+
+    /// Lanes of `mask` whose camera samples are guided, and those whose are compared.
+    #[inline(always)]
+    pub(crate) fn lots(&self, slots: U32x8, mask: Mask8) -> [Mask8; 2] {
+        let slots = slots.to_array();
+        let words: [u32; 8] =
+            core::array::from_fn(|i| self.slots.get(slots[i] as usize).map_or(0, |root| root.target.pixel));
+        let words = U32x8::new(words);
+        [GUIDED, TRIED].map(|bit| mask.and_not((words & U32x8::splat(bit)).eq(U32x8::splat(0))))
     }
 
     /// The root in a slot.

@@ -11,12 +11,12 @@ use super::vertex::pack_samples;
 use crate::bsdf;
 use crate::extension::Extension;
 use crate::learn::cache::NO_BIN;
-use crate::rrs::{self, Learned8, MAX_FACTOR, MIN_FACTOR, Vertices8};
+use crate::rrs::{self, Learned8, MAX_FACTOR, MIN_FACTOR, Strategy, Vertices8};
 use crate::scene::Scene;
 use crate::scene::blob::MaterialKind;
 use crate::settings::Settings;
 use crate::world::World;
-use croupier_simd::{F32x8, Mask8, U32x8};
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -106,8 +106,10 @@ pub(crate) fn roulette<W: World>(
             key = Some(found);
         }
     }
+    // throughput undoes guiding: simple rules play by the albedos that it would have without (EARS, section 6.4)
+    let by_albedo = W::GUIDING && guides_most(world) && strategy.space().is_none();
     let vertices = Vertices8 {
-        beta: v.beta,
+        beta: if by_albedo { Vec3x8::grey(v.albedo_product) } else { v.beta },
         last_weight: a.weight,
         albedo: a.albedo,
         albedo_product: v.albedo_product,
@@ -131,6 +133,8 @@ pub(crate) fn roulette<W: World>(
     }
     if let Some(k) = &key {
         book.arrive(active, &v.path, k.bin, k.scale, a.weight / s);
+    } else if W::GUIDING {
+        book.arrive(active, &v.path, U32x8::splat(NO_BIN), Vec3x8::ZERO, a.weight / s);
     }
     let beta = v.beta / s;
     let nee_roulette = settings.shadow_roulette && key.is_some();
@@ -140,9 +144,19 @@ pub(crate) fn roulette<W: World>(
     v.beta = beta;
     v.nee_probability = nee_probability;
     v.albedo_product *= a.albedo.mean();
+    if by_albedo && !matches!(strategy, Strategy::Albedo(_)) {
+        v.albedo_product /= s;
+    }
     v.samples = U32x8::from_fn(|i| pack_samples(n[i], with_nee[i]));
     v.bin = key.map_or(U32x8::splat(NO_BIN), |k| k.bin);
     Decision8 { n, with_nee }
+}
+
+/// Are most samples guided?
+#[inline(always)]
+fn guides_most<W: World>(world: &W) -> bool {
+    let learned = world.learned();
+    learned.guide().is_some() && learned.guides_most()
 }
 
 /// How many of the `n` samples of each vertex draw a light sample, if each does with probability `nee_probability`: one

@@ -1,5 +1,5 @@
-//! A finished shard as bytes: what the end of an iteration reads of it, for a session of another process or machine that
-//! runs the same iteration.
+//! A finished shard as bytes: what the end of an iteration reads of it, for a session of another process or machine
+//! that runs the same iteration.
 //!
 //! | bytes | what |
 //! |---|---|
@@ -9,6 +9,7 @@
 //! | 4 per pixel and plane | their auxiliary sums |
 //! | 48 per bin | learned sums of the bins in use |
 //! | 4 per bin | their shadow rays |
+//! | 72, and 12 per direction | with path guiding: directions offered to its log, the trial, and those that it holds |
 //!
 //! Numbers have the byte order of the machine; the first bytes tell machines of the other order. The identity of scene,
 //! plan and iteration says where the sums belong, so all of it must agree. All bytes are checked before anything is
@@ -22,6 +23,7 @@ use super::shard::Shard;
 use crate::counters::Counters;
 use crate::film::{AovLayout, PixelSums};
 use crate::learn::cache::Training;
+use crate::learn::guiding::{GuideLog, Trial};
 use crate::scene::blob::content_hash;
 use crate::world::{Identity, Iteration, World};
 use bytemuck::{Pod, Zeroable};
@@ -35,6 +37,8 @@ const VERSION: u32 = 1;
 const UNHASHED: usize = 16;
 
 const HEADER: usize = size_of::<Header>();
+/// Bytes of what comes before the directions of path guiding.
+const GUIDED: usize = size_of::<GuideHeader>();
 
 // Any of these is part of the layout: other counters or sums need another version.
 const _: () = assert!(VERSION == 1 && HEADER == 392 && size_of::<PixelSums>() == 40 && Training::BIN_BYTES == 52);
@@ -171,15 +175,26 @@ fn pixel_bytes(job: &Job) -> usize {
     planes.saturating_mul(size_of::<f32>()).saturating_add(rays).saturating_add(size_of::<PixelSums>())
 }
 
+/// What path guiding has gathered besides directions.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+struct GuideHeader {
+    /// Directions offered to the log.
+    offered: u64,
+    /// Samples that were not guided, and samples that were.
+    trial: Trial,
+}
+
 /// Length of a saved shard, bytes.
-fn length(job: &Job, pixels: usize, bins: usize) -> usize {
-    let of_bins = bins.saturating_mul(Training::BIN_BYTES);
+fn length(job: &Job, pixels: usize, bins: usize, hits: usize) -> usize {
+    let of_log = if job.guide.is_some() { hits.saturating_mul(GuideLog::HIT_BYTES).saturating_add(GUIDED) } else { 0 };
+    let of_bins = bins.saturating_mul(Training::BIN_BYTES).saturating_add(of_log);
     pixels.saturating_mul(pixel_bytes(job)).saturating_add(of_bins).saturating_add(HEADER)
 }
 
 /// Length of the longest that a shard with so many pixels saves, bytes.
 pub(crate) fn longest(job: &Job, pixels: usize) -> usize {
-    length(job, pixels, job.cache.map_or(0, |size| size.bins()))
+    length(job, pixels, job.cache.map_or(0, |size| size.bins()), job.guide.map_or(0, |size| size.hits() as usize))
 }
 
 /// Takes bytes off the front of a saved shard; none if there are not so many.
@@ -189,10 +204,11 @@ fn take<'b>(rest: &mut &'b [u8], bytes: usize) -> &'b [u8] {
     head
 }
 
-/// A saved shard that fits: header, and sums of pixels, rays, auxiliary sums, bins, shadow rays as bytes.
+/// A saved shard that fits: header, and sums of pixels, rays, auxiliary sums, bins, shadow rays, log as bytes.
 struct SavedShard<'b> {
     header: Header,
-    parts: [&'b [u8]; 5],
+    guide: GuideHeader,
+    parts: [&'b [u8]; 6],
 }
 
 impl<'b> SavedShard<'b> {
@@ -235,7 +251,19 @@ impl<'b> SavedShard<'b> {
         }
         let job = &shard.job;
         let pixels = usize::try_from(header.pixels).unwrap_or(usize::MAX);
-        if pixels > job.tiles.pixels_of(shard.index()) || length(job, pixels, bins as usize) != given {
+        let log = shard.guide_log();
+        // what the log adds follows from its first bytes
+        let (mut guide, mut hits) = (GuideHeader::default(), 0);
+        if let Some(log) = log.filter(|_| pixels <= job.tiles.pixels_of(shard.index())) {
+            let at = length(job, pixels, bins as usize, 0).saturating_sub(GUIDED);
+            let bytes = bytes.get(at..).and_then(|b| b.first_chunk::<GUIDED>());
+            guide = bytes.map_or(guide, |b| bytemuck::pod_read_unaligned(b));
+            let Ok(offered) = u32::try_from(guide.offered) else {
+                return Err(E::Numbers { what: "directions of the guide", at: guide.offered });
+            };
+            hits = log.len_of(offered);
+        }
+        if pixels > job.tiles.pixels_of(shard.index()) || length(job, pixels, bins as usize, hits) != given {
             return Err(E::Numbers { what: "pixels", at: header.pixels });
         }
         if !header.counters.have_room() {
@@ -244,18 +272,26 @@ impl<'b> SavedShard<'b> {
         let lengths = shard.state.book.lengths(pixels);
         let [records, shadows] = Training::lengths(bins as usize);
         let [a, b, c] = lengths.map(|n| take(&mut rest, n));
-        Ok(Self { header, parts: [a, b, c, take(&mut rest, records), take(&mut rest, shadows)] })
+        let [d, e] = [records, shadows].map(|n| take(&mut rest, n));
+        let _ = take(&mut rest, if log.is_some() { GUIDED } else { 0 });
+        Ok(Self { header, guide, parts: [a, b, c, d, e, rest] })
     }
 
     /// Checks the numbers.
     fn check_numbers(&self) -> Result<(), SavedShardError> {
-        let [pixels, _, _, records, shadows] = self.parts;
+        let [pixels, _, _, records, shadows, log] = self.parts;
         let unsound = |bytes: &[u8]| !bytemuck::pod_read_unaligned::<PixelSums>(bytes).is_sound();
         if let Some(at) = pixels.chunks_exact(size_of::<PixelSums>()).position(unsound) {
             return Err(SavedShardError::Numbers { what: "pixel", at: at as u64 });
         }
-        match Training::unsound(records, shadows) {
-            Some(at) => Err(SavedShardError::Numbers { what: "bin", at: at as u64 }),
+        if let Some(at) = Training::unsound(records, shadows) {
+            return Err(SavedShardError::Numbers { what: "bin", at: at as u64 });
+        }
+        if let Some(at) = self.guide.trial.iter().position(|sums| !sums.is_sound()) {
+            return Err(SavedShardError::Numbers { what: "trial of path guiding", at: at as u64 });
+        }
+        match GuideLog::unsound(log) {
+            Some(at) => Err(SavedShardError::Numbers { what: "direction", at: at as u64 }),
             None => Ok(()),
         }
     }
@@ -265,7 +301,8 @@ impl Shard<'_> {
     /// Length of what [`Self::save`] writes, bytes; [`Plan::saved_shard`](crate::Plan::saved_shard) is the longest.
     pub fn saved_len(&self) -> usize {
         let book = &self.state.book;
-        length(&self.job, book.begun(), book.training.as_ref().map_or(0, Training::used))
+        let hits = self.guide_log().map_or(0, GuideLog::len);
+        length(&self.job, book.begun(), book.training.as_ref().map_or(0, Training::used), hits)
     }
 
     /// Writes what the end of an iteration reads of a shard that has finished it ([`StepResult::Done`], or stopped and
@@ -297,7 +334,11 @@ impl Shard<'_> {
         let [pixels, rays, aovs] = book.sums();
         let none: [&[u8]; 2] = [&[]; 2];
         let [records, shadows] = book.training.as_ref().map_or(none, Training::sums);
-        let parts = [bytemuck::bytes_of(&header), pixels, rays, aovs, records, shadows];
+        let log = self.guide_log().map_or(none[0], GuideLog::bytes);
+        let trial = self.guide_trial().copied().unwrap_or_default();
+        let guide = self.guide_log().map(|log| GuideHeader { offered: log.offered().into(), trial });
+        let guide = guide.as_ref().map_or(none[0], bytemuck::bytes_of);
+        let parts = [bytemuck::bytes_of(&header), pixels, rays, aovs, records, shadows, guide, log];
         let mut rest = &mut *out;
         for part in parts {
             let (head, tail) =
@@ -313,8 +354,9 @@ impl Shard<'_> {
     }
 
     /// Takes the place of the shard that [`Self::save`] has written: joins the iteration of `world`, the session, with
-    /// its sums, finished. What this shard had gathered in the iteration is forgotten. Sessions of several processes that
-    /// begin the same iterations, and end each with all shards, have the same film and the same statistics to the bit.
+    /// its sums, finished. What this shard had gathered in the iteration is forgotten. Sessions of several processes
+    /// that begin the same iterations, and end each with all shards, have the same film and the same statistics to the
+    /// bit.
     ///
     /// Of the statistics that the other session began the iteration with, only their size is compared: sessions that
     /// load statistics must load the same ones.
@@ -327,12 +369,16 @@ impl Shard<'_> {
         self.begin(world);
         self.state.cursor = CameraCursor::finished();
         let book = &mut self.state.book;
-        let [pixels, rays, aovs, records, shadows] = saved.parts;
+        let [pixels, rays, aovs, records, shadows, log] = saved.parts;
         book.load(saved.header.pixels as usize, [pixels, rays, aovs]);
         book.counters = saved.header.counters;
         if let Some(training) = &mut book.training {
             training.load([records, shadows]);
         }
+        if let Some(guide) = &mut book.guide.log {
+            guide.load(saved.guide.offered as u32, log);
+        }
+        book.guide.trial.fill(saved.guide.trial);
         Ok(())
     }
 }

@@ -2,6 +2,8 @@
 
 use super::class::Kernel as ClassKernel;
 use super::crossing::media_towards;
+use super::guide_notes::GuideNote8;
+use super::guided::{self, GuidedKernel};
 use super::packets::{RayState8, Samples8};
 use super::shading::dispatch;
 use crate::bsdf::{Bsdf, Eval8, HenyeyGreenstein, Inputs8, Sample8, Visitor, folded};
@@ -18,6 +20,8 @@ pub(crate) struct Scattered8 {
     pub rays: RayState8,
     /// Lanes whose weight is not finite.
     pub broken: Mask8,
+    /// What path guiding learns from.
+    pub note: GuideNote8,
 }
 
 /// One class's kernel on a packet.
@@ -56,7 +60,16 @@ impl<'s> Visitor<'s> for Kernel<'_, 's> {
 /// Samples the BSDFs of a packet, and evaluates them in the world directions `nee`.
 #[inline(always)]
 pub(crate) fn scatter<W: World>(world: &W, samples: &Samples8, nee: Option<Vec3x8>) -> Scattered8 {
-    let v = &samples.vertex;
+    if W::GUIDING
+        && let Some(guide) = world.learned().guide()
+        && let Some(guided) = guided::draw(guide, world, samples)
+        && let ClassKernel::Surface(kind) = samples.class.kernel()
+        && let from = (world.scene(), world.sampler())
+        && let Some(both) = dispatch::<W, _>(kind, GuidedKernel::new(from, samples, nee, &guided))
+    {
+        let m = guided::mix(&guided, &both, nee);
+        return onwards(world, samples, m.nee, &m.sample, m.wi, m.note);
+    }
     let kernel = Kernel { scene: world.scene(), samples, nee, u: samples.key.scattering(world.sampler()) };
     // a class outside the profile cannot be: sessions refuse such scenes
     let scattered = match samples.class.kernel() {
@@ -65,7 +78,20 @@ pub(crate) fn scatter<W: World>(world: &W, samples: &Samples8, nee: Option<Vec3x
         _ => None,
     };
     let (nee, s, frame) = scattered.unwrap_or_else(nothing);
-    let wi = frame.to_world(s.wi);
+    onwards(world, samples, nee, &s, frame.to_world(s.wi), GuideNote8::NONE)
+}
+
+/// The rays of the samples `s` in the world directions `wi`.
+#[inline(always)]
+fn onwards<W: World>(
+    world: &W,
+    samples: &Samples8,
+    nee: Eval8,
+    s: &Sample8,
+    wi: Vec3x8,
+    note: GuideNote8,
+) -> Scattered8 {
+    let v = &samples.vertex;
     let beta = v.beta * s.weight;
     let valid = samples.continues & s.valid;
     let finite = beta.is_finite();
@@ -73,6 +99,7 @@ pub(crate) fn scatter<W: World>(world: &W, samples: &Samples8, nee: Option<Vec3x
     Scattered8 {
         nee,
         broken: valid.and_not(finite),
+        note,
         rays: RayState8 {
             active: valid & beta.any_positive() & finite,
             ray: Ray8::unbounded(geometry::offset(v.p, v.ng, v.error, wi), wi).at(samples.time),

@@ -7,6 +7,7 @@ use super::state::{State, StateRecord};
 use crate::counters::Counters;
 use crate::film::PixelSums;
 use crate::learn::cache::Training;
+use crate::learn::guiding::{GuideLog, Trial};
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::tiles::TILE_PIXELS;
 use crate::world::{Identity, World};
@@ -219,6 +220,16 @@ impl<'m> Shard<'m> {
     /// What the shard has learned in this iteration.
     pub(crate) fn training(&self) -> Option<&Training<'m>> {
         self.state.book.training.as_ref()
+    }
+
+    /// The directions that path guiding learns from, of this iteration.
+    pub(crate) fn guide_log(&self) -> Option<&GuideLog<'m>> {
+        self.state.book.guide.log.as_ref()
+    }
+
+    /// What guided samples and others have cost in this iteration, if they are compared.
+    pub(crate) fn guide_trial(&self) -> Option<&Trial> {
+        self.state.book.guide.trial.first()
     }
 
     /// Has the shard finished this iteration of this scene?

@@ -127,6 +127,8 @@ fn floor_samples(shard: &mut Shard<'_>, kind: MaterialKind, with_nee: bool) -> S
     let vertex = floor(shard);
     Samples8 {
         active: Mask8::all_lanes(),
+        guided: Mask8::all_lanes(),
+        taught: Mask8::all_lanes(),
         continues: Mask8::all_lanes(),
         class: PacketClass::of_kind(kind as u32).expect("a class"),
         with_nee,
@@ -226,7 +228,7 @@ fn camera_rays_go_through_their_pixels() {
                     samples[film as usize] += 1;
                 }
                 assert!(r.skip_mis.all() && r.path.depth.to_array() == [1; 8]);
-                book.close_lanes(r.active, &r.path);
+                book.close_lanes::<TestWorld<'_>>(r.active, &r.path);
             }
             assert_eq!(samples, [4; 256]);
             assert_eq!((book.counters.camera_rays, book.counters.camera_samples), (1024, 1024));
@@ -518,7 +520,7 @@ fn vertices_wait_or_their_paths_end() {
             let n = [2, 0, 1, 0, 0, 0, 5, 0];
             let decision = Decision8 { n, with_nee: [1, 0, 1, 0, 0, 0, 5, 0] };
             a.vertex.samples = U32x8::from_fn(|i| n[i] | decision.with_nee[i] << 16);
-            settle(&mut shard.state.book, &mut shard.state.ring, &a, &decision);
+            settle::<TestWorld<'_>>(&mut shard.state.book, &mut shard.state.ring, &a, &decision);
             let c = &shard.state.book.counters;
             assert_eq!((c.paths_terminated, c.camera_samples, c.splits, c.light_samples_skipped), (2, 2, 5, 1));
             assert_eq!(shard.state.ring.waiting(), 3);
@@ -541,7 +543,7 @@ fn books_close_into_pixels() {
             let found = Contribution8 { pixel: x, local: x };
             shard.state.book.accumulate(Mask8::from_bits(0b0011_0110), &path, &found, Beyond::Ray);
             shard.state.book.accumulate(Mask8::from_bits(0b0000_0010), &path, &found, Beyond::Ray);
-            shard.state.book.close_lanes(Mask8::all_lanes(), &path);
+            shard.state.book.close_lanes::<TestWorld<'_>>(Mask8::all_lanes(), &path);
             let sums = [0, 1, 2, 5].map(|p| shard.state.book.pixel(p).0).map(|p| (p.sum, p.samples));
             assert_eq!(sums, [([0.0; 3], 1), ([2.0, 2.0, 1.0], 1), ([2.0, 1.0, 0.5], 1), ([0.0; 3], 1)]);
             let c = &shard.state.book.counters;

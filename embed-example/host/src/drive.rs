@@ -93,7 +93,7 @@ pub fn drive(scene: &[u8], options: &Options<'_>, observer: &dyn Observer) -> Re
 
 /// Renders a validated scene with the smallest profile that holds its effects.
 pub fn drive_scene(scene: Scene<'_>, options: &Options<'_>, observer: &dyn Observer) -> Result<Rendered, DriveError> {
-    AnyProfile::smallest(scene.effects).dispatch(Drive { scene, options, observer })
+    AnyProfile::smallest(scene.effects).dispatch_guided(options.settings.guides(), Drive { scene, options, observer })
 }
 
 /// A render whose profile is to be chosen.

@@ -7,6 +7,7 @@ mod common;
 use common::text;
 use croupier::{INSTRUCTION_SET, processor_instruction_set};
 use std::fs::{self, Permissions};
+use std::io::ErrorKind;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -18,7 +19,13 @@ fn run(program: &Path, asked: Option<&str>, arguments: &[&str]) -> Output {
     let mut command = Command::new(program);
     command.args(arguments).env_remove("CROUPIER_INSTRUCTIONS");
     command.envs(asked.map(|set| ("CROUPIER_INSTRUCTIONS", set)));
-    command.output().unwrap()
+    loop {
+        match command.output() {
+            // a child that another test has just begun may still hold the copy open
+            Err(e) if e.kind() == ErrorKind::ExecutableFileBusy => std::thread::yield_now(),
+            done => return done.unwrap(),
+        }
+    }
 }
 
 /// Killed by: a request that is ignored; arguments, name or status that are lost on the way; a variant that looks for

@@ -76,7 +76,11 @@ const context = await chromium.launchPersistentContext(profile, {
 });
 const complaints = [];
 try {
-  expect(figures.length >= 8, `there are ${figures.length} figures`);
+  const needed = ['error-0', 'times-0', 'settings-0', 'depth-0', 'reliability', 'kernels', 'primitives',
+    ...['scattering', 'lights', 'media'].flatMap((group) => [`components-${group}`, `twins-${group}`])];
+  const missing = needed.filter((name) => !figures.includes(name));
+  const there = `there are ${figures.length} figures, and all that must be`;
+  expect(missing.length === 0, missing.length ? `no ${missing}` : there);
   for (const [device, size] of [['desktop', { width: 1280, height: 900 }], ['phone', { width: 390, height: 844 }]]) {
     for (const colorScheme of ['light', 'dark']) {
       console.log(`${device}, ${colorScheme}`);
@@ -91,6 +95,16 @@ try {
       await page.evaluate(() => document.querySelectorAll('details').forEach((d) => { d.open = true; }));
       const wrong = await page.evaluate(faults, figures);
       expect(wrong.length === 0, wrong.length ? wrong.join('\n    ') : 'every figure is there and in its place');
+      // what is said in tables: every section has its rows, and only tables scroll
+      const empty = await page.evaluate(() => [...document.querySelectorAll('main .table')]
+        .filter((t) => t.querySelectorAll('tbody tr').length === 0).map((t) => t.closest('section').id));
+      expect(empty.length === 0, empty.length ? `empty tables in ${empty}` : 'every table has rows');
+      const says = await page.evaluate(() => document.querySelector('main').textContent);
+      const needed = ['time to 1 %', 'bias floor', 'right, of all', 'within 25 %', 'missed', 'against f64',
+        'instructions / 8 lanes'];
+      for (const text of needed) {
+        if (!says.includes(text)) throw new Error(`the page does not say "${text}"`);
+      }
       const [paper, ink] = await page.evaluate(() => {
         const { backgroundColor, color } = getComputedStyle(document.body);
         return [backgroundColor, color].map((c) => c.match(/\d+/g).map(Number).reduce((a, b) => a + b));

@@ -3,6 +3,7 @@
 use croupier::unstable::accel::{Intersector, WideBvh};
 use croupier::unstable::geometry::Ray8;
 use croupier::unstable::simd::{F32x8, Mask8, Vec3x8};
+use croupier_tests::geometry::star;
 use glam::Vec3;
 use obvhs::ray::Ray;
 use std::path::Path;
@@ -197,9 +198,44 @@ fn bounds(triangles: &[Tri]) -> (Vec3, Vec3) {
 pub(crate) fn scene(path: Option<&Path>) -> (Vec<Tri>, Camera) {
     let Some(path) = path else { return generated() };
     let triangles = read_obj(path);
-    let (lo, hi) = bounds(&triangles);
-    let around = Camera { origin: lo.lerp(hi, 0.9), target: (lo + hi) * 0.5, up: Vec3::Y, vfov: 60.0, aspect: 1.5 };
-    (triangles, read_camera(&path.with_file_name("scene.json")).unwrap_or(around))
+    let camera = read_camera(&path.with_file_name("scene.json")).unwrap_or_else(|| inside(&triangles));
+    (triangles, camera)
+}
+
+/// A camera near a corner of the scene's bounds.
+fn inside(triangles: &[Tri]) -> Camera {
+    let (lo, hi) = bounds(triangles);
+    Camera { origin: lo.lerp(hi, 0.9), target: (lo + hi) * 0.5, up: Vec3::Y, vfov: 60.0, aspect: 1.5 }
+}
+
+/// A closed mesh around `offset`, and rays from its middle to points of edges and to vertices, as closest-hit and as
+/// any-hit rays. One that hits nothing has leaked.
+pub(crate) fn aimed(offset: [f32; 3], scale: f32, number: usize) -> (Vec<Tri>, Camera, [Set; 4]) {
+    let triangles = star(64, offset, scale, 7);
+    let (mut r, middle) = (Random(11), Vec3::from_array(offset));
+    let mut aim = |edges: bool| {
+        let mut origin = middle;
+        let ray = |i: usize| {
+            // packets of one origin and of many
+            if i.is_multiple_of(8) || (i / 8).is_multiple_of(2) {
+                origin = middle + 0.3 * scale * Vec3::new(r.unit() - 0.5, r.unit() - 0.5, r.unit() - 0.5);
+            }
+            let t = triangles[(r.unit() * triangles.len() as f32) as usize % triangles.len()].map(Vec3::from_array);
+            let e = (3.0 * r.unit()) as usize % 3;
+            let s = if edges { r.unit() } else { 0.0 };
+            One { o: origin, d: t[e].lerp(t[(e + 1) % 3], s) - origin, tmax: f32::INFINITY }
+        };
+        (0..number).map(ray).collect::<Vec<_>>()
+    };
+    let (edges, vertices) = (aim(true), aim(false));
+    let camera = inside(&triangles);
+    let sets = [
+        Set::new("edges, closest hit", false, &edges),
+        Set::new("edges, any hit", true, &edges),
+        Set::new("vertices, closest hit", false, &vertices),
+        Set::new("vertices, any hit", true, &vertices),
+    ];
+    (triangles, camera, sets)
 }
 
 /// Primary rays, bounces and shadow rays.

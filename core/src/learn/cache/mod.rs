@@ -31,12 +31,13 @@ mod save;
 mod shared;
 mod size;
 mod training;
-mod tree;
+pub(super) mod tree;
 
 pub(super) use bins::BINS;
 pub use bins::{BIN_LIMIT, MAX_VALUE, NO_BIN};
 pub use kind::{VertexKind, VertexKind8};
 pub use save::CacheError;
+pub(super) use save::check_shape;
 pub use shared::Cache;
 pub(super) use shared::CacheScalars;
 pub use size::CacheSize;

@@ -235,7 +235,7 @@ impl<'b> SavedCache<'b> {
 }
 
 /// Checks that the shape is one tree after the other, as many as there are kinds of vertices.
-fn check_shape(shape: &[u8], expected: [u32; 2]) -> Result<(), CacheError> {
+pub(in crate::learn) fn check_shape(shape: &[u8], expected: [u32; 2]) -> Result<(), CacheError> {
     // nodes still to come at every depth
     let mut open = [0u32; MAX_DEPTH as usize + 1];
     if let Some(o) = open.first_mut() {

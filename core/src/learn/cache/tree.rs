@@ -16,11 +16,11 @@ use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Depth of the deepest leaf.
-pub(super) const MAX_DEPTH: u32 = 16;
+pub(in crate::learn) const MAX_DEPTH: u32 = 16;
 /// Largest number of leaves: their numbers have 26 bits.
-pub(super) const MAX_LEAVES: u32 = 1 << 26;
+pub(in crate::learn) const MAX_LEAVES: u32 = 1 << 26;
 /// Number of octrees, one for each kind of vertex. Their roots are the first nodes.
-pub(super) const ROOTS: u32 = VertexKind::ALL.len() as u32;
+pub(in crate::learn) const ROOTS: u32 = VertexKind::ALL.len() as u32;
 /// Children lie at multiples of 8, so the roots have eight words as well.
 const FIRST_CHILD: u32 = 8;
 const _: () = assert!(ROOTS <= FIRST_CHILD);
@@ -36,7 +36,7 @@ const LAST: f32 = 65_535.996;
 
 /// Decoded word of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum OctreeNode {
+pub(in crate::learn) enum OctreeNode {
     Inner { child: u32 },
     Leaf { number: u32, depth: u32 },
 }
@@ -44,7 +44,7 @@ pub(super) enum OctreeNode {
 /// All of the octrees but their nodes.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct TreeScalars {
+pub(in crate::learn) struct TreeScalars {
     used: u32,
     leaves: u32,
     /// Smallest corner and edge of the cube.
@@ -53,7 +53,7 @@ pub(super) struct TreeScalars {
 
 impl TreeScalars {
     /// Octrees that are leaves, over the bounds `lo` to `hi`.
-    pub(super) fn roots(lo: [f32; 3], hi: [f32; 3]) -> Self {
+    pub(in crate::learn) fn roots(lo: [f32; 3], hi: [f32; 3]) -> Self {
         Self { used: FIRST_CHILD, leaves: ROOTS, cube: cube(lo, hi) }
     }
 
@@ -71,7 +71,7 @@ impl TreeScalars {
 }
 
 #[derive(Debug)]
-pub(super) struct Tree<'m> {
+pub(in crate::learn) struct Tree<'m> {
     nodes: &'m mut [u32],
     /// Words of the nodes at depth `grid_bits`, or of leaves above it, by cell; one grid per root.
     grid: &'m mut [u32],
@@ -80,21 +80,21 @@ pub(super) struct Tree<'m> {
     leaves: u32,
     max_leaves: u32,
     /// Smallest corner and edge of the cube.
-    pub(super) cube: [f32; 4],
+    pub(in crate::learn) cube: [f32; 4],
     scale: f32,
 }
 
 impl<'m> Tree<'m> {
-    pub(super) const fn nodes_for(subdivisions: u32) -> u32 {
+    pub(in crate::learn) const fn nodes_for(subdivisions: u32) -> u32 {
         FIRST_CHILD + 8 * subdivisions
     }
 
     /// Bytes; [`Self::carve`] leaves nodes and grid as they are until [`Self::reset`].
-    pub(super) fn measure(m: Measure, nodes: u32, max_leaves: u32) -> Measure {
+    pub(in crate::learn) fn measure(m: Measure, nodes: u32, max_leaves: u32) -> Measure {
         m.add::<u32>(nodes as usize).add::<u32>(grid_len(max_leaves))
     }
 
-    pub(super) fn carve(
+    pub(in crate::learn) fn carve(
         c: &mut Carver<'m>,
         nodes: u32,
         max_leaves: u32,
@@ -114,17 +114,17 @@ impl<'m> Tree<'m> {
         })
     }
 
-    pub(super) fn scalars(&self) -> TreeScalars {
+    pub(in crate::learn) fn scalars(&self) -> TreeScalars {
         TreeScalars { used: self.used, leaves: self.leaves, cube: self.cube }
     }
 
     /// Are these the scalars of a tree with this room? Whatever nodes there are then, none leads out of memory.
-    pub(super) fn fits(scalars: &TreeScalars, subdivisions: u32, max_leaves: u32) -> bool {
+    pub(in crate::learn) fn fits(scalars: &TreeScalars, subdivisions: u32, max_leaves: u32) -> bool {
         scalars.fit(Self::nodes_for(subdivisions), max_leaves)
     }
 
     /// Makes all roots leaves.
-    pub(super) fn reset(&mut self) {
+    pub(in crate::learn) fn reset(&mut self) {
         self.nodes.iter_mut().zip(0..ROOTS).for_each(|(n, root)| *n = LEAF | root);
         (self.used, self.leaves) = (FIRST_CHILD, ROOTS);
         let _ = self.refresh(0, usize::MAX);
@@ -132,7 +132,7 @@ impl<'m> Tree<'m> {
 
     /// Fills the grid from cell `from` on, `limit` cells at most; the next cell, `None` after the last. Until then
     /// look-ups give the old numbers of leaves, which are still theirs or a child's.
-    pub(super) fn refresh(&mut self, from: usize, limit: usize) -> Option<usize> {
+    pub(in crate::learn) fn refresh(&mut self, from: usize, limit: usize) -> Option<usize> {
         let bits = self.grid_bits;
         let end = from.saturating_add(limit).min(self.grid.len());
         for (i, word) in (from as u32..).zip(self.grid.get_mut(from..end).unwrap_or(&mut [])) {
@@ -148,39 +148,39 @@ impl<'m> Tree<'m> {
         (end < self.grid.len()).then_some(end)
     }
 
-    pub(super) fn leaves(&self) -> u32 {
+    pub(in crate::learn) fn leaves(&self) -> u32 {
         self.leaves
     }
 
     /// Number of nodes that can be reached from the roots.
-    pub(super) fn nodes(&self) -> u32 {
+    pub(in crate::learn) fn nodes(&self) -> u32 {
         self.used - FIRST_CHILD + ROOTS
     }
 
     /// Index of the first node behind the roots' and all groups of children.
-    pub(super) fn end(&self) -> u32 {
+    pub(in crate::learn) fn end(&self) -> u32 {
         self.used
     }
 
     /// Number of groups of eight children.
-    pub(super) fn groups(&self) -> u32 {
+    pub(in crate::learn) fn groups(&self) -> u32 {
         (self.used - FIRST_CHILD) / 8
     }
 
     /// Nodes of a group of children.
-    pub(super) fn group_nodes(group: u32) -> core::ops::Range<u32> {
+    pub(in crate::learn) fn group_nodes(group: u32) -> core::ops::Range<u32> {
         let first = FIRST_CHILD + 8 * group;
         first..first + 8
     }
 
     /// Group that begins with node `child`.
-    pub(super) fn group_of(child: u32) -> usize {
+    pub(in crate::learn) fn group_of(child: u32) -> usize {
         (child.saturating_sub(FIRST_CHILD) / 8) as usize
     }
 
     /// A node as memory has it. Memory that something else has written to has no inner nodes but those that lead to a
     /// later group, and no leaves but those with sums.
-    pub(super) fn node(&self, index: u32) -> OctreeNode {
+    pub(in crate::learn) fn node(&self, index: u32) -> OctreeNode {
         let word = self.nodes.get(index as usize).copied().unwrap_or(LEAF);
         if word & LEAF != 0 {
             let number = word & NUMBER;
@@ -196,7 +196,7 @@ impl<'m> Tree<'m> {
 
     /// Makes a leaf an inner node. The first child keeps the leaf's number; returns the first of the seven new numbers,
     /// `None` if there is no room or the leaf is at [`MAX_DEPTH`].
-    pub(super) fn subdivide(&mut self, index: u32) -> Option<u32> {
+    pub(in crate::learn) fn subdivide(&mut self, index: u32) -> Option<u32> {
         let OctreeNode::Leaf { number, depth } = self.node(index) else { return None };
         if depth >= MAX_DEPTH || self.max_leaves - self.leaves < 7 {
             return None;
@@ -211,9 +211,9 @@ impl<'m> Tree<'m> {
         Some(first)
     }
 
-    /// Calls `f` with every node below and including `index`: parents first, children in order. Ends after as many nodes
-    /// as there are, and above [`MAX_DEPTH`], whatever memory holds.
-    pub(super) fn visit(&self, index: u32, f: &mut impl FnMut(OctreeNode)) {
+    /// Calls `f` with every node below and including `index`: parents first, children in order. Ends after as many
+    /// nodes as there are, and above [`MAX_DEPTH`], whatever memory holds.
+    pub(in crate::learn) fn visit(&self, index: u32, f: &mut impl FnMut(OctreeNode)) {
         self.visit_some(index, 0, &mut self.nodes(), f);
     }
 
@@ -263,11 +263,16 @@ impl<'m> Tree<'m> {
         word
     }
 
-    /// First bin of the leaf around each position. With `jitter` in [0, 1): of the leaf around the position moved by
-    /// `jitter - 0.5` of the edge of its own leaf, but not out of the cube.
+    /// First bin of the leaf around each position; see [`Self::leaf`].
     #[inline(always)]
-    pub(super) fn find(&self, kind: VertexKind8, p: Vec3x8, jitter: Option<[F32x8; 3]>) -> U32x8 {
-        let root = kind.octree();
+    pub(in crate::learn) fn find(&self, kind: VertexKind8, p: Vec3x8, jitter: Option<[F32x8; 3]>) -> U32x8 {
+        self.leaf(kind.octree(), p, jitter) * U32x8::splat(BINS as u32)
+    }
+
+    /// Number of the leaf around each position in octree `root`, below [`ROOTS`]. With `jitter` in [0, 1): of the leaf
+    /// around the position moved by `jitter - 0.5` of the edge of its own leaf, but not out of the cube.
+    #[inline(always)]
+    pub(in crate::learn) fn leaf(&self, root: U32x8, p: Vec3x8, jitter: Option<[F32x8; 3]>) -> U32x8 {
         let position = self.grid_position(p);
         let mut word = self.descend(root, position);
         if let Some([a, b, c]) = jitter {
@@ -277,7 +282,7 @@ impl<'m> Tree<'m> {
             let moved = [(x, a), (y, b), (z, c)].map(|(q, u)| (q + (u - 0.5) * edge).clamp(0.0, LAST));
             word = self.descend(root, moved);
         }
-        (word & U32x8::splat(NUMBER)) * U32x8::splat(BINS as u32)
+        word & U32x8::splat(NUMBER)
     }
 }
 
@@ -309,7 +314,7 @@ fn cube(lo: [f32; 3], hi: [f32; 3]) -> [f32; 4] {
 /// coordinates. The sphere is rotated first, by a matrix of thirds: axis-parallel directions, which normals often have,
 /// lie at least 10 degrees inside their bins, and no two of them share one.
 #[inline(always)]
-pub(super) fn direction_bin(d: Vec3x8) -> U32x8 {
+pub(in crate::learn) fn direction_bin(d: Vec3x8) -> U32x8 {
     let (x, y, z) = (d.x + d.x, d.y + d.y, d.z + d.z);
     let (a, b, height) = (x + y - d.z, y + z - d.x, x + z - d.y);
     let bit = |m: Mask8, v: u32| U32x8::select(m, U32x8::splat(v), U32x8::splat(0));

@@ -1,4 +1,4 @@
-//! When a render ends.
+//! When a render ends. What is left until then, by its progress, is in `observe.rs`.
 
 /// Stop condition of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,17 +1,20 @@
 //! Scattering models, lights and media, eight lanes at a time: how long an operation takes, and whether what is sampled
-//! is what is evaluated. Errors against f64 are measured by the tests, which have the twins.
+//! is what is evaluated. Names, materials and lights are those of the microbenchmarks, which compare the same
+//! operations with the f64 twins of the tests ([`Twins`]).
 
 use super::effort::Effort;
-use super::ledger::Component;
+use super::kernels::ARITHMETIC;
+use super::ledger::{Component, Spread};
 use super::sums::quantile;
 use super::timing::nanoseconds;
-use croupier::Scene;
-use croupier::unstable::bsdf::{Bsdf, Inputs8, Visitor, dispatch};
-use croupier::unstable::light::{PowerSelector, sample_of};
+use super::twins::Twins;
+use croupier::unstable::bsdf::{Bsdf, HenyeyGreenstein, Inputs8, Visitor, dispatch};
+use croupier::unstable::light::{PowerSelector, ShapeRays8, environment_pdf, meet_shapes, sample_of};
 use croupier::unstable::media::{Segment8, fly, transmittance};
 use croupier::unstable::rng::Key8;
 use croupier::unstable::scene::blob::MaterialKind;
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier::{INSTRUCTION_SET, Scene};
 use croupier_host::bake::{BakeError, BakeOptions, Baked, bake};
 use croupier_host::builtin;
 use croupier_host::description::*;
@@ -21,6 +24,27 @@ use std::error::Error;
 const TIMED: usize = 128;
 /// Packets of which samples are compared with values.
 const COMPARED: u32 = 4096;
+
+/// An operation with its time, and what is known of it besides; `kernel` is its name among the microbenchmarks.
+fn component(twins: &Twins, kernel: [&str; 2], operation: &str, ns: Spread) -> Component {
+    let [group, name] = kernel;
+    Component {
+        group: match group.split(' ').next() {
+            Some("bsdf") => "scattering",
+            Some("light") => "lights",
+            _ => "media",
+        }
+        .into(),
+        name: name.into(),
+        operation: operation.into(),
+        arithmetic: ARITHMETIC.into(),
+        instruction_set: INSTRUCTION_SET.into(),
+        ns,
+        instructions: twins.instructions(group, name),
+        against_eval: None,
+        against_twin: twins.errors(group, name),
+    }
+}
 
 /// Words of dimension block `n`, the same in every run.
 fn words(n: u32) -> [U32x8; 4] {
@@ -48,6 +72,7 @@ struct Measured<'a, 's> {
     material: u32,
     name: &'a str,
     repeats: usize,
+    twins: &'a Twins,
 }
 
 impl<'s> Visitor<'s> for Measured<'_, 's> {
@@ -59,20 +84,16 @@ impl<'s> Visitor<'s> for Measured<'_, 's> {
         let model = B::gather(self.scene, &inputs, Mask8::all_lanes());
         let views: Vec<_> = (0..TIMED as u32).map(|n| (upwards(2 * n), uniforms(2 * n + 1))).collect();
         let pairs: Vec<_> = views.iter().map(|(wo, u)| (*wo, model.sample(*wo, *u).wi)).collect();
-        let row = |operation: &str, ns| Component {
-            group: "scattering".into(),
-            name: self.name.into(),
-            operation: operation.into(),
-            ns,
-            ..Component::default()
-        };
+        let row = |operation: &str, ns| component(self.twins, [&format!("bsdf {operation}"), self.name], operation, ns);
+        let gather = |i: Inputs8| B::gather(self.scene, &i, Mask8::all_lanes());
         let mut rows = vec![
             row("sample", nanoseconds(&views, self.repeats, |(wo, u)| model.sample(wo, u))),
-            row("gather", nanoseconds(&[inputs; 16], self.repeats, |i| B::gather(self.scene, &i, Mask8::all_lanes()))),
+            row("gather", nanoseconds(&[inputs; 16], self.repeats, gather)),
             row("albedo", nanoseconds(&views, self.repeats, |(wo, _)| model.albedo(wo))),
         ];
         if !B::DELTA {
-            rows.push(row("eval, with pdf", nanoseconds(&pairs, self.repeats, |(wo, wi)| model.eval(wo, wi))));
+            rows.insert(1, row("eval", nanoseconds(&pairs, self.repeats, |(wo, wi)| model.eval(wo, wi))));
+            rows.insert(2, row("pdf", nanoseconds(&pairs, self.repeats, |(wo, wi)| model.eval(wo, wi).pdf)));
             rows[0].against_eval = against_eval(&model);
         }
         rows
@@ -100,23 +121,26 @@ fn against_eval<'s>(model: &impl Bsdf<'s>) -> Option<[f64; 2]> {
 
 /// One material of every model.
 fn models() -> Vec<(&'static str, Model, bool)> {
-    let reflectance = Reflectance::Constant([0.5; 3]);
-    let (eta, k, alpha) = ([0.2, 0.9, 1.1], [3.9, 2.4, 2.2], 0.2);
+    let reflectance = Reflectance::Constant([0.8, 0.5, 0.2]);
+    let (eta, k, alpha) = ([0.143, 0.375, 1.442], [3.983, 2.386, 1.603], 0.3);
+    let layer = Principled { base_color: [0.8, 0.5, 0.2], roughness: 0.5, ..Principled::default() };
+    let all = Principled { coat: 1.0, metalness: 0.5, transmission: 0.5, ..layer };
     let (int_ior, ext_ior) = (1.5, 1.0);
     vec![
         ("diffuse", Model::Diffuse { reflectance }, false),
         ("mirror", Model::Mirror { reflectance }, false),
         ("conductor", Model::Conductor { eta, k, reflectance }, false),
-        ("rough conductor", Model::RoughConductor { eta, k, reflectance, alpha }, false),
-        ("rough conductor, compensated", Model::RoughConductor { eta, k, reflectance, alpha }, true),
+        ("roughconductor", Model::RoughConductor { eta, k, reflectance, alpha }, false),
+        ("roughconductor, compensated", Model::RoughConductor { eta, k, reflectance, alpha }, true),
         ("dielectric", Model::Dielectric { int_ior, ext_ior }, false),
-        ("rough dielectric", Model::RoughDielectric { int_ior, ext_ior, alpha }, false),
-        ("rough dielectric, compensated", Model::RoughDielectric { int_ior, ext_ior, alpha }, true),
-        ("thin dielectric", Model::ThinDielectric { int_ior, ext_ior }, false),
+        ("roughdielectric", Model::RoughDielectric { int_ior, ext_ior, alpha }, false),
+        ("roughdielectric, compensated", Model::RoughDielectric { int_ior, ext_ior, alpha }, true),
+        ("thindielectric", Model::ThinDielectric { int_ior, ext_ior }, false),
         ("plastic", Model::Plastic { reflectance, int_ior, ext_ior }, false),
-        ("rough plastic", Model::RoughPlastic { reflectance, int_ior, ext_ior, alpha }, false),
-        ("rough plastic, compensated", Model::RoughPlastic { reflectance, int_ior, ext_ior, alpha }, true),
-        ("principled", Model::Principled(Principled::default()), false),
+        ("roughplastic", Model::RoughPlastic { reflectance, int_ior, ext_ior, alpha }, false),
+        ("roughplastic, compensated", Model::RoughPlastic { reflectance, int_ior, ext_ior, alpha }, true),
+        ("principled", Model::Principled(layer), false),
+        ("principled, all layers", Model::Principled(all), false),
     ]
 }
 
@@ -131,7 +155,7 @@ fn floor(scene: &mut SceneDescription, material: u32) {
     scene.add_mesh("floor", material, &corners, &[[0, 1, 2], [0, 2, 3]], false);
 }
 
-fn scattering(effort: &Effort) -> Result<Vec<Component>, Box<dyn Error>> {
+fn scattering(effort: &Effort, twins: &Twins) -> Result<Vec<Component>, Box<dyn Error>> {
     let mut rows = Vec::new();
     for (name, model, compensated) in models() {
         let mut scene = SceneDescription::default();
@@ -141,8 +165,13 @@ fn scattering(effort: &Effort) -> Result<Vec<Component>, Box<dyn Error>> {
         let baked = baked(&scene)?;
         let scene = Scene::from_bytes(&baked.bytes)?;
         let kind: MaterialKind = model.kind();
-        rows.extend(dispatch(kind, Measured { scene: &scene, material, name, repeats: effort.repeats }));
+        rows.extend(dispatch(kind, Measured { scene: &scene, material, name, repeats: effort.repeats, twins }));
     }
+    let fog = Medium { name: "fog".into(), sigma_s: [1.0; 3], g: 0.6, ..Medium::default() };
+    let baked = baked(&cube(fog))?;
+    let scene = Scene::from_bytes(&baked.bytes)?;
+    let phase = Measured { scene: &scene, material: 0, name: "henyey-greenstein", repeats: effort.repeats, twins };
+    rows.extend(phase.visit::<HenyeyGreenstein>());
     Ok(rows)
 }
 
@@ -161,7 +190,8 @@ fn lights() -> Vec<(&'static str, SceneDescription)> {
         ),
         ("directional", Emitter::Directional { direction: down, irradiance: radiance }),
         ("sun", Emitter::Sun { direction: down, irradiance: radiance, angle_deg: 0.53 }),
-        ("sphere", shape(LightShape::Sphere { radius: 0.5 })),
+        ("sphere", shape(LightShape::Sphere { radius: 0.7 })),
+        ("disk", shape(LightShape::Disk { direction: down, radius: 0.8 })),
         ("rectangle", shape(LightShape::Rectangle { edges })),
     ];
     let scene = |emitter: Option<Emitter>| {
@@ -172,16 +202,16 @@ fn lights() -> Vec<(&'static str, SceneDescription)> {
         scene
     };
     let mut scenes: Vec<_> = emitters.into_iter().map(|(name, e)| (name, scene(Some(e)))).collect();
-    scenes.push(("triangles", builtin::cornell_blocks()));
+    scenes.push(("area", builtin::cornell_blocks()));
     scenes.push((
-        "environment, constant",
+        "constant environment",
         SceneDescription { environment: Some(Environment::Constant { radiance }), ..scene(None) },
     ));
-    scenes.push(("environment, map", SceneDescription { environment: Some(builtin::sky()), ..scene(None) }));
+    scenes.push(("environment map", SceneDescription { environment: Some(builtin::sky()), ..scene(None) }));
     scenes
 }
 
-fn light_samples(effort: &Effort) -> Result<Vec<Component>, Box<dyn Error>> {
+fn light_samples(effort: &Effort, twins: &Twins) -> Result<Vec<Component>, Box<dyn Error>> {
     let mut rows = Vec::new();
     for (name, scene) in lights() {
         let baked = baked(&scene)?;
@@ -196,13 +226,24 @@ fn light_samples(effort: &Effort) -> Result<Vec<Component>, Box<dyn Error>> {
             .collect();
         let selector = PowerSelector(scene);
         let sample = |(p, words)| sample_of(effects, &scene, &selector, p, up, words, Mask8::all_lanes());
-        rows.push(Component {
-            group: "lights".into(),
-            name: name.into(),
-            operation: "sample, with pdf".into(),
-            ns: nanoseconds(&points, effort.repeats, sample),
-            ..Component::default()
-        });
+        rows.push(component(twins, ["light sample", name], "sample", nanoseconds(&points, effort.repeats, sample)));
+        let towards: Vec<_> = points.iter().map(|point| (point.0, sample(*point).wi)).collect();
+        let all = Mask8::all_lanes();
+        let pdf = match name {
+            "sphere" | "rectangle" | "disk" => nanoseconds(&towards, effort.repeats, |(p, d)| {
+                let (after, upto) = (F32x8::ZERO, F32x8::INFINITY);
+                let rays = ShapeRays8 { p, d, after, upto, camera: Mask8::NONE, mask: all };
+                let mut found = F32x8::ZERO;
+                meet_shapes(&scene, &selector, &rays, up, all, |lanes, _, pdf| found = lanes.select(pdf, found));
+                found
+            }),
+            "constant environment" | "environment map" => {
+                nanoseconds(&towards, effort.repeats, |(p, wi)| environment_pdf(&scene, &selector, p, up, wi, all))
+            }
+            // what a ray cannot meet by chance, and triangles, whose density is part of the hit
+            _ => continue,
+        };
+        rows.push(component(twins, ["light pdf", name], "pdf", pdf));
     }
     Ok(rows)
 }
@@ -223,13 +264,13 @@ fn cube(medium: Medium) -> SceneDescription {
     scene
 }
 
-fn media(effort: &Effort) -> Result<Vec<Component>, Box<dyn Error>> {
+fn media(effort: &Effort, twins: &Twins) -> Result<Vec<Component>, Box<dyn Error>> {
     let fog = Medium { name: "fog".into(), sigma_a: [0.1; 3], sigma_s: [0.9, 1.0, 1.1], ..Medium::default() };
     let values = (0..16 * 16 * 16).map(|i| (i * 37 % 101) as f32 / 101.0).collect();
     let density = Density::Grid { cells: [16; 3], bounds: [[-1.0; 3], [1.0; 3]], values };
     let cloud = Medium { sigma_s: [4.0; 3], density, ..fog.clone() };
     let mut rows = Vec::new();
-    for (name, medium) in [("homogeneous", fog), ("grid of 16x16x16", cloud)] {
+    for (name, medium) in [("homogeneous", fog), ("grid", cloud)] {
         let baked = baked(&cube(medium))?;
         let scene = Scene::from_bytes(&baked.bytes)?;
         let (effects, which) = (croupier::unstable::Effects(u32::MAX), U32x8::splat(0));
@@ -243,13 +284,7 @@ fn media(effort: &Effort) -> Result<Vec<Component>, Box<dyn Error>> {
             .collect();
         let all = Mask8::all_lanes();
         let beta = Vec3x8::splat(1.0, 1.0, 1.0);
-        let row = |operation: &str, ns| Component {
-            group: "media".into(),
-            name: name.into(),
-            operation: operation.into(),
-            ns,
-            ..Component::default()
-        };
+        let row = |operation: &str, ns| component(twins, [&format!("medium {operation}"), name], operation, ns);
         let flight = nanoseconds(&segments, effort.repeats, |(s, key)| fly(effects, &scene, which, &s, beta, key, all));
         rows.push(row("flight", flight));
         let passed =
@@ -260,6 +295,6 @@ fn media(effort: &Effort) -> Result<Vec<Component>, Box<dyn Error>> {
 }
 
 /// All of them.
-pub(super) fn measure(effort: &Effort) -> Result<Vec<Component>, Box<dyn Error>> {
-    Ok([scattering(effort)?, light_samples(effort)?, media(effort)?].concat())
+pub(super) fn measure(effort: &Effort, twins: &Twins) -> Result<Vec<Component>, Box<dyn Error>> {
+    Ok([scattering(effort, twins)?, light_samples(effort, twins)?, media(effort, twins)?].concat())
 }

@@ -25,19 +25,22 @@ const FORECAST: [&str; 2] = ["classic", "ears"];
 const DEPTHS: [u32; 12] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24, 32];
 
 /// Changes of one setting each: name and value. What this build does not have, or not with this value, is left out.
-const KNOBS: [[&str; 2]; 19] = [
+const KNOBS: [[&str; 2]; 22] = [
     ["rrs", "none"],
     ["rrs", "classic"],
     ["rrs", "adrrs"],
+    ["rrs", "threshold:0.1"],
     ["max-depth", "4"],
     ["max-depth", "8"],
     ["shadow-roulette", "false"],
     ["control-variate", "cached"],
     ["adaptive", "true"],
-    ["sampler", "hashed"],
-    ["guiding", "false"],
+    ["sampler", "sobol"],
+    ["guiding", "on"],
     ["pixel-estimator", "blocks"],
-    ["cache-bytes", "262144"],
+    ["objective", "absolute"],
+    ["cache-bytes", "128KiB"],
+    ["cache-bytes", "1MiB"],
     ["ledger", "64"],
     ["learn-samples", "1"],
     ["factors", "0.05:1"],
@@ -93,9 +96,9 @@ fn knobs(subject: &Subject<'_>) -> Vec<(String, Settings, bool)> {
         if name != "rrs" {
             settings.set(name, value).ok()?;
         }
-        let biased = name == "max-depth";
-        let changed = settings != subject.settings && (!biased || settings.max_depth < subject.settings.max_depth);
-        changed.then(|| (format!("{name} {value}"), settings, biased))
+        let cut = name == "max-depth";
+        let changed = settings != subject.settings && (!cut || settings.max_depth < subject.settings.max_depth);
+        changed.then(|| (format!("{name} {value}"), settings, cut || settings.strategy.is_biased()))
     };
     KNOBS.into_iter().filter_map(of).collect()
 }
@@ -174,7 +177,9 @@ pub(super) fn measure(
             let renders = take(effort.stated_seeds as usize).into_iter().map(|(_, w)| StatedError {
                 measured: w.rel_mse(),
                 estimate: w.rendered.error.rel_mse,
+                low: w.rendered.error.low,
                 high: w.rendered.error.high,
+                resolved: w.rendered.error.is_resolved(),
             });
             record.stated.push(Stated { strategy: strategy.into(), spp: *spp, renders: renders.collect() });
         }
@@ -287,6 +292,20 @@ fn forecasts(subject: &Subject<'_>, effort: &Effort, record: &SceneRecord) -> Re
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Killed by: a setting that is renamed, a value that has become the default or is out of its range.
+    #[test]
+    fn every_change_of_a_setting_is_one() {
+        let default = RenderOptions::default().settings;
+        for [name, value] in KNOBS {
+            let mut settings = default;
+            match name {
+                "rrs" => settings = RenderOptions::new(Strategy::parse(value).unwrap()).settings,
+                _ => settings.set(name, value).unwrap_or_else(|e| panic!("{name} {value}: {e}")),
+            }
+            assert!(settings != default, "{name} {value} is the default");
+        }
+    }
 
     /// Pictures of a bias and noise that is known. Killed by: pairs of a picture with itself, a standard error without
     /// the factor of the jackknife.

@@ -1,8 +1,9 @@
 //! Elementary functions of eight lanes beside those of the platform: errors against f64, and time.
 
 use super::effort::Effort;
-use super::ledger::Kernel;
+use super::ledger::{Group, Kernel, Spread};
 use super::timing::{in_parallel, nanoseconds};
+use super::twins::Twins;
 use croupier::INSTRUCTION_SET;
 use croupier::unstable::simd::{F32x8, REPRODUCIBLE};
 use std::f64::consts::TAU;
@@ -108,18 +109,18 @@ fn error(got: f32, exact: f64) -> f64 {
 
 /// Errors of one variant.
 #[derive(Clone, Default)]
-struct Errors {
+pub(super) struct Errors {
     count: u64,
     sum: f64,
-    max: f64,
+    pub(super) max: f64,
     worst: Vec<f32>,
 }
 
 impl Errors {
-    fn see(&mut self, e: f64, arguments: &[f32]) {
+    pub(super) fn see(&mut self, e: f64, arguments: &[f32]) {
         self.count += 1;
         self.sum += e;
-        if e > self.max || self.worst.is_empty() {
+        if e > self.max || self.count == 1 {
             (self.max, self.worst) = (e, arguments.to_vec());
         }
     }
@@ -129,6 +130,28 @@ impl Errors {
         let (max, worst) = if worse { (o.max, o.worst) } else { (self.max, self.worst) };
         self.count += o.count;
         Self { count: self.count, sum: self.sum + o.sum, max, worst }
+    }
+
+    pub(super) fn mean(&self) -> f64 {
+        self.sum / self.count.max(1) as f64
+    }
+
+    /// Row of a variant with these errors.
+    pub(super) fn row(self, group: Group, function: &str, variant: &str, exhaustive: bool, ns: Spread) -> Kernel {
+        Kernel {
+            group,
+            function: function.into(),
+            variant: variant.into(),
+            instruction_set: INSTRUCTION_SET.into(),
+            arguments: self.count,
+            exhaustive,
+            // a ledger has no infinities
+            max_ulp: self.max.min(f64::MAX),
+            mean_ulp: self.mean().min(f64::MAX),
+            worst: self.worst,
+            ns,
+            ..Kernel::default()
+        }
     }
 }
 
@@ -151,25 +174,30 @@ fn sweep(f: &Unary, part: u64, parts: u64, stride: u64) -> [Errors; 2] {
     errors
 }
 
-/// Even numbers from a hash, in [0, 1).
-fn number(state: &mut u64) -> f32 {
-    *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-    (*state >> 40) as f32 / (1 << 24) as f32
-}
+/// Even numbers, always the same.
+pub(super) struct Random(pub(super) u64);
 
-fn between(state: &mut u64, [low, high]: [f32; 2]) -> f32 {
-    let u = number(state);
-    // over magnitudes where the range has many
-    if low > 0.0 && high / low > 100.0 { low * (high / low).powf(u) } else { low + (high - low) * u }
+impl Random {
+    /// In [0, 1), a whole number of 2^-24.
+    pub(super) fn number(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 40) as f32 / (1 << 24) as f32
+    }
+
+    fn between(&mut self, [low, high]: [f32; 2]) -> f32 {
+        let u = self.number();
+        // over magnitudes where the range has many
+        if low > 0.0 && high / low > 100.0 { low * (high / low).powf(u) } else { low + (high - low) * u }
+    }
 }
 
 /// Pairs within the range that is timed.
 fn sweep_pairs(f: &Binary, packets: u64) -> [Errors; 2] {
     let mut errors = [Errors::default(), Errors::default()];
-    let mut state = 1;
+    let mut random = Random(1);
     for _ in 0..packets {
-        let x: [f32; 8] = std::array::from_fn(|_| between(&mut state, f.range[0]));
-        let y: [f32; 8] = std::array::from_fn(|_| between(&mut state, f.range[1]));
+        let x: [f32; 8] = std::array::from_fn(|_| random.between(f.range[0]));
+        let y: [f32; 8] = std::array::from_fn(|_| random.between(f.range[1]));
         let z = (f.lanes)(F32x8::new(x), F32x8::new(y)).to_array();
         for i in 0..8 {
             let exact = (f.exact)(f64::from(x[i]), f64::from(y[i]));
@@ -190,28 +218,28 @@ const TIMED: usize = 256;
 const PARTS: u64 = 64;
 
 /// All functions. Errors take all processors; times are measured afterwards, on one.
-pub(super) fn measure(effort: &Effort, done: impl Fn(usize, usize) + Sync) -> Vec<Kernel> {
+pub(super) fn measure(effort: &Effort, twins: &Twins, done: impl Fn(usize, usize) + Sync) -> Vec<Kernel> {
     let jobs: Vec<(usize, u64)> = (0..UNARY.len()).flat_map(|f| (0..PARTS).map(move |p| (f, p))).collect();
     let total = jobs.len();
     let swept = in_parallel(&jobs, |&(f, p)| sweep(&UNARY[f], p, PARTS, effort.stride), |n| done(n, total));
     let mut kernels = Vec::new();
-    let mut state = 7;
+    let mut random = Random(7);
     for (i, f) in UNARY.iter().enumerate() {
         let parts = jobs.iter().zip(&swept).filter(|(job, _)| job.0 == i).map(|(_, e)| e.clone());
         let [ours, platform] =
             parts.fold([Errors::default(), Errors::default()], |[a, b], [c, d]| [a.merge(c), b.merge(d)]);
-        let packets: Vec<F32x8> = (0..TIMED).map(|_| F32x8::from_fn(|_| between(&mut state, f.range))).collect();
+        let packets: Vec<F32x8> = (0..TIMED).map(|_| F32x8::from_fn(|_| random.between(f.range))).collect();
         let times = [
             nanoseconds(&packets, effort.repeats, f.lanes),
             nanoseconds(&packets, effort.repeats, |x| F32x8::new(x.to_array().map(f.platform))),
         ];
         let exhaustive = effort.stride == 1;
-        kernels.extend(rows(f.name, exhaustive, [ours, platform], times));
+        kernels.extend(rows(f.name, exhaustive, [ours, platform], times, twins));
     }
     for f in &BINARY {
         let errors = sweep_pairs(f, (1 << 25) / effort.stride.clamp(64, 1 << 16));
         let packets: Vec<[F32x8; 2]> =
-            (0..TIMED).map(|_| f.range.map(|r| F32x8::from_fn(|_| between(&mut state, r)))).collect();
+            (0..TIMED).map(|_| f.range.map(|r| F32x8::from_fn(|_| random.between(r)))).collect();
         let platform = |[x, y]: [F32x8; 2]| {
             let (x, y) = (x.to_array(), y.to_array());
             F32x8::from_fn(|i| (f.platform)(x[i], y[i]))
@@ -220,31 +248,22 @@ pub(super) fn measure(effort: &Effort, done: impl Fn(usize, usize) + Sync) -> Ve
             nanoseconds(&packets, effort.repeats, |[x, y]| (f.lanes)(x, y)),
             nanoseconds(&packets, effort.repeats, platform),
         ];
-        kernels.extend(rows(f.name, false, errors, times));
+        kernels.extend(rows(f.name, false, errors, times, twins));
     }
     kernels
 }
 
-fn rows(
-    name: &str,
-    exhaustive: bool,
-    errors: [Errors; 2],
-    times: [super::ledger::Spread; 2],
-) -> impl Iterator<Item = Kernel> {
-    let variants = [format!("croupier, {ARITHMETIC}"), "platform, f32 x 8".into()];
-    let name = name.to_string();
-    variants.into_iter().zip(errors).zip(times).map(move |((variant, e), ns)| Kernel {
-        function: name.clone(),
-        variant,
-        instruction_set: INSTRUCTION_SET.into(),
-        arguments: e.count,
-        exhaustive,
-        // a ledger has no infinities
-        max_ulp: e.max.min(f64::MAX),
-        worst: e.worst,
-        mean_ulp: (e.sum / e.count.max(1) as f64).min(f64::MAX),
-        ns,
-    })
+fn rows(name: &str, exhaustive: bool, errors: [Errors; 2], times: [Spread; 2], twins: &Twins) -> [Kernel; 2] {
+    let ours = format!("croupier, {ARITHMETIC}");
+    let [computed, platform] = errors;
+    let row = |errors: Errors, variant: &str, ns| errors.row(Group::Function, name, variant, exhaustive, ns);
+    let counted = match name {
+        "sin(2 pi x)" => "sin_2pi",
+        "cos(2 pi x)" => "cos_2pi",
+        same => same,
+    };
+    let ours = Kernel { instructions: twins.instructions("math", counted), ..row(computed, &ours, times[0]) };
+    [ours, row(platform, "platform, f32 x 8", times[1])]
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Version of the layout below.
-pub(super) const FORMAT: u32 = 1;
+pub(super) const FORMAT: u32 = 2;
 
 /// A whole report in numbers. Times are CPU seconds of the threads that worked, of one thread per render.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
@@ -15,6 +15,67 @@ pub(super) struct Ledger {
     pub(super) components: Vec<Component>,
     pub(super) scenes: Vec<SceneRecord>,
 }
+
+/// What tells whether a ledger can be read.
+#[derive(Deserialize)]
+pub(super) struct Format {
+    pub(super) format: u32,
+    pub(super) made: MadeBy,
+}
+
+/// Commit of the program.
+#[derive(Deserialize)]
+pub(super) struct MadeBy {
+    pub(super) commit: String,
+}
+
+impl Ledger {
+    /// Adds the functions and components of another build, and a setting for its arithmetic to the scenes that both
+    /// have; whether there was any function or component that is not here.
+    pub(super) fn join(&mut self, other: Self) -> bool {
+        let known = |k: &Kernel| {
+            let same = |o: &Kernel| (&o.variant, &o.instruction_set) == (&k.variant, &k.instruction_set);
+            self.kernels.iter().any(|o| o.function == k.function && same(o))
+        };
+        let kernels: Vec<_> = other.kernels.into_iter().filter(|k| !known(k)).collect();
+        let built = |c: &Component| (c.arithmetic.clone(), c.instruction_set.clone());
+        let here: Vec<_> = self.components.iter().map(built).collect();
+        let components: Vec<_> = other.components.into_iter().filter(|c| !here.contains(&built(c))).collect();
+        let new = !kernels.is_empty() || !components.is_empty();
+        self.kernels.extend(kernels);
+        self.components.extend(components);
+        if other.made.arithmetic != self.made.arithmetic {
+            for scene in &mut self.scenes {
+                let Some(same) = other.scenes.iter().find(|s| s.name == scene.name && s.size == scene.size) else {
+                    continue;
+                };
+                scene.knobs.extend(Knob::of_arithmetic(&other.made.arithmetic, scene, same));
+            }
+        }
+        new
+    }
+}
+
+impl Knob {
+    /// Another arithmetic as a setting: the default strategy's renders of two ledgers, as if both had stopped after the
+    /// same samples.
+    fn of_arithmetic(name: &str, here: &SceneRecord, there: &SceneRecord) -> Option<Self> {
+        let name = format!("arithmetic {name}, measured apart");
+        if here.knobs.iter().any(|k| k.name == name) {
+            return None;
+        }
+        let default = |scene: &SceneRecord| -> Option<Vec<[f64; 2]>> {
+            let runs = &scene.curves.iter().find(|c| c.name == DEFAULT)?.runs;
+            let ends = runs.iter().filter_map(|r| r.points.last());
+            // of one sample per pixel
+            Some(ends.map(|p| [p.core_seconds / p.spp, p.rel_mse * p.spp]).collect())
+        };
+        Some(Self { name, biased: false, default: default(here)?, changed: default(there)? })
+    }
+}
+
+/// The program's own strategy.
+const DEFAULT: &str = "ears";
 
 /// Where and how it was measured.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
@@ -34,6 +95,10 @@ pub(super) struct Made {
     /// Seconds that were stated before measuring, and those it took on the wall.
     pub(super) seconds_stated: f64,
     pub(super) seconds_taken: f64,
+    /// Seconds that the whole report would take here.
+    pub(super) seconds_of_all: f64,
+    /// Where errors of components against f64 and counts of instructions are from: they are not measured here.
+    pub(super) twins: String,
 }
 
 /// Median with the quarter below and above.
@@ -44,9 +109,17 @@ pub(super) struct Spread {
     pub(super) high: f64,
 }
 
-/// One variant of an elementary function.
+impl Spread {
+    /// Of a part of what was measured.
+    pub(super) fn scaled(self, by: f64) -> Self {
+        Self { low: self.low * by, middle: self.middle * by, high: self.high * by }
+    }
+}
+
+/// One variant of an elementary function, of a geometric test or of a sum.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
 pub(super) struct Kernel {
+    pub(super) group: Group,
     pub(super) function: String,
     /// Who computes it: `croupier` and the arithmetic, or the platform.
     pub(super) variant: String,
@@ -62,6 +135,20 @@ pub(super) struct Kernel {
     pub(super) mean_ulp: f64,
     /// Nanoseconds of eight lanes.
     pub(super) ns: Spread,
+    /// Instructions of eight lanes, counted by callgrind.
+    pub(super) instructions: Option<f64>,
+    /// Of a geometric test: what was missed though it was met, of all that was met.
+    pub(super) missed: Option<[u64; 2]>,
+}
+
+/// What kernels are compared with each other.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Eq, PartialEq, Serialize)]
+pub(super) enum Group {
+    /// Elementary functions: errors in ULP of the result.
+    #[default]
+    Function,
+    /// Tests of triangles and boxes, sums of the film: errors in ULP of the distance, of the mean.
+    Primitive,
 }
 
 /// An operation of a scattering model, light or medium.
@@ -70,12 +157,27 @@ pub(super) struct Component {
     pub(super) group: String,
     pub(super) name: String,
     pub(super) operation: String,
+    pub(super) arithmetic: String,
+    pub(super) instruction_set: String,
     /// Nanoseconds of eight lanes.
     pub(super) ns: Spread,
+    /// Instructions of eight lanes, counted by callgrind.
+    pub(super) instructions: Option<f64>,
     /// Largest and median relative difference of weight x density of a sample from the value that `eval` gives for it.
     pub(super) against_eval: Option<[f64; 2]>,
-    /// Largest error against the f64 twin: measured by the tests, joined from a ledger of theirs.
-    pub(super) against_twin: Option<f64>,
+    /// Errors against the f64 twin.
+    pub(super) against_twin: Option<Twin>,
+}
+
+/// How far results are from those of an f64 twin, relative to these, or to 0.001 where they are smaller.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
+pub(super) struct Twin {
+    pub(super) max: f64,
+    pub(super) mean: f64,
+    /// Standard error, if means of random results were compared.
+    pub(super) noise: Option<f64>,
+    /// Results that were compared.
+    pub(super) count: u64,
 }
 
 /// Everything about one scene.
@@ -139,8 +241,11 @@ pub(super) struct StatedError {
     /// relMSE against the reference.
     pub(super) measured: f64,
     pub(super) estimate: f64,
-    /// Upper end of the 95 % interval; it reaches as far below unless it would be negative.
+    /// Ends of the 95 % interval.
+    pub(super) low: f64,
     pub(super) high: f64,
+    /// The render gives the interval; without it the estimate is a lower bound.
+    pub(super) resolved: bool,
 }
 
 /// A render to an error that was given, and what it predicted.

@@ -19,6 +19,7 @@ pub(super) fn here(mode: &str) -> Made {
         instruction_set: croupier::INSTRUCTION_SET.into(),
         arithmetic: super::kernels::ARITHMETIC.into(),
         mode: mode.into(),
+        twins: super::twins::Twins::of_this_build().source(),
         ..Made::default()
     }
 }

@@ -7,7 +7,9 @@
 //! | `timing` | CPU time, work for all processors | what is measured |
 //! | `sums` | medians, intervals | |
 //! | `made` | date, commit, machine | |
-//! | `kernels`, `components` | elementary functions; scattering models, lights, media | the page |
+//! | `kernels`, `primitives` | elementary functions; tests of triangles and boxes, sums | the page |
+//! | `components` | scattering models, lights, media | the page |
+//! | `twins` | errors against f64 and instructions, as the benchmarks found them | the page |
 //! | `renders`, `images` | pictures and their errors | the page |
 //! | `figures` | plots of the ledger as SVG | how it was measured |
 //! | `tables` | the ledger as CSV, numbers as text | how it was measured |
@@ -21,10 +23,12 @@ mod kernels;
 mod ledger;
 mod made;
 mod page;
+mod primitives;
 mod renders;
 mod sums;
 mod tables;
 mod timing;
+mod twins;
 
 use super::console::{Outcome, note, say};
 use super::progress::Measuring;
@@ -36,11 +40,12 @@ use croupier_host::builtin;
 use croupier_host::render::RenderOptions;
 use croupier_host::text;
 use effort::Effort;
-use ledger::{FORMAT, Ledger};
+use ledger::{FORMAT, Format, Ledger};
 use renders::Subject;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use twins::Twins;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -55,8 +60,8 @@ pub(crate) struct Args {
     /// Measure nothing: make the page from this ledger
     #[arg(long, value_name = "LEDGER.json", value_parser = json_path, conflicts_with = "scenes")]
     ledger: Option<PathBuf>,
-    /// Add the functions of another ledger, of a build with the feature `fast` or for another instruction set; may be
-    /// repeated
+    /// Add functions and components of another ledger, of a build with the feature `fast` or for another instruction
+    /// set, and what its arithmetic changes in scenes that both have; may be repeated
     #[arg(long, value_name = "LEDGER.json", value_parser = json_path)]
     join: Vec<PathBuf>,
     /// Measure next to nothing, to see whether a page can be made
@@ -86,16 +91,9 @@ pub(crate) fn run(args: &Args) -> Outcome {
         None => measure(args)?,
     };
     for path in &args.join {
-        let kernels = read(path)?.kernels;
-        let known = |k: &ledger::Kernel| {
-            let same = |o: &ledger::Kernel| (&o.variant, &o.instruction_set) == (&k.variant, &k.instruction_set);
-            ledger.kernels.iter().any(|o| o.function == k.function && same(o))
-        };
-        let new: Vec<_> = kernels.into_iter().filter(|k| !known(k)).collect();
-        if new.is_empty() {
+        if !ledger.join(read(path)?) {
             note(&format!("{} has no function that is not there yet", text::path(path)));
         }
-        ledger.kernels.extend(new);
     }
     let written = write(args, &ledger)?;
     say(&format!("wrote {}", written.iter().map(|p| text::path(p)).collect::<Vec<_>>().join(", ")))
@@ -104,11 +102,13 @@ pub(crate) fn run(args: &Args) -> Outcome {
 fn read(path: &Path) -> Result<Ledger, Box<dyn Error>> {
     let name = || text::path(path);
     let bytes = std::fs::read(path).map_err(|e| format!("cannot read {}: {e}", name()))?;
-    let ledger: Ledger = serde_json::from_slice(&bytes).map_err(|e| format!("{}: no ledger: {e}", name()))?;
-    if ledger.format == FORMAT {
-        return Ok(ledger);
+    let format: Format = serde_json::from_slice(&bytes).map_err(|e| format!("{}: no ledger: {e}", name()))?;
+    if format.format != FORMAT {
+        let (found, by) = (format.format, format.made.commit);
+        let what = format!("a ledger of format {found}, this program reads {FORMAT}");
+        return Err(format!("{}: {what}; the program of commit {by} has made it, and reads it", name()).into());
     }
-    Err(format!("{}: a ledger of format {}, this program reads {FORMAT}", name(), ledger.format).into())
+    Ok(serde_json::from_slice(&bytes).map_err(|e| format!("{}: no ledger: {e}", name()))?)
 }
 
 /// Writes ledger, page, figures and tables; the files, the page first. What was read is never written over: a page that
@@ -188,22 +188,33 @@ fn measure(args: &Args) -> Result<Ledger, Box<dyn Error>> {
     bar.show("pilot", 0.0);
     let samples = subjects.iter().map(images::pilot).collect::<Result<Vec<f64>, _>>()?;
     let [curves, knobs, stated] = subjects.first().map_or([0; 3], |s| images::counts(s, &effort));
-    // an argument of a function takes about 50 ns of a core, with f64 beside it
-    let functions = 7.0 * 50e-9 * (1u64 << 32) as f64 / effort.stride as f64;
+    let functions = effort.functions();
     let images = effort.core_seconds(curves, knobs, stated, &samples);
     let seconds = (images + functions) / timing::threads() as f64 + 10.0;
     ledger.made.seconds_stated = seconds;
+    // all of it, of the same scenes with more pixels
+    let larger: Vec<_> =
+        samples.iter().map(|s| s * f64::from(Effort::FULL.pixels) / f64::from(effort.pixels)).collect();
+    let [curves, knobs, stated] = subjects.first().map_or([0; 3], |s| images::counts(s, &Effort::FULL));
+    let all = Effort::FULL.core_seconds(curves, knobs, stated, &larger) + Effort::FULL.functions();
+    ledger.made.seconds_of_all = all / timing::threads() as f64 + 10.0;
+    let whole = match effort.name == Effort::FULL.name {
+        true => String::new(),
+        false => format!("; the full one: about {}", duration(ledger.made.seconds_of_all)),
+    };
     say(&format!(
-        "{} scenes, {} report: about {} on {} cores that do nothing else",
+        "{} scenes, {} report: about {} on {} cores that do nothing else{whole}",
         subjects.len(),
         effort.name,
         duration(seconds),
         timing::threads()
     ))?;
+    let twins = Twins::of_this_build();
     let share = functions / (functions + images);
-    ledger.kernels = kernels::measure(&effort, |n, of| bar.show("functions", share * n as f64 / of as f64));
+    ledger.kernels = kernels::measure(&effort, &twins, |n, of| bar.show("functions", share * n as f64 / of as f64));
     bar.show("components", share);
-    ledger.components = components::measure(&effort)?;
+    ledger.kernels.extend(primitives::measure(&effort, &twins)?);
+    ledger.components = components::measure(&effort, &twins)?;
     let part = (1.0 - share) / subjects.len().max(1) as f64;
     for (n, (subject, sample)) in subjects.iter().zip(&samples).enumerate() {
         let before = share + part * n as f64;

@@ -101,7 +101,7 @@ pub(super) struct Calibrated {
 const LEVELS: [(f64, f64); 6] =
     [(0.5, 0.674_490), (0.68, 0.994_458), (0.8, 1.281_552), (0.9, 1.644_854), (0.95, 1.959_964), (0.99, 2.575_829)];
 
-/// By strategy, over all scenes and lengths.
+/// By strategy, over all scenes and lengths; of the intervals that are given.
 pub(super) fn calibration(ledger: &Ledger) -> Vec<(String, Vec<Calibrated>)> {
     let mut strategies: Vec<&str> = Vec::new();
     let stated = || ledger.scenes.iter().flat_map(|s| &s.stated);
@@ -114,7 +114,7 @@ pub(super) fn calibration(ledger: &Ledger) -> Vec<(String, Vec<Calibrated>)> {
         let (mut held, mut n) = (0, 0);
         for s in stated().filter(|s| s.strategy == strategy) {
             let truth = expected(s);
-            for r in &s.renders {
+            for r in s.renders.iter().filter(|r| r.resolved) {
                 // the interval is normal
                 held += usize::from((truth - r.estimate).abs() <= z / 1.96 * (r.high - r.estimate));
                 n += 1;
@@ -129,7 +129,9 @@ pub(super) fn calibration(ledger: &Ledger) -> Vec<(String, Vec<Calibrated>)> {
         };
         LEVELS.map(point).to_vec()
     };
-    strategies.into_iter().map(|s| (s.to_string(), line(s))).collect()
+    // renders without any interval say nothing of intervals
+    let given = |s: &&str| of(s, 1.0).1 > 0;
+    strategies.into_iter().filter(given).map(|s| (s.to_string(), line(s))).collect()
 }
 
 /// Expected relMSE of renders of one length: their mean.
@@ -137,10 +139,48 @@ pub(super) fn expected(s: &super::ledger::Stated) -> f64 {
     mean(&s.renders.iter().map(|r| r.measured).collect::<Vec<_>>())
 }
 
-/// How many of 95 % intervals hold the expectation.
-pub(super) fn held(s: &super::ledger::Stated) -> usize {
-    let truth = expected(s);
-    s.renders.iter().filter(|r| (truth - r.estimate).abs() <= r.high - r.estimate).count()
+/// What renders of one length say of their error, and whether it is so.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Verdicts {
+    /// Renders that give an interval, and those whose interval holds the expected error.
+    pub(super) given: usize,
+    pub(super) held: usize,
+    /// Renders that give a lower bound only: unresolved.
+    pub(super) unresolved: usize,
+    /// Of these, where the expected error is not below the bound.
+    pub(super) at_least: usize,
+    /// Of these, where an interval would not have held it: it was needed to give none.
+    pub(super) would_miss: usize,
+}
+
+impl Verdicts {
+    pub(super) fn of<'a>(stated: impl IntoIterator<Item = &'a super::ledger::Stated>) -> Self {
+        let mut v = Self::default();
+        for s in stated {
+            let truth = expected(s);
+            for r in &s.renders {
+                let holds = (r.low..=r.high).contains(&truth);
+                if r.resolved {
+                    v.given += 1;
+                    v.held += usize::from(holds);
+                } else {
+                    v.unresolved += 1;
+                    v.at_least += usize::from(truth >= r.estimate);
+                    v.would_miss += usize::from(!holds);
+                }
+            }
+        }
+        v
+    }
+
+    /// Renders of which what they say is true: the interval holds, or the error is not below the bound.
+    pub(super) fn right(&self) -> usize {
+        self.held + self.at_least
+    }
+
+    pub(super) fn renders(&self) -> usize {
+        self.given + self.unresolved
+    }
 }
 
 /// The last prediction before a third of the time had passed, or the first: over the time it took, and whether the
@@ -180,15 +220,21 @@ pub(super) fn csv(ledger: &Ledger) -> Result<Vec<(String, String)>, Box<dyn Erro
     let kernels = ledger.kernels.iter().map(|k| {
         let worst = k.worst.iter().map(|x| format!("{x:e}")).collect::<Vec<_>>().join(" ");
         let texts = [&k.function, &k.variant, &k.instruction_set].map(String::clone).to_vec();
+        let count = |n: usize| k.missed.map_or(String::new(), |m| m[n].to_string());
+        let counts = vec![k.instructions.map_or(String::new(), |x| x.to_string()), count(0), count(1)];
         let numbers = [k.max_ulp, k.mean_ulp, k.ns.low, k.ns.middle, k.ns.high].map(|x| x.to_string());
-        [texts, vec![k.arguments.to_string(), k.exhaustive.to_string(), worst], numbers.to_vec()].concat()
+        [texts, vec![k.arguments.to_string(), k.exhaustive.to_string(), worst], numbers.to_vec(), counts].concat()
     });
     let components = ledger.components.iter().map(|c| {
         let optional = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
         let numbers = [c.ns.low, c.ns.middle, c.ns.high].map(|x| x.to_string()).to_vec();
+        let (eval, twin) = (c.against_eval, c.against_twin);
         let errors =
-            [c.against_eval.map(|e| e[0]), c.against_eval.map(|e| e[1]), c.against_twin].map(optional).to_vec();
-        [[&c.group, &c.name, &c.operation].map(String::clone).to_vec(), numbers, errors].concat()
+            [c.instructions, eval.map(|e| e[0]), eval.map(|e| e[1]), twin.map(|t| t.max), twin.map(|t| t.mean)];
+        let noise = twin.and_then(|t| t.noise);
+        let errors = errors.into_iter().chain([noise, twin.map(|t| t.count as f64)]).map(optional).collect();
+        let texts = [&c.group, &c.name, &c.operation, &c.arithmetic, &c.instruction_set];
+        [texts.map(String::clone).to_vec(), numbers, errors].concat()
     });
     let (mut errors, mut stated, mut knobs, mut forecasts, mut depths) = (vec![], vec![], vec![], vec![], vec![]);
     for s in &ledger.scenes {
@@ -202,8 +248,9 @@ pub(super) fn csv(ledger: &Ledger) -> Result<Vec<(String, String)>, Box<dyn Erro
         }
         for t in &s.stated {
             stated.extend(t.renders.iter().map(|r| {
-                let numbers = [r.measured, r.estimate, r.high].map(|x| x.to_string()).to_vec();
-                [vec![s.name.clone(), t.strategy.clone(), t.spp.to_string()], numbers].concat()
+                let numbers = [r.measured, r.estimate, r.low, r.high].map(|x| x.to_string()).to_vec();
+                let names = vec![s.name.clone(), t.strategy.clone(), t.spp.to_string()];
+                [names, numbers, vec![r.resolved.to_string()]].concat()
             }));
         }
         for k in &s.knobs {
@@ -224,26 +271,37 @@ pub(super) fn csv(ledger: &Ledger) -> Result<Vec<(String, String)>, Box<dyn Erro
     }
     let function =
         ["function", "variant", "instruction set", "arguments", "exhaustive", "worst at", "max ULP", "mean ULP"];
+    let times = ["ns low", "ns", "ns high", "instructions", "missed", "of"];
     let ratios = ["time low", "time", "time high", "error low", "error", "error high", "both low", "both", "both high"];
     Ok(vec![
-        table("kernels", &[&function[..], &["ns low", "ns", "ns high"]].concat(), kernels.collect())?,
+        table("kernels", &[&function[..], &times].concat(), kernels.collect())?,
         table(
             "components",
             &[
                 "group",
                 "name",
                 "operation",
+                "arithmetic",
+                "instruction set",
                 "ns low",
                 "ns",
                 "ns high",
+                "instructions",
                 "max against eval",
                 "median against eval",
                 "max against f64",
+                "mean against f64",
+                "standard error",
+                "results",
             ],
             components.collect(),
         )?,
         table("errors", &["scene", "variant", "seed", "core-seconds", "spp", "rays", "relMSE"], errors)?,
-        table("stated", &["scene", "strategy", "spp", "measured relMSE", "stated relMSE", "high"], stated)?,
+        table(
+            "stated",
+            &["scene", "strategy", "spp", "measured relMSE", "stated relMSE", "low", "high", "resolved"],
+            stated,
+        )?,
         table("settings", &[&["scene", "setting", "biased"], &ratios[..]].concat(), knobs)?,
         table(
             "forecasts",
@@ -289,10 +347,25 @@ mod tests {
         assert_eq!(at_a_third(&run), Some((1.2, true)));
         let late = ForecastRun { made: vec![(0.6, record(2.0, 1.5, 3.0))], ..run.clone() };
         assert_eq!(forecast_quality([run, late].iter()), [2, 1, 1]);
-        let render = |measured, estimate, high| StatedError { measured, estimate, high };
-        let renders = vec![render(0.9, 1.0, 1.1), render(1.1, 1.2, 1.3), render(1.0, 0.9, 0.95)];
+        let render = |measured, estimate, by, resolved| StatedError {
+            measured,
+            estimate,
+            low: estimate - by,
+            high: estimate + by,
+            resolved,
+        };
+        let renders = vec![
+            render(0.9, 1.0, 0.1, true),
+            render(1.1, 1.2, 0.1, true),
+            render(1.0, 0.9, 0.05, false),
+            render(1.0, 1.1, 0.2, false),
+            render(1.0, 0.95, 0.1, false),
+        ];
         let stated = Stated { strategy: "ears".into(), spp: 4, renders };
-        assert_eq!((expected(&stated), held(&stated)), (1.0, 1));
+        let verdicts = Verdicts::of([&stated]);
+        assert_eq!(expected(&stated), 1.0);
+        assert_eq!(verdicts, Verdicts { given: 2, held: 1, unresolved: 3, at_least: 2, would_miss: 1 });
+        assert_eq!((verdicts.right(), verdicts.renders()), (3, 5));
     }
 
     /// Killed by: digits that are lost, zeros that pretend digits.

@@ -22,17 +22,17 @@ fn seconds(f: impl FnOnce()) -> f64 {
 }
 
 /// Nanoseconds of one call of `f` with each of the arguments, which lie in the nearest cache.
-pub(super) fn nanoseconds<T: Copy, R>(arguments: &[T], repeats: usize, f: impl Fn(T) -> R) -> Spread {
-    let pass = || {
+pub(super) fn nanoseconds<T: Copy, R>(arguments: &[T], repeats: usize, mut f: impl FnMut(T) -> R) -> Spread {
+    let mut pass = || {
         for x in arguments {
             black_box(f(black_box(*x)));
         }
     };
     // as many passes as take a fifth of a millisecond
-    let once = seconds(pass).max(1e-9);
+    let once = seconds(&mut pass).max(1e-9);
     let passes = ((2e-4 / once).ceil() as usize).clamp(1, 10_000);
-    let time = |_| seconds(|| (0..passes).for_each(|_| pass())) * 1e9 / (passes * arguments.len().max(1)) as f64;
-    spread(&(0..repeats).map(time).collect::<Vec<_>>())
+    let mut time = |_| seconds(|| (0..passes).for_each(|_| pass())) * 1e9 / (passes * arguments.len().max(1)) as f64;
+    spread(&(0..repeats).map(&mut time).collect::<Vec<_>>())
 }
 
 /// Results of all jobs in their order; every processor takes the next one that is left. `done` gets the number of those

@@ -127,6 +127,11 @@ impl Labels {
         self.0.push([x - r, y - r, x + r, y + r]);
     }
 
+    /// Keeps an area free: left, top, right, bottom.
+    pub(super) fn keep_area(&mut self, area: [i32; 4]) {
+        self.0.push(area);
+    }
+
     /// Draws a label beside a point.
     pub(super) fn draw(&mut self, sheet: &Sheet<'_>, label: &str, (x, y): (i32, i32)) -> Result<(), Fault> {
         // about the width of a text

@@ -53,9 +53,14 @@ pub(super) fn errors(name: &str, scene: &SceneRecord) -> Result<Option<Figure>, 
     let points = || bands.iter().flat_map(|(_, b)| b);
     let Some([t0, t1]) = range(points().map(|p| p.0), 1.05) else { return Ok(None) };
     let Some([e0, e1]) = range(points().map(|p| p.1[1]), 1.25) else { return Ok(None) };
-    let (e0, e1) = (e0.min(LEVEL * 0.8), e1.max(LEVEL * 1.2));
+    // what more samples do not take away, where it is told from noise
+    let floor = |c: &Curve| c.bias_error.filter(|e| c.biased && c.bias > 2.0 * e).map(|_| c.bias);
+    let floors = bands.iter().filter_map(|(c, _)| Some((*c, floor(c)?))).collect::<Vec<_>>();
+    let lowest = floors.iter().map(|f| f.1).fold(e0, f64::min).max(e0 / 30.0);
+    let (e0, e1) = ((lowest * 0.8).min(LEVEL * 0.8), e1.max(LEVEL * 1.2));
     let caption = "relMSE against the reference over core-seconds, both logarithmic: median of the seeds, and the band \
-                   in which they lie. A grey line falls as 1 / time; biased variants are dashed.";
+                   in which they lie. A grey line falls as 1 / time. Biased variants are dashed; a dotted line in \
+                   their colour is the floor that they do not pass, however long they run, where it is told from noise.";
     let draw = |sheet: &Sheet<'_>, layout: Layout| -> Result<(), Fault> {
         let mut chart = ChartBuilder::on(sheet)
             .margin(Layout::px(8))
@@ -94,6 +99,10 @@ pub(super) fn errors(name: &str, scene: &SceneRecord) -> Result<Option<Figure>, 
             let upper = band.iter().map(|(t, e)| (*t, clamp(e[2])));
             let around: Vec<_> = upper.chain(band.iter().rev().map(|(t, e)| (*t, clamp(e[0])))).collect();
             chart.draw_series([Polygon::new(around, color.mix(0.12).filled())])?;
+        }
+        for (curve, floor) in floors.iter().filter(|f| f.1 > e0) {
+            let style = color_of(&curve.name).stroke_width(UNIT);
+            chart.draw_series(DashedLineSeries::new([(t0, *floor), (t1, *floor)], 3, 7, style))?;
         }
         for (curve, band) in &bands {
             let style = color_of(&curve.name).stroke_width(2 * UNIT);

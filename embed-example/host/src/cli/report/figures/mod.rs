@@ -22,9 +22,11 @@ pub(super) fn all(ledger: &Ledger) -> Result<Vec<Figure>, Box<dyn Error>> {
     }
     figures.extend(points::reliability(ledger)?);
     figures.extend(points::forecasts(ledger)?);
-    figures.extend(points::kernels(ledger)?);
+    figures.extend(points::functions(ledger)?);
+    figures.extend(points::primitives(ledger)?);
     for group in ["scattering", "lights", "media"] {
         figures.extend(marks::components(group, &ledger.components)?);
+        figures.extend(marks::twins(group, &ledger.components)?);
     }
     Ok(figures)
 }

@@ -1,44 +1,81 @@
 //! Functions by error and time, stated intervals by how often they hold, predicted times by how right they are.
 
-use super::super::ledger::{Kernel, Ledger};
+use super::super::ledger::{Group, Kernel, Ledger};
 use super::super::tables::calibration;
 use super::canvas::*;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
-/// Largest error that is shown; larger ones stand at the top.
-const HIGHEST: f64 = 64.0;
+/// Errors of functions that are shown; larger ones stand at the top.
+const SHOWN: [f64; 2] = [0.25, 64.0];
+
+/// The same of tests and sums.
+const SHOWN_PRIMITIVES: [f64; 2] = [0.01, 1e5];
+
+/// Colours of variants in their order.
+const COLORS: [usize; 9] = [0, 7, 2, 3, 4, 1, 5, 6, 8];
+
+/// Elementary functions.
+pub(super) fn functions(ledger: &Ledger) -> Result<Option<Figure>, Fault> {
+    let caption = "Largest error, in units in the last place of the exact value, over nanoseconds for eight lanes, \
+                   both logarithmic: further down is more accurate, further left is faster. A line joins the variants \
+                   of a function. What is above 64 ULP stands at the top.";
+    let all: Vec<&Kernel> = ledger.kernels.iter().filter(|k| k.group == Group::Function && k.max_ulp > 0.0).collect();
+    kernels("kernels", "Elementary functions: error and time", caption, &all, SHOWN)
+}
+
+/// Tests of triangles and boxes, sums of pixels.
+pub(super) fn primitives(ledger: &Ledger) -> Result<Option<Figure>, Fault> {
+    let caption = "Largest error over nanoseconds for eight lanes, both logarithmic: further down is more accurate, \
+                   further left is faster. A line joins the variants. What is below 0.01 ULP stands at the bottom. \
+                   What leaks is in the table.";
+    let all: Vec<&Kernel> = ledger.kernels.iter().filter(|k| k.group == Group::Primitive).collect();
+    kernels("primitives", "Triangles, boxes, sums: error and time", caption, &all, SHOWN_PRIMITIVES)
+}
 
 /// Largest error by time of every function, with what computes it.
-pub(super) fn kernels(ledger: &Ledger) -> Result<Option<Figure>, Fault> {
-    let shown: Vec<&Kernel> = ledger.kernels.iter().filter(|k| k.ns.middle > 0.0 && k.max_ulp > 0.0).collect();
+fn kernels(
+    name: &str,
+    title: &str,
+    caption: &str,
+    all: &[&Kernel],
+    [least, highest]: [f64; 2],
+) -> Result<Option<Figure>, Fault> {
+    let shown: Vec<&Kernel> = all.iter().copied().filter(|k| k.ns.middle > 0.0).collect();
+    let variant_of = |k: &Kernel| match k.group {
+        Group::Function => k.variant.clone(),
+        // channels are in the table, the product's own arithmetic goes without saying
+        Group::Primitive => {
+            let name = k.variant.split(':').next().unwrap_or_default();
+            name.replace(", reproducible", "").replace(", one channel", "")
+        }
+    };
     let mut functions: Vec<&str> = Vec::new();
     shown.iter().for_each(|k| {
         if !functions.contains(&&*k.function) {
             functions.push(&k.function)
         }
     });
-    let mut variants: Vec<&str> = Vec::new();
+    let mut variants: Vec<String> = Vec::new();
     shown.iter().for_each(|k| {
-        if !variants.contains(&&*k.variant) {
-            variants.push(&k.variant)
+        if !variants.contains(&variant_of(k)) {
+            variants.push(variant_of(k))
         }
     });
     let Some(slowest) = shown.iter().map(|k| k.ns.high).reduce(f64::max) else { return Ok(None) };
     let fastest = shown.iter().map(|k| k.ns.low).fold(f64::INFINITY, f64::min).max(0.05);
-    let top = shown.iter().map(|k| k.max_ulp).filter(|e| e.is_finite()).fold(4.0, f64::max).min(HIGHEST);
-    let caption = "Largest error, in units in the last place of the exact value, over nanoseconds for eight lanes, \
-                   both logarithmic: further down is more accurate, further left is faster. A line joins the variants \
-                   of a function. What is above 64 ULP stands at the top.";
+    let top = shown.iter().map(|k| k.max_ulp).filter(|e| e.is_finite()).fold(4.0, f64::max).min(highest);
+    let place = |k: &Kernel| (k.ns.middle, k.max_ulp.clamp(least * 1.3, top));
     let draw = |sheet: &Sheet<'_>, layout: Layout| -> Result<(), Fault> {
-        let keys = Layout::px(if layout.narrow { 20 * variants.len() as u32 + 8 } else { 28 });
+        let columns = if layout.narrow { 1 } else { 3 };
+        let keys = Layout::px(20 * (variants.len() as u32).div_ceil(columns) + 8);
         let mut chart = ChartBuilder::on(sheet)
             .margin(Layout::px(8))
             .margin_right(Layout::px(40))
             .margin_top(keys + Layout::px(6))
             .x_label_area_size(Layout::px(40))
             .y_label_area_size(Layout::px(56))
-            .build_cartesian_2d((fastest / 1.4..slowest * 1.6).log_scale(), (0.25..top * 1.6).log_scale())?;
+            .build_cartesian_2d((fastest / 1.4..slowest * 1.6).log_scale(), (least..top * 1.6).log_scale())?;
         chart
             .configure_mesh()
             .x_desc("ns for 8 lanes")
@@ -55,20 +92,22 @@ pub(super) fn kernels(ledger: &Ledger) -> Result<Option<Figure>, Fault> {
             .light_line_style(TRANSPARENT)
             .draw()?;
         let ends = [fastest / 1.4, slowest * 1.6];
-        x_ticks(sheet, &chart, &log_ticks(ends, if layout.narrow { 5 } else { 9 }), [0.25, top * 1.6])?;
-        y_ticks(sheet, &chart, &log_ticks([0.25, top * 1.6], 9), ends)?;
+        x_ticks(sheet, &chart, &log_ticks(ends, if layout.narrow { 5 } else { 9 }), [least, top * 1.6])?;
+        y_ticks(sheet, &chart, &log_ticks([least, top * 1.6], 9), ends)?;
         let mut labels = Labels::default();
-        shown.iter().for_each(|k| labels.keep(chart.backend_coord(&(k.ns.middle, k.max_ulp.min(top))), 5));
+        // where the axis has its own
+        let (corner, end) = (chart.backend_coord(&(ends[0], least)), chart.backend_coord(&(ends[1], least)));
+        labels.keep_area([0, corner.1, end.0, corner.1 + Layout::px(40) as i32]);
+        shown.iter().for_each(|k| labels.keep(chart.backend_coord(&place(k)), 5));
         for function in &functions {
             let of: Vec<_> = shown.iter().filter(|k| k.function == **function).collect();
-            let place = |k: &Kernel| (k.ns.middle, k.max_ulp.min(top));
             chart.draw_series([PathElement::new(
                 of.iter().map(|k| place(k)).collect::<Vec<_>>(),
                 GRID.stroke_width(2 * UNIT),
             )])?;
             for k in &of {
-                let variant = variants.iter().position(|v| *v == k.variant).unwrap_or(0);
-                let color = SERIES[[0, 7, 2, 3, 4, 1][variant.min(5)]];
+                let variant = variants.iter().position(|v| *v == variant_of(k)).unwrap_or(0);
+                let color = SERIES[COLORS[variant.min(8)]];
                 chart.draw_series([Circle::new(place(k), 5 * UNIT as i32, color.filled())])?;
             }
             if let Some(first) = of.first() {
@@ -76,15 +115,19 @@ pub(super) fn kernels(ledger: &Ledger) -> Result<Option<Figure>, Fault> {
             }
         }
         for (i, variant) in variants.iter().enumerate() {
-            let (column, row) = if layout.narrow { (0, i as u32) } else { (i as u32, 0) };
+            let (column, row) = (i as u32 % columns, i as u32 / columns);
             let (x, y) = (Layout::px(66 + 210 * column) as i32, Layout::px(14 + 20 * row) as i32);
-            let color = SERIES[[0, 7, 2, 3, 4, 1][i.min(5)]];
+            let color = SERIES[COLORS[i.min(8)]];
             sheet.draw(&Circle::new((x, y), 5 * UNIT as i32, color.filled()))?;
-            sheet.draw(&Text::new(*variant, (x + Layout::px(10) as i32, y), text(INK, HPos::Left, VPos::Center)))?;
+            sheet.draw(&Text::new(
+                variant.as_str(),
+                (x + Layout::px(10) as i32, y),
+                text(INK, HPos::Left, VPos::Center),
+            ))?;
         }
         Ok(())
     };
-    Figure::draw("kernels", "Elementary functions: error and time", caption, [420, 380], draw).map(Some)
+    Figure::draw(name, title, caption, [420, 380], draw).map(Some)
 }
 
 /// How often intervals of a level hold the expectation.

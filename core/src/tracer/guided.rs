@@ -1,0 +1,177 @@
+//! Path guiding in stage `scatter`: the BSDF and the guide are sampled as one mixture, whose density is used
+//! everywhere.
+//!
+//! A sample comes from the guide with probability g, from the BSDF else, and counts f cos / (g q + (1 - g) p) with
+//! both densities q and p at its direction, whichever it came from (Veach's balance heuristic for one sample). Next
+//! event estimation is weighted against the mixture too. Delta lobes, which no guide can find, count 1 / (1 - g)
+//! times. g is 0 in media, at materials that scatter into narrow lobes, and where the guide's statistics promise
+//! nothing.
+
+use super::class::Kernel as ClassKernel;
+use super::guide_notes::GuideNote8;
+use super::ledger::NO_RECORD;
+use super::packets::Samples8;
+use crate::bsdf::{self, Bsdf, Eval8, Inputs8, Sample8, Visitor, folded};
+use crate::extension::Extension;
+use crate::learn::guiding::{Guide, Guide8, UNKNOWN_SHARE, sphere};
+use crate::sampler::Sampler;
+use crate::scene::Scene;
+use crate::world::World;
+use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
+
+/// Phong exponent from which on a lobe is too narrow for a guide: GGX widths below 0.05.
+const NARROW: f32 = 2.0 / (0.05 * 0.05) - 2.0;
+
+/// What the guide has drawn for eight samples.
+pub(super) struct Guided8<'a, 'm> {
+    guide: &'a Guide<'m>,
+    at: Guide8,
+    /// Lanes whose direction is the guide's.
+    chosen: Mask8,
+    /// Those directions, world space.
+    dir: Vec3x8,
+    /// Their densities.
+    pdf: F32x8,
+    /// Lanes that are learned from.
+    recorded: Mask8,
+}
+
+/// Draws from the guide for a packet of one surface class; `None` if guiding is off or of no use.
+#[inline(never)]
+pub(super) fn draw<'a, 'm: 'a, W: World>(
+    guide: &'a Guide<'m>,
+    world: &W,
+    samples: &Samples8,
+) -> Option<Guided8<'a, 'm>> {
+    let ClassKernel::Surface(kind) = samples.class.kernel() else { return None };
+    let recorded = samples.taught.and_not(samples.path.record.eq(U32x8::splat(NO_RECORD)));
+    let asked = samples.continues & (samples.guided | recorded);
+    if samples.class.is_delta() || asked.none() {
+        return None;
+    }
+    let v = &samples.vertex;
+    let (material, materials) = (v.material.to_array(), world.scene().materials);
+    let shininess = F32x8::from_fn(|i| {
+        let m = materials.get(material[i] as usize);
+        m.map_or(f32::INFINITY, |m| bsdf::shininess_with::<<W::Extension as Extension>::Bsdf>(kind, m))
+    });
+    let lanes = asked & shininess.lt(F32x8::splat(NARROW));
+    if lanes.none() {
+        return None;
+    }
+    // by the vertex's key: if the leaf went with the light sample's numbers, the weights of MIS would be biased
+    let mut at = guide.at(v.p, v.ns, v.key.cache_jitter(world.sampler()), lanes);
+    at.fraction = samples.guided.zero_unless(at.fraction);
+    // shares tell what other shares would do only of samples that were guided as most are
+    let most = if world.learned().guides_most() { samples.guided } else { !samples.guided };
+    at.known &= most;
+    let words = samples.key.guided_direction();
+    let chosen = lanes & at.chosen(&words);
+    let (mut dir, mut pdf) = (v.ns, F32x8::ZERO);
+    if chosen.any() {
+        let (d, q) = guide.sample(&at, words, chosen);
+        (dir, pdf) = (Vec3x8::select(chosen, d, v.ns), chosen.zero_unless(q));
+    }
+    Some(Guided8 { guide, at, chosen, dir, pdf, recorded: lanes & recorded })
+}
+
+/// One class's kernel on a packet, with the BSDF in the guide's directions.
+pub(super) struct GuidedKernel<'a, 's> {
+    pub(super) scene: &'a Scene<'s>,
+    pub(super) samples: &'a Samples8,
+    /// World directions of light samples; `None` where light sampling does not apply.
+    pub(super) nee: Option<Vec3x8>,
+    pub(super) u: [F32x8; 3],
+    /// World directions of the guide, and the lanes that have one.
+    pub(super) dir: Vec3x8,
+    pub(super) chosen: Mask8,
+}
+
+impl<'a, 's> GuidedKernel<'a, 's> {
+    pub(super) fn new(
+        (scene, sampler): (&'a Scene<'s>, Sampler),
+        samples: &'a Samples8,
+        nee: Option<Vec3x8>,
+        g: &Guided8<'_, '_>,
+    ) -> Self {
+        Self { scene, samples, nee, u: samples.key.scattering(sampler), dir: g.dir, chosen: g.chosen }
+    }
+}
+
+/// What a [`GuidedKernel`] found.
+pub(super) struct Both8 {
+    /// Towards the light sample.
+    pub(super) nee: Eval8,
+    /// The BSDF's own sample.
+    pub(super) own: Sample8,
+    /// The BSDF in the guide's direction.
+    pub(super) guided: Eval8,
+    /// Shading frames.
+    pub(super) frame: Frame8,
+}
+
+impl<'s> Visitor<'s> for GuidedKernel<'_, 's> {
+    type Out = Both8;
+
+    #[inline(never)]
+    fn visit<B: Bsdf<'s>>(self) -> Both8 {
+        let v = &self.samples.vertex;
+        let frame = Frame8::from_normal(v.ns);
+        let wo = frame.to_local(v.wo);
+        let inputs = Inputs8 { material: v.material, reflectance: v.reflectance };
+        let b = B::gather(self.scene, &inputs, self.samples.active);
+        let n = frame.to_local(v.ng);
+        let eval = |wi: Vec3x8| {
+            let wi = frame.to_local(wi);
+            if B::FOLDED { folded::eval(&b, wo, wi, n) } else { b.eval(wo, wi) }
+        };
+        let nee = if B::DELTA { Eval8::ZERO } else { self.nee.map_or(Eval8::ZERO, eval) };
+        let guided = if self.chosen.any() { eval(self.dir) } else { Eval8::ZERO };
+        let own = if B::FOLDED { folded::sample(&b, wo, self.u, n) } else { b.sample(wo, self.u) };
+        Both8 { nee, own, guided, frame }
+    }
+}
+
+/// A sample of the mixture.
+pub(super) struct Mixed8 {
+    /// Towards the light sample, with the mixture's density.
+    pub(super) nee: Eval8,
+    /// World direction.
+    pub(super) wi: Vec3x8,
+    /// Weight, density, delta lanes and valid lanes; `wi` means nothing.
+    pub(super) sample: Sample8,
+    pub(super) note: GuideNote8,
+}
+
+/// Mixes both samples.
+#[inline(never)]
+pub(super) fn mix(g: &Guided8<'_, '_>, both: &Both8, nee_direction: Option<Vec3x8>) -> Mixed8 {
+    let (share, own) = (g.at.fraction, 1.0 - g.at.fraction);
+    let used = share.gt(F32x8::ZERO);
+    let (chosen, s) = (g.chosen, &both.own);
+    let mut nee = both.nee;
+    if let Some(wi) = nee_direction.filter(|_| used.any()) {
+        nee.pdf = own * nee.pdf + share * g.guide.pdf(&g.at, wi, used & nee.f.any_positive());
+    }
+    let wi = Vec3x8::select(chosen, g.dir, both.frame.to_world(s.wi));
+    let delta = s.delta.and_not(chosen);
+    let p = chosen.select(both.guided.pdf, s.pdf);
+    let asked = (used | g.recorded & g.at.known) & s.valid.and_not(delta | chosen);
+    let q = chosen.select(g.pdf, g.guide.pdf(&g.at, wi, asked));
+    let pdf = own * p + share * q;
+    let possible = pdf.gt(F32x8::ZERO);
+    let ratio = delta.select(F32x8::ONE / own, used.select(p / pdf, F32x8::ONE));
+    let weight = Vec3x8::select(chosen, both.guided.f / pdf, s.weight * ratio);
+    let valid = (chosen & both.guided.f.any_positive() & possible) | (s.valid & (delta | possible)).and_not(chosen);
+    let learned = g.recorded & valid & (g.at.known | !delta);
+    let known = g.at.known.select(q / (q + p) * 254.99, F32x8::splat(UNKNOWN_SHARE as f32));
+    let note = GuideNote8 {
+        lanes: learned,
+        leaf: g.at.leaf,
+        share: (!delta).zero_unless(known).to_i32().to_u32(),
+        point: if learned.any() { sphere::quantised(wi) } else { U32x8::splat(0) },
+        pdf: (!delta).zero_unless(pdf),
+    };
+    let sample = Sample8 { wi: s.wi, weight: weight.zero_unless(valid), pdf, delta: delta & valid, valid };
+    Mixed8 { nee, wi, sample, note }
+}
