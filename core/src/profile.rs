@@ -17,6 +17,7 @@
 //! set is compiled into the program. The set is one table at the end of this file; a row is a profile. What a row must
 //! be worth is in docs/EFFECTS.md.
 
+use crate::learn::guiding::COMPILED;
 use crate::scene::Effects;
 use core::marker::PhantomData;
 
@@ -58,7 +59,7 @@ impl<const EFFECTS: u32> Profile for Custom<EFFECTS> {
     const LIGHT_TREES: bool = false;
 }
 
-/// The profile `P` with path guiding.
+/// The profile `P` with path guiding, in builds with the crate's feature `guiding`.
 #[derive(Clone, Copy, Debug)]
 pub struct Guided<P>(PhantomData<P>);
 
@@ -67,7 +68,7 @@ impl<P: Profile> Profile for Guided<P> {
     const NAME: &'static str = P::NAME;
     const SOBOL: bool = P::SOBOL;
     const LIGHT_TREES: bool = P::LIGHT_TREES;
-    const GUIDING: bool = true;
+    const GUIDING: bool = COMPILED;
 }
 
 /// Code to run with a profile that is chosen at run time; see [`AnyProfile::dispatch`].

@@ -2,7 +2,7 @@
 
 use crate::film::{Aov, AovSet, FilmLayout};
 use crate::learn::cache::CacheSize;
-use crate::learn::guiding::GuideSize;
+use crate::learn::guiding::{COMPILED, GuideSize};
 use crate::learn::{ControlVariate, Guiding, Learning, Needs};
 use crate::rrs::{Space, Strategy};
 use crate::sampler::Sampler;
@@ -107,7 +107,7 @@ impl Settings {
 
     /// Room for path guiding, if it is on; [`Self::check`] has seen that it fits.
     pub(crate) fn guide_size(&self) -> Option<GuideSize> {
-        self.guides().then(|| GuideSize::within(self.learning.guide_bytes, self.shards)).flatten()
+        (COMPILED && self.guides()).then(|| GuideSize::within(self.learning.guide_bytes, self.shards)).flatten()
     }
 
     /// Is path guiding on?

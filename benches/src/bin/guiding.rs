@@ -1,9 +1,9 @@
 //! What path guiding brings: relMSE at equal samples, and times CPU seconds, with guiding and without.
 //!
 //! Both sides render the same seeds in turn, on one thread, from bare shards: loading and baking do not count. The
-//! error is the variance of a pixel over the seeds of a side, over the squared mean of both sides plus 0.01, without
+//! error is the variance of a pixel over the seeds of a side, over the squared mean of all sides plus 0.01, without
 //! the worst share of the pixels: no reference takes part, and the brightness of both sides is there to compare.
-//! Guiding learns from 64 samples per pixel and iteration, the other side from the usual 8.
+//! Guiding that is `on` learns from 64 samples per pixel and iteration, the other sides from the usual 8.
 
 use clap::Parser;
 use croupier::unstable::learn::Guiding;
@@ -36,6 +36,9 @@ struct Args {
     /// Roulette strategies.
     #[arg(long, value_delimiter = ',', default_value = "ears,classic")]
     rrs: Vec<String>,
+    /// Settings of guiding that are compared with `off`.
+    #[arg(long, value_delimiter = ',', default_value = "on,auto")]
+    guiding: Vec<String>,
     /// Renders of each side, 2 at least.
     #[arg(long, default_value_t = 4)]
     seeds: u64,
@@ -108,14 +111,15 @@ impl Side {
         sum / (3 * self.pictures.len() * self.pictures[0].len()) as f64
     }
 
-    /// relMSE of a render, over the pictures of both sides.
-    fn error(&self, other: &Self, trim: f64) -> f64 {
+    /// relMSE of a render, over the pictures of all sides.
+    fn error(&self, all: &[Self], trim: f64) -> f64 {
         let n = self.pictures.len() as f64;
         let pixel = |i: usize| {
             let channel = |c: usize| {
-                let (own, both) = (self.mean(i, c), 0.5 * (self.mean(i, c) + other.mean(i, c)));
+                let own = self.mean(i, c);
+                let mean = all.iter().map(|side| side.mean(i, c)).sum::<f64>() / all.len() as f64;
                 let squares: f64 = self.pictures.iter().map(|p| (p[i][c] - own).powi(2)).sum();
-                squares / (n - 1.0) / (both * both + 0.01)
+                squares / (n - 1.0) / (mean * mean + 0.01)
             };
             (0..3).map(channel).sum::<f64>() / 3.0
         };
@@ -128,10 +132,16 @@ impl Side {
 
 fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
     let mut results = Results::of_this_run(NAME);
-    let columns = "scene, strategy, relMSE without, relMSE with, gain at equal samples, CPU s without, CPU s with, \
-                   gain in efficiency, brightness without, brightness with";
-    let mut table = Table::new(&format!("{} samples per pixel, {} seeds", args.spp, args.seeds.max(2)), columns);
+    let columns = "scene, strategy, guiding, relMSE without, relMSE with, gain at equal samples, CPU s without, \
+                   CPU s with, gain in efficiency, brightness without, brightness with";
+    let seeds = args.seeds.max(2);
+    let mut table = Table::new(&format!("{} samples per pixel, {seeds} seeds", args.spp), columns);
     print!("{}", table.head());
+    let named = |name: &String| {
+        let found = [Guiding::On, Guiding::Auto].into_iter().find(|mode| mode.name() == name);
+        found.ok_or_else(|| format!("--guiding {name}: must be `on` or `auto`"))
+    };
+    let modes = args.guiding.iter().map(named).collect::<Result<Vec<_>, _>>()?;
     for name in &args.scene {
         let baked = bake(&load(&args.scenes.join(name))?.0, &BakeOptions::default(), |_, _| ())?;
         let scene = Scene::from_bytes(&baked.bytes)?;
@@ -139,24 +149,28 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
             let mut s = Settings { shards: SHARDS, strategy: Strategy::parse(rrs)?, ..Settings::for_scene(&scene) };
             s.shadow_roulette = s.strategy.is_efficiency_aware();
             s.size = [args.columns, (args.columns * s.size[1]).div_ceil(s.size[0])];
-            let mut sides = [Side::default(), Side::default()];
-            for seed in 0..args.seeds.max(2) {
-                for (side, guided) in sides.iter_mut().zip([false, true]) {
+            let asked = || [Guiding::Off].into_iter().chain(modes.iter().copied());
+            let mut sides: Vec<_> = asked().map(|_| Side::default()).collect();
+            for seed in 0..seeds {
+                for (side, guiding) in sides.iter_mut().zip(asked()) {
                     s.seed = 1 + seed;
-                    s.learning.guiding = if guided { Guiding::On } else { Guiding::Off };
-                    s.learning.samples = if guided { 64 } else { 8 };
+                    s.learning.guiding = guiding;
+                    s.learning.samples = if guiding == Guiding::On { 64 } else { 8 };
                     let render = Render { scene, settings: &s, spp: args.spp };
+                    let guided = guiding != Guiding::Off;
                     let (picture, seconds) = AnyProfile::smallest(scene.effects).dispatch_guided(guided, render)?;
                     side.pictures.push(picture);
-                    side.seconds += seconds / args.seeds.max(2) as f64;
+                    side.seconds += seconds / seeds as f64;
                 }
             }
-            let [off, on] = &sides;
-            let (a, b) = (off.error(on, args.trim), on.error(off, args.trim));
-            let efficiency = a * off.seconds / (b * on.seconds);
-            let numbers = [a, b, a / b, off.seconds, on.seconds, efficiency, off.brightness(), on.brightness()];
-            table.add([name.clone(), rrs.clone()].into_iter().chain(numbers.map(digits)));
-            println!("{}", table.last());
+            let off = &sides[0];
+            for (on, mode) in sides[1..].iter().zip(&args.guiding) {
+                let (a, b) = (off.error(&sides, args.trim), on.error(&sides, args.trim));
+                let efficiency = a * off.seconds / (b * on.seconds);
+                let numbers = [a, b, a / b, off.seconds, on.seconds, efficiency, off.brightness(), on.brightness()];
+                table.add([name.clone(), rrs.clone(), mode.clone()].into_iter().chain(numbers.map(digits)));
+                println!("{}", table.last());
+            }
         }
     }
     results.tables.push(table);

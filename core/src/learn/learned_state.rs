@@ -3,7 +3,7 @@
 use super::adaptive::{AllocationScalars, SampleAllocation};
 use super::cache::{BINS, Cache, CacheScalars, NO_BIN, Training, VertexKind8};
 use super::estimate::{EstimateScalars, PixelEstimates};
-use super::guiding::{Guide, GuideLog, GuideScalars, GuideUse, Lot, Trial, Watch};
+use super::guiding::{COMPILED, Guide, GuideLog, GuideScalars, GuideUse, Lot, Trial, Watch};
 use super::needs::Needs;
 use super::picture::{Picture, PictureStatistics, error_of, outliers};
 use super::settings::{Guiding, Learning, Objective};
@@ -93,7 +93,7 @@ impl<'m> LearnedState<'m> {
             learning: n.learning,
             size: n.size,
             cache,
-            guide: n.guide.map(|size| Guide::carve(c, size, &scalars.guide)).transpose()?,
+            guide: n.guide.filter(|_| COMPILED).map(|size| Guide::carve(c, size, &scalars.guide)).transpose()?,
             watch: scalars.watch,
             block,
             pixels: PixelEstimates::carve(c, n.size, n.pixels, &n.learning, scalars.estimate)?,
@@ -113,7 +113,7 @@ impl<'m> LearnedState<'m> {
         if let Some(cache) = &mut self.cache {
             cache.forget();
         }
-        if let Some(guide) = &mut self.guide {
+        if let Some(guide) = self.guide_mut() {
             guide.reset();
         }
         self.watch = Watch::default();
@@ -127,7 +127,7 @@ impl<'m> LearnedState<'m> {
         LearnedScalars {
             picture: self.picture,
             cache: self.cache.as_ref().map_or(fresh.cache, Cache::scalars),
-            guide: self.guide.as_ref().map_or(fresh.guide, Guide::scalars),
+            guide: self.guide().map_or(fresh.guide, Guide::scalars),
             watch: self.watch,
             estimate: self.pixels.scalars(),
             allocation: self.allocation.scalars(),
@@ -146,17 +146,17 @@ impl<'m> LearnedState<'m> {
     /// Distributions of path guiding, if it is on.
     #[inline(always)]
     pub(crate) fn guide(&self) -> Option<&Guide<'m>> {
-        self.guide.as_ref()
+        self.guide.as_ref().filter(|_| COMPILED)
     }
 
     pub(crate) fn guide_mut(&mut self) -> Option<&mut Guide<'m>> {
-        self.guide.as_mut()
+        self.guide.as_mut().filter(|_| COMPILED)
     }
 
     /// Is the guide watched, whether it pays?
     #[inline(always)]
     pub(crate) fn watches(&self) -> bool {
-        self.learning.guiding == Guiding::Auto
+        COMPILED && self.learning.guiding == Guiding::Auto
     }
 
     /// Are most samples guided?
@@ -189,7 +189,7 @@ impl<'m> LearnedState<'m> {
     /// Begins to learn from the logs of path guiding; `false` if it is off.
     pub(crate) fn begin_guide(&mut self) -> bool {
         let (keep, most) = (self.learning.decay, self.guides_most());
-        self.guide.as_mut().map(|g| g.begin_learning(keep, most)).is_some()
+        self.guide_mut().map(|g| g.begin_learning(keep, most)).is_some()
     }
 
     /// Adds what a shard has measured of guiding.
@@ -199,32 +199,33 @@ impl<'m> LearnedState<'m> {
 
     /// Are the shards' logs to be replayed next?
     pub(crate) fn guide_wants_logs(&self) -> bool {
-        self.guide.as_ref().is_some_and(Guide::wants_logs)
+        self.guide().is_some_and(Guide::wants_logs)
     }
 
     /// Are the logs replayed for the first time?
     pub(crate) fn is_first_replay(&self) -> bool {
-        self.guide.as_ref().is_some_and(Guide::is_first_replay)
+        self.guide().is_some_and(Guide::is_first_replay)
     }
 
     /// Replays a log from entry `at` on, `limit` at most; their number, and `true` after the last.
     pub(crate) fn replay(&mut self, log: &GuideLog<'_>, at: usize, limit: usize) -> (usize, bool) {
-        self.guide.as_mut().map_or((0, true), |g| g.replay(log, at, limit))
+        self.guide_mut().map_or((0, true), |g| g.replay(log, at, limit))
     }
 
     /// All logs were replayed.
     pub(crate) fn end_replay(&mut self) {
-        if let Some(g) = &mut self.guide {
+        if let Some(g) = self.guide_mut() {
             g.end_replay();
         }
     }
 
     /// Goes on to learn where no logs are wanted; work done, in units of about a ray, and `true` after the last.
     pub(crate) fn learn_guide(&mut self) -> (u64, bool) {
-        let Some(guide) = &mut self.guide else { return (0, true) };
+        let Some(guide) = self.guide_mut() else { return (0, true) };
         let (work, done) = guide.learn_some();
-        if done && self.learning.guiding == Guiding::Auto {
-            self.watch.decide(guide.is_useful(), self.learning.decay.into());
+        let useful = done && guide.is_useful();
+        if done && self.watches() {
+            self.watch.decide(useful, self.learning.decay.into());
         }
         (work, done)
     }
@@ -430,7 +431,7 @@ impl<'m> LearnedState<'m> {
     /// Discounts statistics of the scene from bin `at` on, `limit` at most; their number, and `true` after the last.
     pub(crate) fn discount(&mut self, at: usize, limit: usize) -> (usize, bool) {
         // the variance in a bin is that of the guide that was: factors must not lag behind
-        let guided = self.guide.is_some() && self.guides_most();
+        let guided = self.guide().is_some() && self.guides_most();
         let again = if guided { self.learning.decay } else { 1.0 };
         let keep = f64::from(self.learning.decay) * f64::from(again);
         self.cache.as_mut().map_or((0, true), |c| c.discount(keep, at, limit))

@@ -29,7 +29,7 @@ pub enum SessionError {
         /// The sampler.
         missing: Sampler,
     },
-    /// Path guiding is on, and the profile was compiled without it
+    /// Path guiding is on, and the profile, or the crate without its feature `guiding`, was compiled without it
     /// ([`Profile::GUIDING`](crate::profile::Profile::GUIDING)).
     Guiding,
     /// The shards are not all of the plan's, in order.

@@ -128,7 +128,7 @@ impl<'m> Bookkeeping<'m> {
             clear_bins: bins[1],
             begun: self.begun as u64,
             outlier: self.outlier,
-            guide_offered: self.guide.log.as_ref().map_or(0, GuideLog::offered),
+            guide_offered: self.guide.log().map_or(0, GuideLog::offered),
         }
     }
 
@@ -139,7 +139,7 @@ impl<'m> Bookkeeping<'m> {
         if let Some(training) = &mut self.training {
             training.resume([r.used_bins, r.clear_bins])?;
         }
-        if let Some(log) = &mut self.guide.log {
+        if let Some(log) = self.guide.log_mut() {
             log.resume(r.guide_offered);
         }
         self.begun = usize::try_from(r.begun).ok().filter(|&begun| begun <= self.pixels.len())?;
@@ -461,7 +461,7 @@ impl<'m> Bookkeeping<'m> {
     fn close_record<W: World>(&mut self, record: u32) {
         let (training, counters, guide) = (&mut self.training, &mut self.counters, &mut self.guide);
         // two copies of the code: renders without a guide do not even read what it learns from
-        if !W::GUIDING || guide.log.is_none() {
+        if !W::GUIDING || guide.log().is_none() {
             self.ledger.close(record, |f| log(training, counters, &f));
         } else {
             self.ledger.close(record, |f| {

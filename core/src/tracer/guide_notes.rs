@@ -3,7 +3,7 @@
 
 use super::job::Job;
 use crate::learn::Guiding;
-use crate::learn::guiding::{GuideLog, NO_LEAF, Trial};
+use crate::learn::guiding::{COMPILED, GuideLog, NO_LEAF, Trial};
 use crate::memory::{Carver, Measure, MemoryError};
 use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, Mask8, U32x8};
@@ -53,7 +53,7 @@ const NOTHING: u32 = NO_LEAF;
 #[derive(Debug)]
 pub(crate) struct GuideNotes<'m> {
     notes: &'m mut [GuideNote],
-    pub(super) log: Option<GuideLog<'m>>,
+    log: Option<GuideLog<'m>>,
     /// Errors of samples that are not guided and of samples that are; one if they are compared, else none.
     pub(super) trial: &'m mut [Trial],
 }
@@ -71,7 +71,7 @@ impl<'m> GuideNotes<'m> {
 
     /// Number of trials.
     fn trials(job: &Job) -> usize {
-        usize::from(job.settings.learning.guiding == Guiding::Auto)
+        usize::from(COMPILED && job.settings.learning.guiding == Guiding::Auto)
     }
 
     /// Bytes; [`Self::carve`] carves in the same order.
@@ -82,13 +82,24 @@ impl<'m> GuideNotes<'m> {
 
     pub(crate) fn carve(c: &mut Carver<'m>, job: &Job, ledger: usize) -> Result<Self, MemoryError> {
         let notes = c.take_unset(Self::capacity(job, ledger))?;
-        let log = job.guide.map(|size| GuideLog::carve(c, size)).transpose()?;
+        let log = job.guide.filter(|_| COMPILED).map(|size| GuideLog::carve(c, size)).transpose()?;
         Ok(Self { notes, log, trial: c.take_unset(Self::trials(job))? })
+    }
+
+    /// The log.
+    #[inline(always)]
+    pub(crate) fn log(&self) -> Option<&GuideLog<'m>> {
+        self.log.as_ref().filter(|_| COMPILED)
+    }
+
+    #[inline(always)]
+    pub(crate) fn log_mut(&mut self) -> Option<&mut GuideLog<'m>> {
+        self.log.as_mut().filter(|_| COMPILED)
     }
 
     /// Forgets what was learned.
     pub(crate) fn clear(&mut self) {
-        if let Some(log) = &mut self.log {
+        if let Some(log) = self.log_mut() {
             log.clear();
         }
         self.trial.fill(Trial::default());

@@ -375,7 +375,7 @@ impl Shard<'_> {
         if let Some(training) = &mut book.training {
             training.load([records, shadows]);
         }
-        if let Some(guide) = &mut book.guide.log {
+        if let Some(guide) = book.guide.log_mut() {
             guide.load(saved.guide.offered as u32, log);
         }
         book.guide.trial.fill(saved.guide.trial);

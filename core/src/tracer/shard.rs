@@ -224,7 +224,7 @@ impl<'m> Shard<'m> {
 
     /// The directions that path guiding learns from, of this iteration.
     pub(crate) fn guide_log(&self) -> Option<&GuideLog<'m>> {
-        self.state.book.guide.log.as_ref()
+        self.state.book.guide.log()
     }
 
     /// What guided samples and others have cost in this iteration, if they are compared.

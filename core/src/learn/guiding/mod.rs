@@ -27,6 +27,9 @@
 //! | `save` | the guide as bytes |
 //! | `watch` | is it worth its cost? |
 
+/// The crate's feature `guiding`. Without it there is no guide, and compilers remove what would serve one.
+pub(crate) const COMPILED: bool = cfg!(feature = "guiding");
+
 mod fraction;
 mod log;
 mod node;
