@@ -4,6 +4,7 @@ use croupier::unstable::Sampler;
 use croupier::unstable::accel::{Intersector, WideBvh};
 use croupier::unstable::film::{PixelAov, PixelStats};
 use croupier::unstable::learn::cache::CacheError;
+use croupier::unstable::learn::guiding::GuideUse;
 use croupier::unstable::learn::{Learning, PictureStatistics, PixelEstimator};
 use croupier::unstable::profile::{AnyProfile, Profile, ProfileVisitor};
 use croupier::{
@@ -144,6 +145,9 @@ pub trait Learned {
     /// no room for; `None` if it is off.
     fn guide(&self) -> Option<(Vec<u8>, f64, u64)>;
 
+    /// Whether path guiding pays, if the settings leave that open.
+    fn guide_use(&self) -> Option<GuideUse>;
+
     /// Loads saved distributions.
     fn load_guide(&mut self, bytes: &[u8]) -> Result<(), CacheError>;
 
@@ -184,6 +188,10 @@ impl<P: Profile, I: Intersector> Learned for Session<'_, '_, P, I> {
         let mut bytes = vec![0; guide.saved_len()];
         guide.save(&mut bytes).expect("room for the guide");
         Some((bytes, guide.mean_fraction(), guide.thinned()))
+    }
+
+    fn guide_use(&self) -> Option<GuideUse> {
+        SessionState::guide_use(self)
     }
 
     fn load_guide(&mut self, bytes: &[u8]) -> Result<(), CacheError> {

@@ -3,7 +3,6 @@
 //! Both sides render the same seeds in turn, on one thread, from bare shards: loading and baking do not count. The
 //! error is the variance of a pixel over the seeds of a side, over the squared mean of all sides plus 0.01, without
 //! the worst share of the pixels: no reference takes part, and the brightness of both sides is there to compare.
-//! Guiding that is `on` learns from 64 samples per pixel and iteration, the other sides from the usual 8.
 
 use clap::Parser;
 use croupier::unstable::learn::Guiding;
@@ -155,7 +154,6 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
                 for (side, guiding) in sides.iter_mut().zip(asked()) {
                     s.seed = 1 + seed;
                     s.learning.guiding = guiding;
-                    s.learning.samples = if guiding == Guiding::On { 64 } else { 8 };
                     let render = Render { scene, settings: &s, spp: args.spp };
                     let guided = guiding != Guiding::Off;
                     let (picture, seconds) = AnyProfile::smallest(scene.effects).dispatch_guided(guided, render)?;

@@ -3,7 +3,7 @@
 use super::adaptive::{AllocationScalars, SampleAllocation};
 use super::cache::{BINS, Cache, CacheScalars, NO_BIN, Training, VertexKind8};
 use super::estimate::{EstimateScalars, PixelEstimates};
-use super::guiding::{COMPILED, Guide, GuideLog, GuideScalars, GuideUse, Lot, Trial, Watch};
+use super::guiding::{Assignment, COMPILED, Guide, GuideLog, GuideScalars, GuideUse, LEARNED_ENABLED, Trial, Watch};
 use super::needs::Needs;
 use super::picture::{Picture, PictureStatistics, error_of, outliers};
 use super::settings::{Guiding, Learning, Objective};
@@ -162,28 +162,33 @@ impl<'m> LearnedState<'m> {
     /// Are most samples guided?
     #[inline(always)]
     pub(crate) fn guides_most(&self) -> bool {
-        !self.watches() || self.watch.awake()
+        !self.watches() || self.watch.enabled()
     }
 
     /// What becomes of sample `sample` of the pixel in column and row `at` in iteration `iteration`.
     #[inline(always)]
-    pub(crate) fn lot(&self, iteration: u64, at: [u32; 2], sample: u32) -> Lot {
-        if self.watches() { self.watch.lot(iteration, at, sample) } else { Lot { guided: true, tried: false } }
+    pub(crate) fn assignment(&self, iteration: u64, at: [u32; 2], sample: u32) -> Assignment {
+        if self.watches() {
+            self.watch.assignment(iteration, at, sample)
+        } else {
+            Assignment { guided: true, tried: false }
+        }
     }
 
     /// How many samples of a pixel are learned from in an iteration.
     #[inline(always)]
-    pub(crate) fn learned_samples(&self, lot: Lot) -> u32 {
+    pub(crate) fn learned_samples(&self, assignment: Assignment) -> u32 {
         if !self.watches() {
-            return self.learning.samples;
+            let least = if self.guide().is_some() { LEARNED_ENABLED } else { 0 };
+            return self.learning.samples.max(least);
         }
         // without a cache nothing but the guide learns
-        self.watch.learned(if self.cache.is_some() { self.learning.samples } else { 0 }, lot)
+        self.watch.learned(if self.cache.is_some() { self.learning.samples } else { 0 }, assignment)
     }
 
     /// Whether guiding pays, if the settings leave that open.
     pub(crate) fn guide_use(&self) -> Option<GuideUse> {
-        self.watches().then(|| GuideUse { awake: self.watch.awake(), gain: self.watch.gain() })
+        self.watches().then(|| GuideUse { enabled: self.watch.enabled(), gain: self.watch.gain() })
     }
 
     /// Begins to learn from the logs of path guiding; `false` if it is off.

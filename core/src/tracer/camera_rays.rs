@@ -145,9 +145,9 @@ pub(super) fn camera_samples<W: World>(
         let mut target = PixelTarget::numbered(error_weight, share, film, slot, s);
         let mut learning = settings.learning.samples;
         if W::GUIDING {
-            let lot = learned.lot(iteration.number, p, s);
-            target = target.with_lot(lot);
-            learning = learned.learned_samples(lot);
+            let assignment = learned.assignment(iteration.number, p, s);
+            target = target.with_assignment(assignment);
+            learning = learned.learned_samples(assignment);
         }
         let Some(opened) = book.open_camera_sample(target, s < learning) else { break };
         [x[lanes], y[lanes]] = p;

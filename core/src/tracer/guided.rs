@@ -44,7 +44,7 @@ pub(super) fn draw<'a, 'm: 'a, W: World>(
     samples: &Samples8,
 ) -> Option<Guided8<'a, 'm>> {
     let ClassKernel::Surface(kind) = samples.class.kernel() else { return None };
-    let recorded = samples.taught.and_not(samples.path.record.eq(U32x8::splat(NO_RECORD)));
+    let recorded = samples.trains.and_not(samples.path.record.eq(U32x8::splat(NO_RECORD)));
     let asked = samples.continues & (samples.guided | recorded);
     if samples.class.is_delta() || asked.none() {
         return None;
@@ -65,6 +65,10 @@ pub(super) fn draw<'a, 'm: 'a, W: World>(
     // shares tell what other shares would do only of samples that were guided as most are
     let most = if world.learned().guides_most() { samples.guided } else { !samples.guided };
     at.known &= most;
+    let recorded = lanes & recorded;
+    if recorded.none() && !at.fraction.gt(F32x8::ZERO).any() {
+        return None;
+    }
     let words = samples.key.guided_direction();
     let chosen = lanes & at.chosen(&words);
     let (mut dir, mut pdf) = (v.ns, F32x8::ZERO);
@@ -72,7 +76,7 @@ pub(super) fn draw<'a, 'm: 'a, W: World>(
         let (d, q) = guide.sample(&at, words, chosen);
         (dir, pdf) = (Vec3x8::select(chosen, d, v.ns), chosen.zero_unless(q));
     }
-    Some(Guided8 { guide, at, chosen, dir, pdf, recorded: lanes & recorded })
+    Some(Guided8 { guide, at, chosen, dir, pdf, recorded })
 }
 
 /// One class's kernel on a packet, with the BSDF in the guide's directions.

@@ -30,7 +30,7 @@ pub(crate) struct Samples8 {
     /// Lanes that are guided, where the guide asks for it; all where the kernels contain no guiding.
     pub guided: Mask8,
     /// Lanes that path guiding learns from, if they have a record.
-    pub taught: Mask8,
+    pub trains: Mask8,
 }
 
 /// One ray per lane, from the camera or from a vertex.

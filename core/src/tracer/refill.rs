@@ -53,10 +53,10 @@ pub(crate) fn samples<W: World>(world: &W, ring: &Ring<'_>, book: &mut Bookkeepi
     let (class, with_nee) = (taken.queue.class(), taken.queue.with_nee());
     book.counters.scatter.count(taken.lanes as u32);
     book.counters.vertex_samples += taken.lanes as u64;
-    let (mut guided, mut taught) = (active, active);
+    let (mut guided, mut trains) = (active, active);
     if W::GUIDING && world.learned().watches() {
-        let [chosen, tried] = book.roots.lots(vertex.path.root, active);
-        (guided, taught) = (chosen, if world.learned().guides_most() { active } else { tried });
+        let [chosen, tried] = book.roots.assignments(vertex.path.root, active);
+        (guided, trains) = (chosen, if world.learned().guides_most() { active } else { tried });
     }
     let record = book.open_samples::<W>(vertex.path.record, taken.lanes, with_nee);
     if W::GUIDING {
@@ -65,7 +65,7 @@ pub(crate) fn samples<W: World>(world: &W, ring: &Ring<'_>, book: &mut Bookkeepi
     Samples8 {
         active,
         guided,
-        taught,
+        trains,
         continues: active & vertex.path.depth.lt(U32x8::splat(world.max_depth())),
         class,
         with_nee,

@@ -1,7 +1,7 @@
 //! One record per camera sample in flight: what its whole tree of paths has found.
 
 use super::free_list::FreeList;
-use crate::learn::guiding::Lot;
+use crate::learn::guiding::Assignment;
 use crate::memory::{Carver, Measure, MemoryError};
 use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -36,7 +36,7 @@ pub(crate) struct PixelTarget {
     /// Film index.
     pub film: u32,
     /// Number of the pixel in the shard, below 2^29, and in the highest bits whether the sample is its first of the
-    /// iteration, and its [`Lot`]; see [`Self::numbered`].
+    /// iteration, and its [`Assignment`]; see [`Self::numbered`].
     pixel: u32,
 }
 
@@ -55,10 +55,10 @@ impl PixelTarget {
         Self { error_weight, share, film, pixel: pixel & !BITS | if sample == 0 { FIRST } else { 0 } }
     }
 
-    /// The same of a sample with this lot.
+    /// The same of a sample with this assignment.
     #[inline(always)]
-    pub(crate) fn with_lot(self, lot: Lot) -> Self {
-        let bits = if lot.guided { GUIDED } else { 0 } | if lot.tried { TRIED } else { 0 };
+    pub(crate) fn with_assignment(self, assignment: Assignment) -> Self {
+        let bits = if assignment.guided { GUIDED } else { 0 } | if assignment.tried { TRIED } else { 0 };
         Self { pixel: self.pixel | bits, ..self }
     }
 
@@ -175,7 +175,7 @@ impl<'m> Roots<'m> {
 
     /// Lanes of `mask` whose camera samples are guided, and those whose are compared.
     #[inline(always)]
-    pub(crate) fn lots(&self, slots: U32x8, mask: Mask8) -> [Mask8; 2] {
+    pub(crate) fn assignments(&self, slots: U32x8, mask: Mask8) -> [Mask8; 2] {
         let slots = slots.to_array();
         let words: [u32; 8] =
             core::array::from_fn(|i| self.slots.get(slots[i] as usize).map_or(0, |root| root.target.pixel));

@@ -2,8 +2,8 @@
 //! second camera sample is guided, and the errors and rays of both halves are compared. Blocks, because samples of a
 //! packet are neighbours: packets without any guided lane cost what they cost without guiding.
 //!
-//! The guide is asleep while no gain is proven: then the other pixels are not guided, and no direction is learned
-//! from there. It is awake while the gain lasts: then they are.
+//! The guide is disabled while no gain is proven: then the other pixels are not guided, and no direction is learned
+//! from there. It is enabled while the gain lasts: then they are.
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing)]
 
 use crate::film::{REL_MSE_EPSILON, SqrtNewton};
@@ -15,24 +15,25 @@ use croupier_simd::F32x8;
 /// Cost of a ray of a guided path over that of others, in instructions: trees are looked up twice, BSDFs are evaluated
 /// once more, and more samples are learned from.
 const GUIDED_RAY: f64 = 1.35;
-/// Gain, less its standard error, from which on the guide is awake.
-const WAKES: f64 = 1.05;
-/// Gain below which it falls asleep again.
-const SLEEPS: f64 = 1.0;
-/// Gain that it may have, by its standard errors, lest hardly any samples are guided from then on.
-const HOPE: f64 = 1.1;
+/// Gain, less its standard error, from which on the guide is enabled.
+const ENABLED_ABOVE: f64 = 1.05;
+/// Gain below which it is disabled again.
+const DISABLED_BELOW: f64 = 1.0;
+/// Gain that must be within two standard errors, lest hardly any samples are compared from then on.
+const POSSIBLE: f64 = 1.1;
 /// Share of the blocks in which halves are compared while nothing is decided, in 65536ths.
 const TRIED: u32 = 65_536 / 24;
-/// The same after the decision to sleep.
-const ASLEEP: u32 = 65_536 / 128;
-/// The same while the guide is awake.
+/// The same after a gain of [`POSSIBLE`] is out of the question.
+const UNPROMISING: u32 = 65_536 / 128;
+/// The same while the guide is enabled.
 const CONTROL: u32 = 65_536 / 16;
 /// Binary logarithm of the edge of a block.
 const BLOCK_BITS: u32 = 3;
 /// Guided samples before which nothing is decided.
 const FEWEST: f64 = 256.0;
-/// Samples per pixel and iteration that are learned from while the guide is awake, at least.
-const LEARNED_AWAKE: u32 = 32;
+/// Samples per pixel and iteration that are learned from while the guide is enabled, at least: of 8, 16, 32 and 64 the
+/// one with the best efficiency in the scenes of benches/results/guiding.md.
+pub(crate) const LEARNED_ENABLED: u32 = 16;
 /// The same in blocks in which halves are compared.
 const LEARNED_TRIED: u32 = 64;
 
@@ -40,7 +41,7 @@ const LEARNED_TRIED: u32 = 64;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuideUse {
     /// Are most samples of the next iteration guided?
-    pub awake: bool,
+    pub enabled: bool,
     /// What was measured; `None` before enough samples.
     pub gain: Option<GuideGain>,
 }
@@ -107,13 +108,13 @@ impl TrialSums {
 /// Samples that were not guided, and samples that were.
 pub(crate) type Trial = [TrialSums; 2];
 
-/// What is known of the gain, and whether the guide is awake.
+/// What is known of the gain, and whether the guide is enabled.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Watch {
     trial: Trial,
     /// Not 0: most samples are guided.
-    awake: u32,
+    enabled: u32,
     /// Share of the blocks in which halves are compared, in 65536ths.
     tried: u32,
 }
@@ -121,13 +122,13 @@ pub(crate) struct Watch {
 impl Default for Watch {
     /// Nothing is known.
     fn default() -> Self {
-        Self { trial: Trial::default(), awake: 0, tried: TRIED }
+        Self { trial: Trial::default(), enabled: 0, tried: TRIED }
     }
 }
 
-/// What becomes of a camera sample.
+/// How a camera sample takes part in the comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Lot {
+pub(crate) struct Assignment {
     /// Is it guided?
     pub guided: bool,
     /// Is it compared with others?
@@ -137,26 +138,26 @@ pub(crate) struct Lot {
 impl Watch {
     /// Are most samples guided?
     #[inline(always)]
-    pub(crate) fn awake(&self) -> bool {
-        self.awake != 0
+    pub(crate) fn enabled(&self) -> bool {
+        self.enabled != 0
     }
 
     /// What becomes of sample `sample` of the pixel in this column and row in iteration `iteration`.
     #[inline]
-    pub(crate) fn lot(&self, iteration: u64, [x, y]: [u32; 2], sample: u32) -> Lot {
+    pub(crate) fn assignment(&self, iteration: u64, [x, y]: [u32; 2], sample: u32) -> Assignment {
         let salt = mix(iteration);
         let bits = |x: u32, y: u32, n: u32| mix(mix(u64::from(y) << 32 | u64::from(x)) ^ salt ^ u64::from(n));
         let tried = (bits(x >> BLOCK_BITS, y >> BLOCK_BITS, u32::MAX) >> 48) < u64::from(self.tried);
-        Lot { guided: if tried { bits(x, y, sample) >> 63 == 1 } else { self.awake() }, tried }
+        Assignment { guided: if tried { bits(x, y, sample) >> 63 == 1 } else { self.enabled() }, tried }
     }
 
     /// How many samples of a pixel and iteration are learned from, where `asked` are without guiding.
     #[inline]
-    pub(crate) fn learned(&self, asked: u32, lot: Lot) -> u32 {
-        let least = if lot.tried {
+    pub(crate) fn learned(&self, asked: u32, a: Assignment) -> u32 {
+        let least = if a.tried {
             LEARNED_TRIED
-        } else if self.awake() {
-            LEARNED_AWAKE
+        } else if self.enabled() {
+            LEARNED_ENABLED
         } else {
             0
         };
@@ -188,14 +189,14 @@ impl Watch {
             return;
         }
         let gain = self.gain();
-        self.awake = match gain {
-            Some(GuideGain { gain, error }) if self.awake == 0 => u32::from(gain * (1.0 - error) > WAKES),
-            Some(GuideGain { gain, .. }) => u32::from(gain >= SLEEPS),
-            None => self.awake,
+        self.enabled = match gain {
+            Some(GuideGain { gain, error }) if self.enabled == 0 => u32::from(gain * (1.0 - error) > ENABLED_ABOVE),
+            Some(GuideGain { gain, .. }) => u32::from(gain >= DISABLED_BELOW),
+            None => self.enabled,
         };
         self.tried = match gain {
-            _ if self.awake() => CONTROL,
-            Some(GuideGain { gain, error }) if gain * (1.0 + 2.0 * error) < HOPE => ASLEEP,
+            _ if self.enabled() => CONTROL,
+            Some(GuideGain { gain, error }) if gain * (1.0 + 2.0 * error) < POSSIBLE => UNPROMISING,
             _ => TRIED,
         };
         self.trial = self.trial.map(|sums| sums.times(decay));
@@ -240,30 +241,30 @@ mod tests {
 
     /// Killed by: a gain upside down, rays left out, the cost of guided rays left out, a decision from too few samples.
     #[test]
-    fn the_guide_wakes_where_it_pays() {
+    fn the_guide_is_enabled_where_it_pays() {
         let fresh = Watch::default();
-        assert!(!fresh.awake() && fresh.gain().is_none());
-        assert!(decided(fresh, true, &trial(1000, 0.5, 10)).awake());
-        assert!(!decided(fresh, true, &trial(1000, 1.0, 10)).awake(), "no better, and dearer");
-        assert!(!decided(fresh, true, &trial(1000, 0.5, 20)).awake(), "half the error for twice the rays");
-        assert!(!decided(fresh, true, &trial(100, 0.1, 10)).awake(), "too few samples");
-        assert!(!decided(fresh, false, &trial(1000, 0.1, 10)).awake(), "nothing to guide by");
+        assert!(!fresh.enabled() && fresh.gain().is_none());
+        assert!(decided(fresh, true, &trial(1000, 0.5, 10)).enabled());
+        assert!(!decided(fresh, true, &trial(1000, 1.0, 10)).enabled(), "no better, and dearer");
+        assert!(!decided(fresh, true, &trial(1000, 0.5, 20)).enabled(), "half the error for twice the rays");
+        assert!(!decided(fresh, true, &trial(100, 0.1, 10)).enabled(), "too few samples");
+        assert!(!decided(fresh, false, &trial(1000, 0.1, 10)).enabled(), "nothing to guide by");
         let gain = decided(fresh, true, &trial(1000, 0.5, 10)).gain().map(|g| g.gain);
         assert!(gain.is_some_and(|g| (g * GUIDED_RAY - 2.0).abs() < 1e-9), "{gain:?}");
     }
 
-    /// Killed by: a guide that stays awake, one that flickers, shares of guided samples that are not those asked for.
+    /// Killed by: a guide that stays enabled, one that flickers, shares of guided samples that are not those asked for.
     #[test]
-    fn it_stays_awake_while_it_pays() {
-        let awake = decided(Watch::default(), true, &trial(1000, 0.5, 10));
-        assert!(decided(awake, true, &trial(10_000, 0.7, 10)).awake());
-        assert!(!decided(awake, true, &trial(100_000, 2.0, 10)).awake());
+    fn it_stays_enabled_while_it_pays() {
+        let enabled = decided(Watch::default(), true, &trial(1000, 0.5, 10));
+        assert!(decided(enabled, true, &trial(10_000, 0.7, 10)).enabled());
+        assert!(!decided(enabled, true, &trial(100_000, 2.0, 10)).enabled());
         let rejected = decided(Watch::default(), true, &trial(100_000, 2.0, 10));
         let open = decided(Watch::default(), true, &Trial::default());
-        for (watch, tried) in [(awake, CONTROL), (rejected, ASLEEP), (open, TRIED)] {
-            let lots = (0..1 << 20).map(|i| watch.lot(7, [i % 1024, i / 1024], 1));
+        for (watch, tried) in [(enabled, CONTROL), (rejected, UNPROMISING), (open, TRIED)] {
+            let all = (0..1 << 20).map(|i| watch.assignment(7, [i % 1024, i / 1024], 1));
             let share = |tried, guided| {
-                let alike = lots.clone().filter(|l| (l.tried, l.guided) == (tried, guided));
+                let alike = all.clone().filter(|l| (l.tried, l.guided) == (tried, guided));
                 alike.count() as f64 / f64::from(1 << 20)
             };
             let tried = f64::from(tried) / 65_536.0;
@@ -274,7 +275,7 @@ mod tests {
                 (without + with - tried).abs() < 0.008 && (without - with).abs() < 0.002,
                 "{without}, {with}, {tried}"
             );
-            assert_eq!((off, on) == (0.0, 1.0 - without - with), watch.awake());
+            assert_eq!((off, on) == (0.0, 1.0 - without - with), watch.enabled());
         }
     }
 
