@@ -17,7 +17,6 @@
 //! set is compiled into the program. The set is one table at the end of this file; a row is a profile. What a row must
 //! be worth is in docs/EFFECTS.md.
 
-use crate::learn::guiding::COMPILED;
 use crate::scene::Effects;
 use core::marker::PhantomData;
 
@@ -68,7 +67,7 @@ impl<P: Profile> Profile for Guided<P> {
     const NAME: &'static str = P::NAME;
     const SOBOL: bool = P::SOBOL;
     const LIGHT_TREES: bool = P::LIGHT_TREES;
-    const GUIDING: bool = COMPILED;
+    const GUIDING: bool = cfg!(feature = "guiding");
 }
 
 /// Code to run with a profile that is chosen at run time; see [`AnyProfile::dispatch`].
