@@ -37,6 +37,16 @@ pub(crate) struct Finishing {
     pub shard: u32,
 }
 
+impl Finishing {
+    /// `n` more are done of the shard, or all of it.
+    pub(crate) fn advance(&mut self, n: usize, done: bool) {
+        self.at += n as u64;
+        if done {
+            (self.shard, self.at) = (self.shard + 1, 0);
+        }
+    }
+}
+
 /// Scalars of a session.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]

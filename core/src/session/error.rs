@@ -29,8 +29,8 @@ pub enum SessionError {
         /// The sampler.
         missing: Sampler,
     },
-    /// Path guiding is on, and the profile, or the crate without its feature `guiding`, was compiled without it
-    /// ([`Profile::GUIDING`](crate::profile::Profile::GUIDING)).
+    /// Path guiding is on, and the profile was compiled without it ([`Guided`](crate::unstable::profile::Guided) has it,
+    /// in builds with the crate's feature `guiding`).
     Guiding,
     /// The shards are not all of the plan's, in order.
     Shards {
@@ -73,7 +73,9 @@ impl fmt::Display for SessionError {
             Self::Sampler { missing } => {
                 write!(f, "the settings call for the sampler {}, which the kernel profile lacks", missing.name())
             }
-            Self::Guiding => f.write_str("path guiding is on, but the kernel profile was compiled without it"),
+            Self::Guiding => f.write_str(
+                "path guiding is on, but the kernels were compiled without it: profile Guided, feature guiding",
+            ),
             Self::Shards { expected } => {
                 write!(f, "the end of an iteration needs every shard in order; shard {expected} is missing")
             }

@@ -333,10 +333,7 @@ impl SessionState<'_> {
         };
         let limit = rays.saturating_mul(ABSORBED_PER_RAY) as usize;
         let (n, done) = s.training().map_or((0, true), |t| self.learned.absorb(t, f.at as usize, limit));
-        f.at += n as u64;
-        if done {
-            (f.shard, f.at) = (f.shard + 1, 0);
-        }
+        f.advance(n, done);
         1 + n as u64 / ABSORBED_PER_RAY
     }
 
@@ -360,10 +357,7 @@ impl SessionState<'_> {
         }
         let limit = rays.saturating_mul(REPLAYED_PER_RAY) as usize;
         let (n, done) = s.guide_log().map_or((0, true), |log| self.learned.replay(log, f.at as usize, limit));
-        f.at += n as u64;
-        if done {
-            (f.shard, f.at) = (f.shard + 1, 0);
-        }
+        f.advance(n, done);
         1 + n as u64 / REPLAYED_PER_RAY
     }
 

@@ -38,16 +38,13 @@ impl GuideNote8 {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 struct GuideNote {
-    /// Leaf, and below it in 8 bits the share.
+    /// Leaf, and below it in 8 bits the share; [`NO_LEAF`] if there is nothing to learn from.
     leaf: u32,
     point: u32,
     pdf: f32,
     /// What next event estimation gave the sample, mean of rgb.
     nee: f32,
 }
-
-/// No direction to learn from.
-const NOTHING: u32 = NO_LEAF;
 
 /// Notes on the samples in the ledger, by slot, and the log that they go to; nothing if guiding is off.
 #[derive(Debug)]
@@ -92,6 +89,7 @@ impl<'m> GuideNotes<'m> {
         self.log.as_ref().filter(|_| COMPILED)
     }
 
+    /// The same, to be changed.
     #[inline(always)]
     pub(crate) fn log_mut(&mut self) -> Option<&mut GuideLog<'m>> {
         self.log.as_mut().filter(|_| COMPILED)
@@ -109,7 +107,7 @@ impl<'m> GuideNotes<'m> {
     #[inline(always)]
     pub(crate) fn open(&mut self, slot: u32) {
         if let Some(note) = self.notes.get_mut(slot as usize) {
-            note.leaf = NOTHING;
+            note.leaf = NO_LEAF;
         }
     }
 
@@ -125,7 +123,7 @@ impl<'m> GuideNotes<'m> {
     #[inline]
     pub(crate) fn close(&mut self, slot: u32, radiance: [f32; 3]) {
         let Some((n, log)) = self.notes.get(slot as usize).zip(self.log.as_mut()) else { return };
-        if n.leaf == NOTHING {
+        if n.leaf == NO_LEAF {
             return;
         }
         let bounce = (mean(radiance) - n.nee).max(0.0);

@@ -31,8 +31,8 @@ const CONTROL: u32 = 65_536 / 16;
 const BLOCK_BITS: u32 = 3;
 /// Guided samples before which nothing is decided.
 const FEWEST: f64 = 256.0;
-/// Samples per pixel and iteration that are learned from while the guide is enabled, at least: of 8, 16, 32 and 64 the
-/// one with the best efficiency in the scenes of benches/results/guiding.md.
+/// Samples per pixel and iteration that are learned from while the guide is enabled, at least: a choice. 8
+/// learn too little where light is hard to find, 64 cost more.
 pub(crate) const LEARNED_ENABLED: u32 = 16;
 /// The same in blocks in which halves are compared.
 const LEARNED_TRIED: u32 = 64;

@@ -181,6 +181,13 @@ impl Layout {
     }
 }
 
+/// A chart on the sheet, with this much room for labels at the left and for marks at the right.
+pub(super) fn framed<'a, 'b>(sheet: &'a Sheet<'b>, left: u32, right: u32) -> ChartBuilder<'a, 'a, SVGBackend<'b>> {
+    let mut chart = ChartBuilder::on(sheet);
+    chart.margin(Layout::px(8)).margin_right(right).x_label_area_size(Layout::px(40)).y_label_area_size(left);
+    chart
+}
+
 /// Size of texts, pixels.
 const TEXT: u32 = 13;
 

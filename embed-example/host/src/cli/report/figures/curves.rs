@@ -62,11 +62,7 @@ pub(super) fn errors(name: &str, scene: &SceneRecord) -> Result<Option<Figure>, 
                    in which they lie. A grey line falls as 1 / time. Biased variants are dashed; a dotted line in \
                    their colour is the floor that they do not pass, however long they run, where it is told from noise.";
     let draw = |sheet: &Sheet<'_>, layout: Layout| -> Result<(), Fault> {
-        let mut chart = ChartBuilder::on(sheet)
-            .margin(Layout::px(8))
-            .margin_right(Layout::px(16))
-            .x_label_area_size(Layout::px(40))
-            .y_label_area_size(Layout::px(56))
+        let mut chart = framed(sheet, Layout::px(56), Layout::px(16))
             .build_cartesian_2d((t0..t1).log_scale(), (e0..e1).log_scale())?;
         chart
             .configure_mesh()
@@ -131,12 +127,8 @@ pub(super) fn times(name: &str, scene: &SceneRecord) -> Result<Option<Figure>, F
                    Hollow: the renders ended before, and the error goes on as 1 / time.";
     let draw = |sheet: &Sheet<'_>, layout: Layout| -> Result<(), Fault> {
         let names = Layout::px(if layout.narrow { 118 } else { 180 });
-        let mut chart = ChartBuilder::on(sheet)
-            .margin(Layout::px(8))
-            .margin_right(Layout::px(18))
-            .x_label_area_size(Layout::px(40))
-            .y_label_area_size(names)
-            .build_cartesian_2d((t0..t1).log_scale(), -0.6..f64::from(n) - 0.4)?;
+        let mut chart =
+            framed(sheet, names, Layout::px(18)).build_cartesian_2d((t0..t1).log_scale(), -0.6..f64::from(n) - 0.4)?;
         chart
             .configure_mesh()
             .disable_y_axis()
@@ -203,12 +195,8 @@ pub(super) fn depths(name: &str, scene: &SceneRecord) -> Result<Option<Figure>, 
     let caption = "Share of the light, of the time and of the rays that paths of at most so many segments have, \
                    classic, the same samples.";
     let draw = |sheet: &Sheet<'_>, _: Layout| -> Result<(), Fault> {
-        let mut chart = ChartBuilder::on(sheet)
-            .margin(Layout::px(8))
-            .margin_right(Layout::px(16))
-            .x_label_area_size(Layout::px(40))
-            .y_label_area_size(Layout::px(56))
-            .build_cartesian_2d((1.0..end).log_scale(), 0.0..top)?;
+        let mut chart =
+            framed(sheet, Layout::px(56), Layout::px(16)).build_cartesian_2d((1.0..end).log_scale(), 0.0..top)?;
         chart
             .configure_mesh()
             .x_desc("segments of a path, at most")

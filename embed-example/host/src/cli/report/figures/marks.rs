@@ -25,12 +25,8 @@ pub(super) fn knobs(name: &str, scene: &SceneRecord) -> Result<Option<Figure>, F
                    has a star.";
     let draw = |sheet: &Sheet<'_>, layout: Layout| -> Result<(), Fault> {
         let names = Layout::px(if layout.narrow { 132 } else { 190 });
-        let mut chart = ChartBuilder::on(sheet)
-            .margin(Layout::px(8))
-            .margin_right(Layout::px(18))
+        let mut chart = framed(sheet, names, Layout::px(18))
             .margin_top(Layout::px(26))
-            .x_label_area_size(Layout::px(40))
-            .y_label_area_size(names)
             .build_cartesian_2d((1.0 / widest..widest).log_scale(), -0.6..f64::from(n) - 0.4)?;
         chart
             .configure_mesh()
@@ -114,11 +110,7 @@ pub(super) fn twins(group: &str, components: &[Component]) -> Result<Option<Figu
     let n = rows.len() as u32;
     let draw = |sheet: &Sheet<'_>, layout: Layout| -> Result<(), Fault> {
         let names = names_of(layout);
-        let mut chart = ChartBuilder::on(sheet)
-            .margin(Layout::px(8))
-            .margin_right(Layout::px(26))
-            .x_label_area_size(Layout::px(40))
-            .y_label_area_size(names)
+        let mut chart = framed(sheet, names, Layout::px(26))
             .build_cartesian_2d((low..high).log_scale(), -0.6..f64::from(n) - 0.4)?;
         chart
             .configure_mesh()
@@ -182,12 +174,7 @@ pub(super) fn components(group: &str, components: &[Component]) -> Result<Option
     let n = rows.len() as u32;
     let draw = |sheet: &Sheet<'_>, layout: Layout| -> Result<(), Fault> {
         let names = names_of(layout);
-        let mut chart = ChartBuilder::on(sheet)
-            .margin(Layout::px(8))
-            .margin_right(Layout::px(26))
-            .x_label_area_size(Layout::px(40))
-            .y_label_area_size(names)
-            .build_cartesian_2d(0.0..top, -0.6..f64::from(n) - 0.4)?;
+        let mut chart = framed(sheet, names, Layout::px(26)).build_cartesian_2d(0.0..top, -0.6..f64::from(n) - 0.4)?;
         chart
             .configure_mesh()
             .disable_y_axis()

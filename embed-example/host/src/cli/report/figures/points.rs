@@ -69,12 +69,8 @@ fn kernels(
     let draw = |sheet: &Sheet<'_>, layout: Layout| -> Result<(), Fault> {
         let columns = if layout.narrow { 1 } else { 3 };
         let keys = Layout::px(20 * (variants.len() as u32).div_ceil(columns) + 8);
-        let mut chart = ChartBuilder::on(sheet)
-            .margin(Layout::px(8))
-            .margin_right(Layout::px(40))
+        let mut chart = framed(sheet, Layout::px(56), Layout::px(40))
             .margin_top(keys + Layout::px(6))
-            .x_label_area_size(Layout::px(40))
-            .y_label_area_size(Layout::px(56))
             .build_cartesian_2d((fastest / 1.4..slowest * 1.6).log_scale(), (least..top * 1.6).log_scale())?;
         chart
             .configure_mesh()
@@ -139,12 +135,7 @@ pub(super) fn reliability(ledger: &Ledger) -> Result<Option<Figure>, Fault> {
     let caption = "Share of renders whose interval of the stated level holds the expected error, over all scenes and \
                    numbers of samples: on the grey line a level is what it says, below it intervals are too narrow.";
     let draw = |sheet: &Sheet<'_>, _: Layout| -> Result<(), Fault> {
-        let mut chart = ChartBuilder::on(sheet)
-            .margin(Layout::px(8))
-            .margin_right(Layout::px(16))
-            .x_label_area_size(Layout::px(40))
-            .y_label_area_size(Layout::px(56))
-            .build_cartesian_2d(0.0..100.0, 0.0..100.0)?;
+        let mut chart = framed(sheet, Layout::px(56), Layout::px(16)).build_cartesian_2d(0.0..100.0, 0.0..100.0)?;
         chart
             .configure_mesh()
             .x_desc("stated level, %")
@@ -197,11 +188,7 @@ pub(super) fn forecasts(ledger: &Ledger) -> Result<Option<Figure>, Fault> {
                    those of the strategies.";
     let draw = |sheet: &Sheet<'_>, layout: Layout| -> Result<(), Fault> {
         let start = (least / 1.1).min(0.3);
-        let mut chart = ChartBuilder::on(sheet)
-            .margin(Layout::px(8))
-            .margin_right(Layout::px(16))
-            .x_label_area_size(Layout::px(40))
-            .y_label_area_size(Layout::px(56))
+        let mut chart = framed(sheet, Layout::px(56), Layout::px(16))
             .build_cartesian_2d((start..1.0).log_scale(), (1.0 / widest..widest).log_scale())?;
         chart
             .configure_mesh()
