@@ -8,10 +8,10 @@ use croupier::{Settings, Strategy};
 pub const MODIFIERS: &[(&str, &str)] = &[
     ("adaptive", "adaptive sampling"),
     ("shadow", "roulette of light samples and their rays"),
-    ("guided", "path guiding that learns from 64 samples per pixel and iteration"),
+    ("guided", "path guiding"),
     ("constant", "the cached mean as control variate of roulette"),
     ("small", "one shard, and less than 256 KiB for all that is learned"),
-    ("sobol", "Sobol' points in place of hashed numbers"),
+    ("hashed", "hashed numbers in place of Sobol' points"),
     ("truth", "strategies that learn are told the true pixels instead of denoised ones"),
     ("idle", "learned factors are all 1: what learning costs where paths are as with `classic:200`"),
 ];
@@ -55,8 +55,8 @@ impl Variant {
         s.strategy = self.strategy;
         s.adaptive |= self.has("adaptive");
         s.shadow_roulette |= self.has("shadow");
-        if self.has("sobol") {
-            s.sampler = Sampler::Sobol;
+        if self.has("hashed") {
+            s.sampler = Sampler::Hashed;
         }
         if self.has("guided") {
             (s.learning.guiding, s.learning.samples) = (Guiding::On, 64);

@@ -28,7 +28,7 @@ pub trait Profile {
     const NAME: &'static str;
     /// Do the kernels contain [`Sampler::Sobol`](crate::unstable::Sampler::Sobol)? Settings that ask for it are refused where
     /// they do not.
-    const SOBOL: bool = false;
+    const SOBOL: bool = true;
     /// Do the kernels choose lights by the tree of scenes that have one? Without it they choose by power: pictures are as
     /// right, with more noise under many lights.
     const LIGHT_TREES: bool = true;
@@ -36,14 +36,15 @@ pub trait Profile {
     const GUIDING: bool = false;
 }
 
-/// The profile `P` with [`Sampler::Sobol`](crate::unstable::Sampler::Sobol).
+/// The profile `P` without [`Sampler::Sobol`](crate::unstable::Sampler::Sobol), the default: smaller code, for settings
+/// with [`Sampler::Hashed`](crate::unstable::Sampler::Hashed).
 #[derive(Clone, Copy, Debug)]
-pub struct WithSobol<P>(PhantomData<P>);
+pub struct WithoutSobol<P>(PhantomData<P>);
 
-impl<P: Profile> Profile for WithSobol<P> {
+impl<P: Profile> Profile for WithoutSobol<P> {
     const EFFECTS: Effects = P::EFFECTS;
     const NAME: &'static str = P::NAME;
-    const SOBOL: bool = true;
+    const SOBOL: bool = false;
     const LIGHT_TREES: bool = P::LIGHT_TREES;
     const GUIDING: bool = P::GUIDING;
 }
@@ -89,7 +90,6 @@ macro_rules! profiles {
             impl Profile for $profile {
                 const EFFECTS: Effects = $effects;
                 const NAME: &'static str = $name;
-                const SOBOL: bool = true;
             }
         )*
 

@@ -26,14 +26,22 @@ use croupier_simd::{F32x8, Mask8, U32x8};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sampler {
     /// Independent numbers, hashes of pixel, sample and depth.
-    #[default]
     Hashed,
     /// Owen-scrambled Sobol' points for the samples of a pixel in an iteration, which are spread more evenly. Pays
-    /// where iterations have 4 samples and more; iterations of one sample are as with hashed numbers.
+    /// where iterations have 4 samples and more; those of one sample take hashed numbers.
+    #[default]
     Sobol,
 }
 
 names!(Sampler: Hashed = "hashed", Sobol = "sobol");
+
+impl Sampler {
+    /// What iterations of so many samples per pixel take: one sample has nothing to be spread among.
+    #[inline(always)]
+    pub(crate) fn of_iteration(self, samples: u32) -> Self {
+        if samples > 1 { self } else { Self::Hashed }
+    }
+}
 
 /// Vertices of a path whose samples may belong to sequences: beyond, numbers are hashed.
 const SOBOL_DEPTH: u32 = 4;

@@ -338,7 +338,8 @@ macro_rules! worlds {
 
             #[inline(always)]
             fn sampler(&self) -> Sampler {
-                if P::SOBOL { self.state.plan.settings().sampler } else { Sampler::Hashed }
+                let sampler = if P::SOBOL { self.state.plan.settings().sampler } else { Sampler::Hashed };
+                sampler.of_iteration(self.state.iteration.samples)
             }
 
             #[inline(always)]

@@ -27,9 +27,9 @@ settings! {
             SettingRange::Size { max_pixels: 1 << 31 }, scene;
         seed: u64 = 0 =>
             "seed", "Seed of all random numbers: another one gives another, independent image";
-        /// With the Sobol' points the picture depends on how its samples are divided into iterations.
-        sampler: Sampler = Sampler::Hashed =>
-            "sampler", "Random numbers: independent hashes, or Owen-scrambled Sobol points, spread more evenly over a pixel";
+        /// With Sobol' points the picture depends on how its samples are divided into iterations.
+        sampler: Sampler = Sampler::Sobol =>
+            "sampler", "Random numbers: Owen-scrambled Sobol points, spread evenly over a pixel, or independent hashes";
         /// The picture depends on it (rounding and the comb), never on threads.
         shards: u32 = 1 =>
             "shards", "Units of parallel work; the image depends on their number",

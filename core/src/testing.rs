@@ -235,7 +235,8 @@ fn block(size: usize) -> (Vec<u8>, usize) {
 /// `change` may change the settings, which are those of the scene with auxiliary values.
 pub(crate) fn world<R>(change: impl FnOnce(&mut Settings), f: impl FnOnce(&TestWorld<'_>, &mut Shard<'_>) -> R) -> R {
     scene(|scene| {
-        let mut settings = Settings { aovs: true.into(), ..Settings::for_scene(scene) };
+        let sampler = Sampler::Hashed; // each lane has its own numbers, whatever its pixel and sample
+        let mut settings = Settings { aovs: true.into(), sampler, ..Settings::for_scene(scene) };
         change(&mut settings);
         let plan = Plan::new(&settings).expect("a plan");
         let needs = settings.needs(plan.job.cache);

@@ -240,6 +240,7 @@ fn pictures_have_the_same_bits_on_every_target() {
         let mut learns = Settings { strategy: settings(&scene, "ears").strategy, ..base };
         learns.learning.subdivide_count = 1000.0;
         add("ears", learns, &[1, 2, 4]);
+        add("ears+sobol", Settings { sampler: Sampler::Sobol, ..learns }, &[1, 2, 4]);
         let all = Settings { adaptive: true, shadow_roulette: true, control_variate: ControlVariate::Cached, ..learns };
         add("ears+adaptive+shadow+constant", all, &[1, 2, 4]);
     }

@@ -1,7 +1,7 @@
 //! The Sobol' sampler gives the pictures of hashed numbers, with less noise; its iterations are independent.
 
 use croupier::unstable::Sampler;
-use croupier::unstable::profile::{Custom, Profile, WithSobol};
+use croupier::unstable::profile::{Custom, Profile, WithoutSobol};
 use croupier::unstable::{Effects, learn::ControlVariate};
 use croupier::{Plan, Scene, Session, SessionError, Settings};
 use croupier_tests::media_scene::misty;
@@ -121,10 +121,10 @@ fn profiles_without_it_refuse_it() {
     let bytes = blob(&cornell([4, 4]));
     let refused = SessionError::Sampler { missing: Sampler::Sobol };
     assert!(refused.to_string().contains("sobol"));
-    assert_eq!(session::<Own>(&bytes, Sampler::Sobol), Err(refused));
+    assert_eq!(session::<WithoutSobol<Own>>(&bytes, Sampler::Sobol), Err(refused));
     for found in [
-        session::<Own>(&bytes, Sampler::Hashed),
-        session::<WithSobol<Own>>(&bytes, Sampler::Sobol),
+        session::<WithoutSobol<Own>>(&bytes, Sampler::Hashed),
+        session::<Own>(&bytes, Sampler::Sobol),
         session::<croupier::unstable::profile::Full>(&bytes, Sampler::Sobol),
     ] {
         assert_eq!(found, Ok(()));

@@ -24,7 +24,7 @@ pub enum SessionError {
         missing: Effects,
     },
     /// The settings call for a sampler that the profile was compiled without
-    /// ([`WithSobol`](crate::unstable::profile::WithSobol)).
+    /// ([`WithoutSobol`](crate::unstable::profile::WithoutSobol)).
     Sampler {
         /// The sampler.
         missing: Sampler,

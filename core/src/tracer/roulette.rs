@@ -143,9 +143,11 @@ pub(crate) fn roulette<W: World>(
     let v = &mut a.vertex;
     v.beta = beta;
     v.nee_probability = nee_probability;
-    v.albedo_product *= a.albedo.mean();
     if by_albedo && !matches!(strategy, Strategy::Albedo(_)) {
-        v.albedo_product /= s;
+        // the largest channel, as rules that play by throughput take it
+        v.albedo_product *= a.albedo.max_component() / s;
+    } else {
+        v.albedo_product *= a.albedo.mean();
     }
     v.samples = U32x8::from_fn(|i| pack_samples(n[i], with_nee[i]));
     v.bin = key.map_or(U32x8::splat(NO_BIN), |k| k.bin);

@@ -4,6 +4,7 @@
 mod common;
 
 use common::{croupier, text};
+use croupier::unstable::Sampler;
 use croupier::{Scene, Settings};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
@@ -56,13 +57,13 @@ fn parts(folder: &Path, scene: Scene<'_>, settings: Settings, spp: u32, of: u32)
     (1..=of).map(one).collect()
 }
 
-/// Without roulette, samples do not depend on combs: parts have those of one render, each once. Killed by: ranges with
+/// Without roulette, hashed samples do not depend on combs: parts have those of one render, each once. Killed by: ranges with
 /// gaps or samples in common, sums, spreads, rays or auxiliary values that are lost or added with other weights.
 #[test]
 fn parts_have_the_samples_of_one_render() {
     let (bytes, folder) = (cornell(), tempfile::tempdir().unwrap());
     let scene = Scene::from_bytes(&bytes).unwrap();
-    let settings = settings(&scene, "none");
+    let settings = Settings { sampler: Sampler::Hashed, ..settings(&scene, "none") };
     let whole = render(scene, settings, Target::Spp(17), None);
     for of in [1, 5, 17] {
         let merged = merge(&parts(folder.path(), scene, settings, 17, of)).unwrap().rendered;
@@ -109,7 +110,9 @@ fn the_mean_of_learning_parts_is_unbiased() {
     let pairs = merged.pixels.iter().zip(&reference.pixels).flat_map(|(a, b)| a.mean().into_iter().zip(b.mean()));
     let found = pairs.map(square).sum::<f64>() / (3 * merged.pixels.len()) as f64;
     let stated = merged.error.rel_mse + reference.error.rel_mse;
-    assert!((0.5..2.0).contains(&(found / stated)), "relMSE {found}, stated {stated}");
+    // few pixels cause most of it, which the interval knows
+    let (low, high) = (merged.error.low, merged.error.high + reference.error.high);
+    assert!((low..high).contains(&found), "relMSE {found}, stated {stated}: {low} to {high}");
 }
 
 /// Killed by: iterations that two parts have in common, which would have the same combs; a share that depends on

@@ -35,7 +35,7 @@ const KNOBS: [[&str; 2]; 22] = [
     ["shadow-roulette", "false"],
     ["control-variate", "cached"],
     ["adaptive", "true"],
-    ["sampler", "sobol"],
+    ["sampler", "hashed"],
     ["guiding", "on"],
     ["pixel-estimator", "blocks"],
     ["objective", "absolute"],
