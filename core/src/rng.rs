@@ -21,7 +21,8 @@ pub struct Key8 {
 
 /// Hash of four words to four random words per lane: `pcg4d` of Jarzynski and Olano, "Hash Functions for GPU
 /// Rendering", JCGT 9(3) 2020.
-#[inline(always)]
+#[cfg_attr(target_family = "wasm", inline(never))] // for size
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
 fn pcg4d(v: [U32x8; 4]) -> [U32x8; 4] {
     let [mut x, mut y, mut z, mut w] = v.map(|a| a * U32x8::splat(1_664_525) + U32x8::splat(1_013_904_223));
     x = x + y * w;

@@ -88,14 +88,14 @@ impl Key8 {
 
     /// Position in the pixel (two numbers) and on the lens (two).
     #[inline(always)]
-    pub(crate) fn pixel_and_lens(self, sampler: Sampler, lens: bool) -> [F32x8; 4] {
-        self.block(sampler, PIXEL_BLOCK, lens).map(U32x8::to_unit)
+    pub(crate) fn pixel_and_lens(self, sampler: Sampler) -> [F32x8; 4] {
+        self.block(sampler, PIXEL_BLOCK).map(U32x8::to_unit)
     }
 
     /// Time of a camera sample; drawn only in scenes where something moves.
     #[inline(always)]
     pub(crate) fn time(self, sampler: Sampler) -> F32x8 {
-        let [u, ..] = self.block(sampler, TIME_BLOCK, false);
+        let [u, ..] = self.block(sampler, TIME_BLOCK);
         u.to_unit()
     }
 
@@ -121,7 +121,7 @@ impl Key8 {
     /// Direction (two numbers) and lobe of the scattered ray of a sample.
     #[inline(always)]
     pub(crate) fn scattering(self, sampler: Sampler) -> [F32x8; 3] {
-        let [u, v, lobe, _] = self.block(sampler, SCATTER_BLOCK, true).map(U32x8::to_unit);
+        let [u, v, lobe, _] = self.block(sampler, SCATTER_BLOCK).map(U32x8::to_unit);
         [u, v, lobe]
     }
 
@@ -132,7 +132,7 @@ impl Key8 {
             Sampler::Hashed => self.words(LIGHT_BLOCK),
             Sampler::Sobol => {
                 // the best pair of coordinates for the place
-                let [u, v, light, w] = self.sobol(LIGHT_BLOCK, true);
+                let [u, v, light, w] = self.sobol(LIGHT_BLOCK);
                 [light, u, v, w]
             }
         }
@@ -147,8 +147,8 @@ impl Key8 {
 
     /// Words of a sample's guided direction; see [`crate::learn::guiding::Guide::sample`].
     #[inline(always)]
-    pub(crate) fn guided_direction(self) -> [U32x8; 4] {
-        self.words(GUIDE_BLOCK)
+    pub(crate) fn guided_direction(self, sampler: Sampler) -> [U32x8; 4] {
+        self.block(sampler, GUIDE_BLOCK)
     }
 
     /// Does light pass the surface at which the vertex of this key would be?
@@ -214,18 +214,18 @@ impl Key8 {
         [self.lo, self.hi, rest].map(U32x8::to_unit)
     }
 
-    /// Numbers of a block; 2 and 3 are meaningless unless `all` of them are asked for.
+    /// Numbers of a block.
     #[inline(always)]
-    fn block(self, sampler: Sampler, block: u32, all: bool) -> [U32x8; 4] {
+    fn block(self, sampler: Sampler, block: u32) -> [U32x8; 4] {
         match sampler {
             Sampler::Hashed => self.words(block),
-            Sampler::Sobol => self.sobol(block, all),
+            Sampler::Sobol => self.sobol(block),
         }
     }
 
     /// [`Self::block`] of keys of which some belong to sequences.
     #[inline(never)]
-    fn sobol(self, block: u32, all: bool) -> [U32x8; 4] {
+    fn sobol(self, block: u32) -> [U32x8; 4] {
         let hashed = self.is_hashed();
         // longer iterations go on with another sequence
         let sequence = self.hi >> sobol::INDEX_BITS | U32x8::splat(HASHED);
@@ -234,7 +234,7 @@ impl Key8 {
             return seeds;
         }
         let index = self.hi & U32x8::splat((1 << sobol::INDEX_BITS) - 1);
-        let [a, b, c, d] = sobol::points(index, seeds, all);
+        let [a, b, c, d] = sobol::points(index, seeds);
         let [e, f, g, h] = seeds;
         [(e, a), (f, b), (g, c), (h, d)].map(|(seed, x)| U32x8::select(hashed, seed, x))
     }

@@ -124,9 +124,17 @@ impl U32x8 {
     }
 
     /// Bit `i` of each lane as bit `31 - i`.
-    #[cfg_attr(feature = "compact", inline(never))]
-    #[cfg_attr(not(feature = "compact"), inline(always))]
+    #[cfg_attr(any(feature = "compact", target_family = "wasm"), inline(never))]
+    #[cfg_attr(not(any(feature = "compact", target_family = "wasm")), inline(always))]
     pub fn reverse_bits(self) -> Self {
+        if cfg!(target_family = "wasm") {
+            // an instruction, or a shuffle, elsewhere
+            let masks = [0x5555_5555, 0x3333_3333, 0x0f0f_0f0f, 0x00ff_00ff, 0x0000_ffff];
+            return masks.into_iter().enumerate().fold(self, |x, (i, mask)| {
+                let (by, mask) = (1 << i, Self::splat(mask));
+                (x >> by & mask) | (x & mask) << by
+            });
+        }
         Self::new(self.to_array().map(u32::reverse_bits))
     }
 

@@ -47,13 +47,14 @@ const fn directions() -> [[u32; 2]; INDEX_BITS as usize] {
     out
 }
 
-/// An Owen scramble of numbers whose first digit is bit 0.
-#[inline(always)]
+/// An Owen scramble of numbers whose first digit is bit 0; its result has it in bit 31.
+#[cfg_attr(target_family = "wasm", inline(never))] // for size
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
 fn scramble(x: U32x8, seed: U32x8) -> U32x8 {
     let x = x ^ (x * U32x8::splat(0x3d20_adea));
     let x = (x + seed) * (seed >> 16 | U32x8::splat(1));
     let x = x ^ (x * U32x8::splat(0x0552_6c56));
-    x ^ (x * U32x8::splat(0x53a2_2864))
+    (x ^ (x * U32x8::splat(0x53a2_2864))).reverse_bits()
 }
 
 /// The same without a constant term: 0 stays, and so does the lowest bit that is set.
@@ -87,15 +88,14 @@ fn others(index: U32x8) -> [U32x8; 2] {
     out
 }
 
-/// Coordinates of the points of eight indices; `all` says whether 2 and 3 are wanted. `seeds` are random.
+/// Coordinates of the points of eight indices. `seeds` are random.
 #[inline(always)]
-pub(super) fn points(index: U32x8, seeds: [U32x8; 4], all: bool) -> [U32x8; 4] {
+pub(super) fn points(index: U32x8, seeds: [U32x8; 4]) -> [U32x8; 4] {
     let [a, b, c, d] = seeds;
     // of five numbers, any four are independent
     let shuffled = shuffle(index.reverse_bits(), a ^ b ^ c ^ d).reverse_bits();
-    let [z, w] = if all { others(shuffled) } else { [shuffled; 2] };
-    let scrambled = [scramble(shuffled, a), scramble(pascal(shuffled), b), scramble(z, c), scramble(w, d)];
-    scrambled.map(U32x8::reverse_bits)
+    let [z, w] = others(shuffled);
+    [scramble(shuffled, a), scramble(pascal(shuffled), b), scramble(z, c), scramble(w, d)]
 }
 
 #[cfg(test)]
@@ -126,7 +126,7 @@ mod tests {
     /// Points 0 to `n` of the sequence of seed `seed`, four words each.
     fn block(n: u32, seed: u32) -> Vec<[u32; 4]> {
         let of = |first: u32| {
-            let p = points(U32x8::from_fn(|i| first + i as u32), seeds(seed), true);
+            let p = points(U32x8::from_fn(|i| first + i as u32), seeds(seed));
             (0..8).map(move |i| p.map(|x| x.lane(i)))
         };
         (0..n).step_by(8).flat_map(of).take(n as usize).collect()

@@ -158,10 +158,7 @@ pub(super) fn camera_samples<W: World>(
         lanes += 1;
     }
     let key = Key8::camera_sample(sampler, seed, U32x8::new(pixel), U32x8::new(sample));
-    let lens = W::EFFECTS.contains(Effects::LENS) && world.scene().effects.contains(Effects::LENS)
-        || W::Extension::RAYS
-        || W::Extension::POINTS;
-    let [u0, u1, u2, u3] = key.pixel_and_lens(sampler, lens);
+    let [u0, u1, u2, u3] = key.pixel_and_lens(sampler);
     let px = F32x8::from_fn(|i| x[i] as f32) + u0;
     let py = F32x8::from_fn(|i| y[i] as f32) + u1;
     let asked = Mask8::first(lanes);

@@ -69,7 +69,7 @@ pub(super) fn draw<'a, 'm: 'a, W: World>(
     if recorded.none() && !at.fraction.gt(F32x8::ZERO).any() {
         return None;
     }
-    let words = samples.key.guided_direction();
+    let words = samples.key.guided_direction(world.sampler());
     let chosen = lanes & at.chosen(&words);
     let (mut dir, mut pdf) = (v.ns, F32x8::ZERO);
     if chosen.any() {

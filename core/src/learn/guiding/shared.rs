@@ -237,7 +237,7 @@ impl<'m> Guide<'m> {
         let [a, b, ..] = words.map(U32x8::to_array);
         let mut cells = [Cell { at: [0; 2], per_row: 1, density: 1.0 }; 8];
         for i in lanes.lanes() {
-            let bits: [u16; LEVELS] = [a[i] as u16, (a[i] >> 16) as u16, b[i] as u16];
+            let bits: [u16; LEVELS] = [(a[i] >> 16) as u16, a[i] as u16, b[i] as u16];
             cells[i] = node::sample(self.nodes, at.root[i], bits);
         }
         let edge = F32x8::ONE / F32x8::from_fn(|i| cells[i].per_row as f32);

@@ -455,7 +455,7 @@ fn keys_choose_evenly() {
         for k in 0..4096u32 {
             let camera = Key8::camera(1, U32x8::from_fn(|i| 8 * k + i as u32), U32x8::splat(0));
             let key = camera.next_vertex(Sampler::Hashed, U32x8::splat(1));
-            let (d, _) = guide.sample(&at, key.guided_direction(), Mask8::all_lanes());
+            let (d, _) = guide.sample(&at, key.guided_direction(Sampler::Hashed), Mask8::all_lanes());
             quantised(d).to_array().iter().for_each(|p| counts[(p >> 14 & 3 | p >> 30 << 2) as usize] += 1);
         }
         // 2048 each, standard deviation 44
