@@ -54,9 +54,11 @@
 //!     let plan = Plan::new(&Settings::for_scene(&scene))?;
 //!     let mut session = Session::new(scene, &plan, shared)?;
 //!     let mut shard = Shard::new(&plan, 0, block)?;
-//!     session.begin_iteration(16);
-//!     while shard.step(&session, Budget { rays: 10_000 }) == StepResult::More {}
-//!     session.end_iteration([&shard])?;
+//!     for _ in 0..2 {
+//!         session.begin_iteration(8);
+//!         while shard.step(&session, Budget { rays: 10_000 }) == StepResult::More {}
+//!         session.end_iteration([&shard])?;
+//!     }
 //!     Ok(session.film().error_estimate().rel_mse)
 //! }
 //! assert!(render(b"no scene", &mut [], &mut []).is_err());

@@ -16,9 +16,12 @@ mod example {
         let (shared, rest) = memory.split_at_mut_checked(plan.session().size).ok_or("too little memory")?;
         let mut session = Session::new(scene, &plan, shared)?;
         let mut shard = Shard::new(&plan, 0, rest)?; // one per unit of parallel work: `Settings::shards`
-        session.begin_iteration(16); // samples per pixel
-        while shard.step(&session, Budget { rays: 10_000 }) == StepResult::More {} // or draw a frame in between
-        session.end_iteration([&shard])?;
+        for _ in 0..2 {
+            // how much iterations differ tells the error
+            session.begin_iteration(8); // samples per pixel
+            while shard.step(&session, Budget { rays: 10_000 }) == StepResult::More {} // or draw a frame in between
+            session.end_iteration([&shard])?;
+        }
         Ok(session.film().error_estimate().rel_mse) // `film().pixels()`: mean and standard error of each pixel
     }
 }
