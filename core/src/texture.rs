@@ -8,7 +8,7 @@ use crate::scene::blob::{
     NONE, TEXTURE_CLAMP, TEXTURE_LINEAR, TEXTURE_MIRROR, TEXTURE_REPEAT, TEXTURE_WRAP, TEXTURE_WRAP_U, TEXTURE_WRAP_V,
     Texture, TextureRecord,
 };
-use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
+use croupier_simd::{F32x8, I32x8, Mask8, U32x8, Vec3x8};
 
 /// Linear value of each sRGB code (IEC 61966-2-1), every entry the nearest `f32` to the exact value.
 pub const SRGB_TO_LINEAR: [f32; 256] = {
@@ -49,13 +49,12 @@ fn position(coordinate: F32x8, size: F32x8) -> (F32x8, F32x8) {
 /// that of an integer. The error of the position is half an ulp of the coordinate times the size, in texels. Textures
 /// may have up to 2^24 columns and rows.
 pub fn lookup(scene: &Scene<'_>, texture: U32x8, uv: [F32x8; 2], active: Mask8) -> Vec3x8 {
-    let rgb = |bytes: [u8; 4]| [bytes[0], bytes[1], bytes[2]].map(|b| SRGB_TO_LINEAR[b as usize]);
-    interpolated::<false>(scene, texture, uv, active, rgb)
+    interpolated::<false>(scene, texture, uv, active, decoded)
 }
 
 /// Alpha of `texture` at `uv`, 0 to 1, under the conditions of [`lookup`]. Not encoded: alpha is linear.
 pub fn alpha(scene: &Scene<'_>, texture: U32x8, uv: [F32x8; 2], active: Mask8) -> F32x8 {
-    interpolated::<false>(scene, texture, uv, active, |bytes| [f32::from(bytes[3]) / 255.0, 0.0, 0.0]).x
+    interpolated::<false>(scene, texture, uv, active, opacity).x
 }
 
 /// Linear Rec. 709 colours, or numbers code / 255 of linear textures, of a referenced texture per lane at the surface
@@ -71,13 +70,11 @@ pub fn referenced(scene: &Scene<'_>, of: &[Option<&TextureRecord>; 8], uv: [F32x
     let linear = Mask8::from_bits(present.lanes().fold(0, |bits, l| bits | u32::from(is_linear(l)) << l));
     let mut out = Vec3x8::ONE;
     if linear.any() {
-        let rgb = |bytes: [u8; 4]| [bytes[0], bytes[1], bytes[2]].map(|b| f32::from(b) / 255.0);
-        out = Vec3x8::select(linear, interpolated::<true>(scene, index, uv, linear, rgb), out);
+        out = Vec3x8::select(linear, interpolated::<true>(scene, index, uv, linear, numbers), out);
     }
     let encoded = present.and_not(linear);
     if encoded.any() {
-        let rgb = |bytes: [u8; 4]| [bytes[0], bytes[1], bytes[2]].map(|b| SRGB_TO_LINEAR[b as usize]);
-        out = Vec3x8::select(encoded, interpolated::<true>(scene, index, uv, encoded, rgb), out);
+        out = Vec3x8::select(encoded, interpolated::<true>(scene, index, uv, encoded, decoded), out);
     }
     (present, out)
 }
@@ -85,8 +82,27 @@ pub fn referenced(scene: &Scene<'_>, of: &[Option<&TextureRecord>; 8], uv: [F32x
 /// Alpha of a referenced texture per lane, as [`referenced`].
 pub fn referenced_alpha(scene: &Scene<'_>, of: &[Option<&TextureRecord>; 8], uv: [F32x8; 2]) -> F32x8 {
     let (index, present) = indices(of);
-    let alpha = |bytes: [u8; 4]| [f32::from(bytes[3]) / 255.0, 0.0, 0.0];
-    present.select(interpolated::<true>(scene, index, transformed(of, uv), present, alpha).x, F32x8::ONE)
+    present.select(interpolated::<true>(scene, index, transformed(of, uv), present, opacity).x, F32x8::ONE)
+}
+
+/// Linear colours of sRGB texels.
+#[inline(always)]
+fn decoded(texels: &[[u8; 4]; 8]) -> Vec3x8 {
+    let channel = |c: usize| F32x8::from_fn(|i| SRGB_TO_LINEAR[texels[i][c] as usize]);
+    Vec3x8::new(channel(0), channel(1), channel(2))
+}
+
+/// Numbers code / 255 of linear texels.
+#[inline(always)]
+fn numbers(texels: &[[u8; 4]; 8]) -> Vec3x8 {
+    let channel = |c: usize| F32x8::from_fn(|i| f32::from(texels[i][c])) / 255.0;
+    Vec3x8::new(channel(0), channel(1), channel(2))
+}
+
+/// Alpha of texels, in `x`.
+#[inline(always)]
+fn opacity(texels: &[[u8; 4]; 8]) -> Vec3x8 {
+    Vec3x8::new(F32x8::from_fn(|i| f32::from(texels[i][3])) / 255.0, F32x8::ZERO, F32x8::ZERO)
 }
 
 /// Indices of the textures, and the lanes that have one.
@@ -106,66 +122,69 @@ fn transformed(of: &[Option<&TextureRecord>; 8], uv: [F32x8; 2]) -> [F32x8; 2] {
 /// Whole parts of coordinates along one axis of clamped and mirrored textures, brought into [0, 1) so that only the
 /// neighbours of the edges are left to [`neighbour`].
 #[inline(always)]
-fn wrapped(c: F32x8, mode: &[u32; 8]) -> F32x8 {
+fn wrapped(c: F32x8, mode: U32x8) -> F32x8 {
     let c = c.is_finite().zero_unless(c);
     let half = (c * 0.5 - (c * 0.5).floor()) * 2.0;
     let mirrored = half.gt(F32x8::ONE).select(2.0 - half, half);
     let below_one = 1.0 - f32::EPSILON / 2.0;
-    let of = |k: u32| U32x8::new(*mode).eq(U32x8::splat(k));
+    let of = |k: u32| mode.eq(U32x8::splat(k));
     let c = of(TEXTURE_CLAMP).select(c.clamp(0.0, below_one), c);
     of(TEXTURE_MIRROR).select(mirrored.clamp(0.0, below_one), c)
 }
 
-/// Bilinear mean of what `value` makes of the texels around `uv`.
+/// Bilinear mean of what `value` makes of the texels around `uv`: of the bytes of eight texels.
 #[inline(always)]
 fn interpolated<const ANY_WRAP: bool>(
     scene: &Scene<'_>,
     texture: U32x8,
     uv: [F32x8; 2],
     active: Mask8,
-    value: impl Fn([u8; 4]) -> [f32; 3],
+    value: impl Fn(&[[u8; 4]; 8]) -> Vec3x8,
 ) -> Vec3x8 {
-    const NOTHING: Texture = Texture { first: 0, width: 1, height: 1, flags: 0 };
-    let index = texture.to_array();
-    let mut record = [NOTHING; 8];
-    for i in active.lanes() {
-        record[i] = scene.textures.get(index[i] as usize).copied().unwrap_or(NOTHING);
-    }
-    let mode = |shift: u32| record.each_ref().map(|t| t.flags >> shift & TEXTURE_WRAP);
-    let modes = if ANY_WRAP { [mode(TEXTURE_WRAP_U), mode(TEXTURE_WRAP_V)] } else { [[0; 8]; 2] };
-    let uv = if ANY_WRAP { [wrapped(uv[0], &modes[0]), wrapped(uv[1], &modes[1])] } else { uv };
-    let (x, fx) = position(uv[0], F32x8::from_fn(|i| record[i].width as f32));
-    let (y, fy) = position(uv[1], F32x8::from_fn(|i| record[i].height as f32));
-    let (x, y) = (x.to_i32().to_array(), y.to_i32().to_array());
-    let mut corner = [[[0.0f32; 3]; 8]; 4];
-    for i in active.lanes() {
-        let t = &record[i];
-        // a constant where all textures repeat
-        let mode = |axis: usize| if ANY_WRAP { modes[axis][i] } else { TEXTURE_REPEAT };
-        let columns = [x[i], x[i].wrapping_add(1)].map(|x| neighbour(x, t.width, mode(0)));
-        let rows = [y[i], y[i].wrapping_add(1)].map(|y| neighbour(y, t.height, mode(1)));
-        for (c, out) in corner.iter_mut().enumerate() {
-            // The file's row 0 is the top.
-            let row = t.height.saturating_sub(1).saturating_sub(rows[c >> 1]) as usize;
-            let texel = t.first as usize + row * t.width as usize + columns[c & 1] as usize;
-            out[i] = value(scene.texels.get(texel).copied().unwrap_or(0).to_le_bytes());
-        }
-    }
-    let [a, b, c, d] = corner.map(|k| Vec3x8::from_fn(|i| k[i]));
-    let lower = a * (1.0 - fx) + b * fx;
-    let upper = c * (1.0 - fx) + d * fx;
+    const NOTHING: &Texture = &Texture { first: 0, width: 1, height: 1, flags: 0 };
+    let index = U32x8::select(active, texture, U32x8::splat(NONE)).to_array();
+    let record = index.map(|i| scene.textures.get(i as usize).unwrap_or(NOTHING));
+    let [first, width, height] = [
+        U32x8::from_fn(|i| record[i].first),
+        U32x8::from_fn(|i| record[i].width),
+        U32x8::from_fn(|i| record[i].height),
+    ];
+    let mode = |shift: u32| U32x8::from_fn(|i| record[i].flags >> shift & TEXTURE_WRAP);
+    // a constant where all textures repeat
+    let repeat = U32x8::splat(TEXTURE_REPEAT);
+    let modes = if ANY_WRAP { [mode(TEXTURE_WRAP_U), mode(TEXTURE_WRAP_V)] } else { [repeat; 2] };
+    let uv = if ANY_WRAP { [wrapped(uv[0], modes[0]), wrapped(uv[1], modes[1])] } else { uv };
+    let (x, fx) = position(uv[0], width.to_i32().to_f32());
+    let (y, fy) = position(uv[1], height.to_i32().to_f32());
+    let next = |i: I32x8| [i, i + I32x8::splat(1)];
+    let columns = next(x.to_i32()).map(|i| neighbour::<ANY_WRAP>(i, width, modes[0]));
+    // the file's row 0 is the top
+    let last = height - U32x8::splat(1);
+    let rows = next(y.to_i32()).map(|i| last - neighbour::<ANY_WRAP>(i, height, modes[1]));
+    let corner = |column: U32x8, row: U32x8| {
+        let texel = (first + row * width + column).to_array();
+        value(&texel.map(|i| scene.texels.get(i as usize).copied().unwrap_or(0).to_le_bytes()))
+    };
+    let lower = corner(columns[0], rows[0]) * (1.0 - fx) + corner(columns[1], rows[0]) * fx;
+    let upper = corner(columns[0], rows[1]) * (1.0 - fx) + corner(columns[1], rows[1]) * fx;
     (lower * (1.0 - fy) + upper * fy).zero_unless(active)
 }
 
 /// `i` in -1..=size by the wrapping `mode`: a mirrored or clamped texture has its edge again beyond the edge.
 #[inline(always)]
-fn neighbour(i: i32, size: u32, mode: u32) -> u32 {
-    if mode == TEXTURE_REPEAT { wrap(i, size) } else { (i.max(0) as u32).min(size.saturating_sub(1)) }
+fn neighbour<const ANY_WRAP: bool>(i: I32x8, size: U32x8, mode: U32x8) -> U32x8 {
+    let (negative, bits) = (i.lt(I32x8::splat(0)), i.to_u32());
+    let repeated = wrap(U32x8::select(negative, bits + size, bits), size);
+    if !ANY_WRAP {
+        return repeated;
+    }
+    let (last, i) = (size - U32x8::splat(1), U32x8::select(negative, U32x8::splat(0), bits));
+    U32x8::select(mode.eq(U32x8::splat(TEXTURE_REPEAT)), repeated, U32x8::select(i.lt(size), i, last))
 }
 
-/// `i` in -1..=size brought into 0..size; anything else to some texel.
+/// `i` in 0..=size brought into 0..size; anything else to some texel.
 #[inline(always)]
-fn wrap(i: i32, size: u32) -> u32 {
-    let i = if i < 0 { size.wrapping_add_signed(i) } else { i as u32 };
-    if i < size { i } else { i.wrapping_sub(size).min(size.saturating_sub(1)) }
+fn wrap(i: U32x8, size: U32x8) -> U32x8 {
+    let (last, beyond) = (size - U32x8::splat(1), i - size);
+    U32x8::select(i.lt(size), i, U32x8::select(beyond.lt(size), beyond, last))
 }

@@ -20,3 +20,4 @@ pub use placement::{Map8, Placed8, instances_of_light, place, place_normals};
 pub use ray::{Hit8, NO_INSTANCE, Ray8};
 pub use spawn::{OFFSET_BOUND, SurfacePoint8, offset, shadow_ray, surface_point, triangle_normal};
 pub use surface_hit::SurfaceHit8;
+pub(crate) use surface_hit::corners;

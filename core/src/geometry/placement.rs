@@ -11,7 +11,7 @@
 use super::OFFSET_BOUND;
 use super::spawn::edge_normal;
 use crate::scene::Scene;
-use crate::scene::blob::{INSTANCE_HIDDEN, INSTANCE_MIRRORED, INSTANCE_MOVING, Instance, Light, NONE};
+use crate::scene::blob::{INSTANCE_HIDDEN, INSTANCE_MIRRORED, INSTANCE_MOVING, Instance, NONE};
 use crate::scene::inverse;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
@@ -170,9 +170,9 @@ pub fn place_normals(scene: &Scene<'_>, instances: [U32x8; 2], time: F32x8, norm
     normals
 }
 
-/// Instances around the triangle of light `index`, whose record is `light`; [`NONE`] where there is none.
-pub fn instances_of_light(scene: &Scene<'_>, index: u32, light: &Light) -> [u32; 2] {
-    let Some(outer) = light.instance.checked_sub(1) else { return [NONE; 2] };
+/// Instances around the triangle of light `index` with this [`Light::instance`]; [`NONE`] where there is none.
+pub fn instances_of_light(scene: &Scene<'_>, index: u32, instance: u32) -> [u32; 2] {
+    let Some(outer) = instance.checked_sub(1) else { return [NONE; 2] };
     let inner = || {
         let i = scene.instances.get(outer as usize)?;
         let object = scene.objects.get(i.object as usize)?;

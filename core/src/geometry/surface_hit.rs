@@ -3,8 +3,8 @@
 
 use super::spawn::point_with_normal;
 use super::{Hit8, SurfacePoint8, place, surface_point, triangle_normal};
-use crate::scene::Scene;
 use crate::scene::blob::{NONE, TRIANGLE_SMOOTH, Triangle, Vertex};
+use crate::scene::{Scene, gather};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Eight hit triangles. Lanes outside `mask`, and those whose triangle does not exist, hold the zero triangle of
@@ -38,26 +38,22 @@ pub struct SurfaceHit8 {
 }
 
 /// What lanes without a triangle read.
-const NO_TRIANGLE: Triangle = Triangle { vertex: [NONE; 3], material: 0, light: NONE, flags: 0 };
+const NO_TRIANGLE: &Triangle = &Triangle { vertex: [NONE; 3], material: 0, light: NONE, flags: 0 };
 
 impl SurfaceHit8 {
     /// Reads the triangles of the hit lanes.
     #[inline(always)]
     pub fn gather(scene: &Scene<'_>, hit: &Hit8) -> Self {
         let mask = hit.hit;
-        let index = U32x8::select(mask, hit.triangle, U32x8::splat(NONE)).to_array();
-        let triangle = index.map(|i| scene.triangles.get(i as usize).unwrap_or(&NO_TRIANGLE));
+        let triangle = triangles(scene, U32x8::select(mask, hit.triangle, U32x8::splat(NONE)));
         let vertices = triangle.map(|t| t.vertex);
-        let corner = |k: usize| {
-            Vec3x8::from_fn(|i| scene.vertices.get(vertices[i][k] as usize).map_or([0.0; 3], |vertex| vertex.p))
-        };
         let smooth = (0..8).fold(0, |bits, i| bits | u32::from(triangle[i].flags & TRIANGLE_SMOOTH != 0) << i);
         Self {
             mask,
             t: hit.t,
             u: mask.zero_unless(hit.u),
             v: mask.zero_unless(hit.v),
-            corners: [corner(0), corner(1), corner(2)],
+            corners: positions(scene, &vertices),
             vertices,
             material: triangle.map(|t| t.material),
             light: triangle.map(|t| t.light),
@@ -120,11 +116,52 @@ impl SurfaceHit8 {
         [F32x8::ONE - self.u - self.v, self.u, self.v]
     }
 
-    /// What `of` says of vertex `k` (0 to 2) of each lane; 0 where there is no such vertex.
+    /// Normals of vertex `k` (0 to 2) of each lane; 0 where there is no such vertex.
     #[inline(always)]
-    pub fn of_vertex(&self, scene: &Scene<'_>, k: usize, of: impl Fn(&Vertex) -> [f32; 3]) -> Vec3x8 {
-        Vec3x8::from_fn(|i| scene.vertices.get(self.vertices[i][k] as usize).map_or([0.0; 3], &of))
+    pub fn normals(&self, scene: &Scene<'_>, k: usize) -> Vec3x8 {
+        let [_, _, _, x, y, z, ..] = of_vertices(scene, &self.vertices, k);
+        Vec3x8::new(x, y, z)
     }
+
+    /// Texture coordinates of vertex `k` (0 to 2) of each lane; 0 where there is no such vertex.
+    #[inline(always)]
+    pub fn coordinates(&self, scene: &Scene<'_>, k: usize) -> [F32x8; 2] {
+        let [.., u, v] = of_vertices(scene, &self.vertices, k);
+        [u, v]
+    }
+}
+
+/// The triangles of these indices.
+#[inline(always)]
+fn triangles<'s>(scene: &Scene<'s>, index: U32x8) -> [&'s Triangle; 8] {
+    index.to_array().map(|i| scene.triangles.get(i as usize).unwrap_or(NO_TRIANGLE))
+}
+
+/// Positions of the corners of eight triangles as the blob has them, by index; 0 for those that do not exist.
+#[inline(always)]
+pub(crate) fn corners(scene: &Scene<'_>, triangle: U32x8) -> [Vec3x8; 3] {
+    positions(scene, &triangles(scene, triangle).map(|t| t.vertex))
+}
+
+/// Positions of the vertices of eight triangles.
+#[inline(always)]
+fn positions(scene: &Scene<'_>, vertices: &[[u32; 3]; 8]) -> [Vec3x8; 3] {
+    let corner = |k: usize| {
+        let [x, y, z, ..] = of_vertices(scene, vertices, k);
+        Vec3x8::new(x, y, z)
+    };
+    [corner(0), corner(1), corner(2)]
+}
+
+/// What lanes without a vertex read.
+const NO_VERTEX: &Vertex = &Vertex { p: [0.0; 3], n: [0.0; 3], uv: [0.0; 2] };
+
+/// Position, normal and texture coordinates of vertex `k` of each of these triangles.
+#[inline(always)]
+fn of_vertices(scene: &Scene<'_>, vertices: &[[u32; 3]; 8], k: usize) -> [F32x8; 8] {
+    let v = |lane: usize| vertices[lane][k];
+    let [row] = gather(scene.vertices, [v(0), v(1), v(2), v(3), v(4), v(5), v(6), v(7)], NO_VERTEX);
+    row
 }
 
 #[cfg(test)]

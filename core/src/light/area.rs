@@ -35,15 +35,8 @@ struct Corners {
 impl Corners {
     /// Lanes outside `mask` and indices out of range give the zero triangle.
     #[inline(always)]
-    fn gather(scene: &Scene<'_>, triangle: [u32; 8], mask: Mask8) -> Self {
-        let mut p = [[[0.0f32; 3]; 8]; 3];
-        for i in mask.lanes() {
-            let Some(t) = scene.triangles.get(triangle[i] as usize) else { continue };
-            for (corner, vertex) in p.iter_mut().zip(t.vertex) {
-                corner[i] = scene.vertices.get(vertex as usize).map_or([0.0; 3], |v| v.p);
-            }
-        }
-        let [a, b, c] = p.map(|k| Vec3x8::from_fn(|i| k[i]));
+    fn gather(scene: &Scene<'_>, triangle: U32x8, mask: Mask8) -> Self {
+        let [a, b, c] = geometry::corners(scene, U32x8::select(mask, triangle, U32x8::splat(NONE)));
         Self { a, b, c }
     }
 
@@ -54,10 +47,10 @@ impl Corners {
     }
 
     /// Brings those that are in instances to the world.
-    fn place(&mut self, scene: &Scene<'_>, light: &Chosen<'_>, mask: Mask8) -> Placed8 {
+    fn place(&mut self, scene: &Scene<'_>, light: &Chosen, mask: Mask8) -> Placed8 {
         let index = light.index.to_array();
-        let path: [[u32; 2]; 8] =
-            core::array::from_fn(|i| geometry::instances_of_light(scene, index[i], light.record[i]));
+        let instance = light.instance.to_array();
+        let path: [[u32; 2]; 8] = core::array::from_fn(|i| geometry::instances_of_light(scene, index[i], instance[i]));
         let instance = [0, 1].map(|level| U32x8::from_fn(|i| path[i][level]));
         let placed = geometry::place(scene, instance, light.time, [self.a, self.b, self.c], mask);
         [self.a, self.b, self.c] = placed.corners;
@@ -90,13 +83,12 @@ impl LightModel for Area {
     const DELTA: bool = false;
 
     #[inline(always)]
-    fn sample(scene: &Scene<'_>, light: &Chosen<'_>, p: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8 {
+    fn sample(scene: &Scene<'_>, light: &Chosen, p: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8 {
         if light.placed {
             return sample_placed(scene, light, p, words, mask);
         }
-        let corners = Corners::gather(scene, light.record.map(|l| l.triangle), mask);
-        let area = F32x8::from_fn(|i| light.record[i].area);
-        on_triangle(&corners, &corners.normal(), &area, light, &p, &words)
+        let corners = Corners::gather(scene, light.triangle, mask);
+        on_triangle(&corners, &corners.normal(), &light.area, light, &p, &words)
     }
 
     /// Power of a Lambertian emitter.
@@ -122,11 +114,12 @@ fn factor(scene: &Scene<'_>, vertices: [[u32; 3]; 8], material: [u32; 8], [b, c]
 }
 
 /// Emission textures at the points that [`Area`] samples with `words`.
-pub(super) fn sampled_factor(scene: &Scene<'_>, light: &Chosen<'_>, words: [U32x8; 2], mask: Mask8) -> Vec3x8 {
-    let of = |i: usize| scene.triangles.get(light.record[i].triangle as usize);
+pub(super) fn sampled_factor(scene: &Scene<'_>, light: &Chosen, words: [U32x8; 2], mask: Mask8) -> Vec3x8 {
+    let triangle = light.triangle.to_array();
+    let of = |i: usize| scene.triangles.get(triangle[i] as usize);
     let mut vertices: [[u32; 3]; 8] = core::array::from_fn(|i| of(i).map_or([NONE; 3], |t| t.vertex));
     if !scene.instances.is_empty() {
-        let mut corners = Corners::gather(scene, light.record.map(|l| l.triangle), mask);
+        let mut corners = Corners::gather(scene, light.triangle, mask);
         // `Area` samples b and c in exchanged places there
         for i in corners.place(scene, light, mask).mirrored.lanes() {
             vertices[i].swap(1, 2);
@@ -154,7 +147,7 @@ fn on_triangle(
     corners: &Corners,
     &normal: &Vec3x8,
     &area: &F32x8,
-    light: &Chosen<'_>,
+    light: &Chosen,
     &p: &Vec3x8,
     words: &[U32x8; 3],
 ) -> LightSample8 {
@@ -181,12 +174,11 @@ fn on_triangle(
 /// [`LightModel::sample`] in scenes with instances. What they add to the error at the end of a shadow ray is that of a ray
 /// that leaves the triangle, and that of the distance along which the ray is brought into the instance.
 #[inline(never)]
-fn sample_placed(scene: &Scene<'_>, light: &Chosen<'_>, p: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8 {
-    let mut corners = Corners::gather(scene, light.record.map(|l| l.triangle), mask);
-    let area = F32x8::from_fn(|i| light.record[i].area);
+fn sample_placed(scene: &Scene<'_>, light: &Chosen, p: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8 {
+    let mut corners = Corners::gather(scene, light.triangle, mask);
     let placed = corners.place(scene, light, mask);
     let in_instance = placed.condition.gt(F32x8::ZERO);
-    let (normal, area) = in_instances(in_instance, placed.normal, corners.normal(), area);
+    let (normal, area) = in_instances(in_instance, placed.normal, corners.normal(), light.area);
     let sample = on_triangle(&corners, &normal, &area, light, &p, &words);
     let normal = sample.normal.abs();
     let far = placed.condition * (sample.point - p).abs().max_component() * OFFSET_BOUND;
@@ -241,7 +233,7 @@ pub(super) fn in_world(scene: &Scene<'_>, index: u32, light: &Light) -> ([[f32; 
         let p = t.and_then(|t| scene.vertices.get(t.vertex[k] as usize)).map_or([0.0; 3], |v| v.p);
         Vec3x8::splat(p[0], p[1], p[2])
     };
-    let instance = geometry::instances_of_light(scene, index, light).map(U32x8::splat);
+    let instance = geometry::instances_of_light(scene, index, light.instance).map(U32x8::splat);
     let corners = [corner(0), corner(1), corner(2)];
     let [a, b, c] = corners;
     let placed = geometry::place(scene, instance, F32x8::ZERO, corners, Mask8::all_lanes());

@@ -18,7 +18,7 @@ impl LightModel for Directional {
     const DELTA: bool = true;
 
     #[inline(always)]
-    fn sample(_: &Scene<'_>, light: &Chosen<'_>, _: Vec3x8, _: [U32x8; 3], _: Mask8) -> LightSample8 {
+    fn sample(_: &Scene<'_>, light: &Chosen, _: Vec3x8, _: [U32x8; 3], _: Mask8) -> LightSample8 {
         LightSample8 {
             wi: light.vector,
             radiance: light.emission,

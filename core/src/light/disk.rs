@@ -80,7 +80,7 @@ impl Disk {
 impl Shape for Disk {
     #[inline(always)]
     fn read(of: &impl ShapeFields) -> Self {
-        let [x, y, z, radius] = of.params(|[x, y, z, radius, ..]| [*x, *y, *z, *radius]);
+        let [x, y, z, radius, ..] = of.params();
         // unit to 1e-3 only in the blob
         let normal = Vec3x8::new(x, y, z).normalize();
         Self { middle: of.vector(), normal, radius, two_sided: of.two_sided() }
@@ -130,7 +130,7 @@ impl LightModel for Disk {
     const DELTA: bool = false;
 
     #[inline(always)]
-    fn sample(_: &Scene<'_>, light: &Chosen<'_>, p: Vec3x8, words: [U32x8; 3], _: Mask8) -> LightSample8 {
+    fn sample(_: &Scene<'_>, light: &Chosen, p: Vec3x8, words: [U32x8; 3], _: Mask8) -> LightSample8 {
         shape_sample::<Self>(light, p, words)
     }
 

@@ -22,7 +22,7 @@
 use super::power::{pick, probability};
 use super::{Chosen, LightModel, LightSample8, LightSelector, SceneExtent, usable};
 use crate::scene::Scene;
-use crate::scene::blob::{Alias, Environment, EnvironmentKind, Light, NONE};
+use crate::scene::blob::{Environment, EnvironmentKind, Light, NONE};
 use core::f32::consts::{FRAC_1_PI, TAU};
 use core::f64::consts::PI;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -69,7 +69,8 @@ fn map_position(e: &Environment, d: Vec3x8) -> MapPosition {
     let c = d.x.atan2(-d.z) * (1.0 / TAU) * e.width as f32 - 0.5;
     let left = c.floor();
     let width = e.width.clamp(1, i32::MAX as u32) as i32;
-    let wrap = |i: i32| i.checked_rem_euclid(width).unwrap_or(0) as u32;
+    // columns of the left half are negative, by half a map and a texel at most
+    let wrap = |i: i32| if i < 0 { i.saturating_add(width).max(0) as u32 } else { i.min(width - 1) as u32 };
     MapPosition {
         column: left.to_i32().to_array().map(wrap),
         row: row.to_i32().to_array().map(|j| j as u32),
@@ -81,17 +82,35 @@ fn map_position(e: &Environment, d: Vec3x8) -> MapPosition {
 /// The four texels around each cell of `mask`: upper left, upper right, lower left, lower right. Zeros elsewhere.
 #[inline(always)]
 fn corners(scene: &Scene<'_>, e: &Environment, at: &MapPosition, mask: Mask8) -> [Vec3x8; 4] {
-    let mut out = [[[0.0f32; 3]; 8]; 4];
-    for i in mask.lanes() {
-        let left = at.column[i] as usize;
-        let right = if left + 1 < e.width as usize { left + 1 } else { 0 };
-        let upper = at.row[i] as usize * e.width as usize;
-        let lower = upper + e.width as usize;
-        for (k, texel) in out.iter_mut().zip([upper + left, upper + right, lower + left, lower + right]) {
-            k[i] = scene.env_texels.get(texel).copied().unwrap_or([0.0; 3]);
+    let width = e.width as usize;
+    let numbers: &[f32] = bytemuck::cast_slice(scene.env_texels);
+    // both texels of a row, and two numbers behind them that are not read
+    let pair = |row: usize, left: usize| {
+        let first = 3 * (row * width + left);
+        match numbers.get(first..).and_then(|n| n.first_chunk::<8>()) {
+            Some(n) if left + 1 < width => *n,
+            _ => seam(scene, row * width, left, width),
         }
+    };
+    let (mut upper, mut lower) = ([F32x8::ZERO; 8], [F32x8::ZERO; 8]);
+    for i in mask.lanes() {
+        let (row, left) = (at.row[i] as usize, at.column[i] as usize);
+        (upper[i], lower[i]) = (F32x8::new(pair(row, left)), F32x8::new(pair(row + 1, left)));
     }
-    out.map(|k| Vec3x8::from_fn(|i| k[i]))
+    let [a, b, c, d, e, f, ..] = F32x8::transpose(upper);
+    let [g, h, i, j, k, l, ..] = F32x8::transpose(lower);
+    [Vec3x8::new(a, b, c), Vec3x8::new(d, e, f), Vec3x8::new(g, h, i), Vec3x8::new(j, k, l)]
+}
+
+/// The texel in column `left` of the row that begins at `start` and the next one, where that is the first of its row, or
+/// the map ends behind it.
+#[cold]
+#[inline(never)]
+fn seam(scene: &Scene<'_>, start: usize, left: usize, width: usize) -> [f32; 8] {
+    let right = if left + 1 < width { left + 1 } else { 0 };
+    let texel = |column: usize| scene.env_texels.get(start + column).copied().unwrap_or([0.0; 3]);
+    let ([a, b, c], [d, e, f]) = (texel(left), texel(right));
+    [a, b, c, d, e, f, 0.0, 0.0]
 }
 
 #[inline(always)]
@@ -174,21 +193,16 @@ fn sample_linear(u: F32x8, a: F32x8, b: F32x8) -> F32x8 {
     x.min(F32x8::ONE)
 }
 
-/// The alias table of the rows, or of the cells of one row.
-#[inline(always)]
-fn table<'s>(scene: &Scene<'s>, e: &Environment, row: Option<u32>) -> &'s [Alias] {
-    let (rows, width) = (e.height.max(2) as usize - 1, e.width as usize);
-    let (start, length) = row.map_or((0, rows), |j| (rows + j as usize * width, width));
-    scene.env_alias.get(start..).and_then(|t| t.get(..length)).unwrap_or(&[])
-}
-
 /// Solid-angle density of the map's sampler in the lanes of `mask`.
 #[inline(always)]
 fn map_density(scene: &Scene<'_>, e: &Environment, at: &MapPosition, c: [Vec3x8; 4], mask: Mask8) -> F32x8 {
-    let rows = table(scene, e, None);
+    // a table of the rows, and behind it one of the cells of each row
+    let (rows, tables) = (e.height.max(2) - 1, scene.env_alias);
     let mut chosen = [0.0f32; 8];
     for i in mask.lanes() {
-        chosen[i] = probability(rows, at.row[i]) * probability(table(scene, e, Some(at.row[i])), at.column[i]);
+        let cell = rows as usize + at.row[i] as usize * e.width as usize + at.column[i] as usize;
+        let of_cell = tables.get(cell).map_or(0.0, |a| a.probability);
+        chosen[i] = if at.row[i] < rows { probability(tables, at.row[i]) * of_cell } else { 0.0 };
     }
     let band = Band::new(e, at.row);
     let t = band.share_above(at.y);
@@ -207,7 +221,7 @@ impl LightModel for Surroundings {
     const DELTA: bool = false;
 
     #[inline(always)]
-    fn sample(scene: &Scene<'_>, _: &Chosen<'_>, _: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8 {
+    fn sample(scene: &Scene<'_>, _: &Chosen, _: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8 {
         let Some(e) = scene.environment else { return LightSample8::NONE };
         let (wi, radiance, pdf) = if e.kind == EnvironmentKind::Map as u32 {
             let wi = sample_map(scene, e, words, mask);
@@ -289,13 +303,25 @@ pub fn environment_pdf<S: LightSelector>(
     dir: Vec3x8,
     mask: Mask8,
 ) -> F32x8 {
-    let Some(e) = scene.environment else { return F32x8::ZERO };
-    let density = if e.kind == EnvironmentKind::Map as u32 {
+    environment_met(scene, selector, [p, n], dir, mask).1
+}
+
+/// [`environment_radiance`] and [`environment_pdf`], from `p` with normals `n`: the map is read once.
+#[inline(always)]
+pub fn environment_met<S: LightSelector>(
+    scene: &Scene<'_>,
+    selector: &S,
+    [p, n]: [Vec3x8; 2],
+    dir: Vec3x8,
+    mask: Mask8,
+) -> (Vec3x8, F32x8) {
+    let Some(e) = scene.environment else { return (Vec3x8::ZERO, F32x8::ZERO) };
+    let (mut radiance, mut density) = (splat(e.radiance), F32x8::splat(UNIFORM_SPHERE));
+    if e.kind == EnvironmentKind::Map as u32 {
         let at = map_position(e, to_local(e, dir));
-        map_density(scene, e, &at, corners(scene, e, &at, mask), mask)
-    } else {
-        F32x8::splat(UNIFORM_SPHERE)
-    };
+        let c = corners(scene, e, &at, mask);
+        (radiance, density) = (bilinear(c, at.x, at.y) * radiance, map_density(scene, e, &at, c, mask));
+    }
     let pdf = density * selector.probability(p, n, U32x8::splat(e.light), mask);
-    (mask & usable(pdf)).zero_unless(pdf)
+    (radiance.zero_unless(mask), (mask & usable(pdf)).zero_unless(pdf))
 }

@@ -36,14 +36,14 @@ mod sun;
 mod tree;
 
 pub use area::{area_of, area_pdf, area_radiance, area_texture};
-pub use environment::{environment_pdf, environment_radiance};
+pub use environment::{environment_met, environment_pdf, environment_radiance};
 pub use meet::{ShapeRays8, meet_shapes, nearest_shape};
 pub use mis::power_heuristic;
 pub use power::{PowerSelector, SceneExtent, luminance};
 pub use tree::{LightTree, SURFACE_FLOOR, TreeSelector, build_light_tree, light_importance, light_node_of};
 
 use crate::scene::blob::{Light, LightKind, NONE};
-use crate::scene::{Effects, Scene};
+use crate::scene::{Effects, Scene, gather};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// One light sample per lane, seen from the reference points.
@@ -182,9 +182,16 @@ const IDLE: &Light = &Light {
 };
 
 /// The chosen lights of eight lanes; lanes outside the mask they were gathered with hold [`IDLE`].
-struct Chosen<'s> {
+struct Chosen {
     index: U32x8,
-    record: [&'s Light; 8],
+    /// [`LightKind`]s.
+    kind: U32x8,
+    /// See [`Light::triangle`].
+    triangle: U32x8,
+    area: F32x8,
+    /// See [`Light::instance`].
+    instance: U32x8,
+    params: [F32x8; 6],
     /// Times at which they are seen.
     time: F32x8,
     /// May triangles be in instances?
@@ -193,19 +200,21 @@ struct Chosen<'s> {
     vector: Vec3x8,
 }
 
-impl<'s> Chosen<'s> {
+impl Chosen {
     #[inline(always)]
-    fn gather(scene: &Scene<'s>, light: U32x8, time: F32x8, placed: bool, mask: Mask8) -> Self {
-        let index = light.to_array();
-        let mut record = [IDLE; 8];
-        for i in mask.lanes() {
-            record[i] = scene.lights.get(index[i] as usize).unwrap_or(IDLE);
-        }
+    fn gather(scene: &Scene<'_>, light: U32x8, time: F32x8, placed: bool, mask: Mask8) -> Self {
+        let index = U32x8::select(mask, light, U32x8::splat(NONE));
+        let [[kind, triangle, area, instance, x, y, z, red], [green, blue, params @ ..]] =
+            gather(scene.lights, index.to_array(), IDLE);
         Self {
-            emission: Vec3x8::from_fn(|i| record[i].emission),
-            vector: Vec3x8::from_fn(|i| record[i].vector),
+            kind: kind.to_bits(),
+            triangle: triangle.to_bits(),
+            area,
+            instance: instance.to_bits(),
+            params,
+            emission: Vec3x8::new(red, green, blue),
+            vector: Vec3x8::new(x, y, z),
             index: light,
-            record,
             time,
             placed,
         }
@@ -214,7 +223,7 @@ impl<'s> Chosen<'s> {
     /// Lanes of `mask` whose light is of `kind`.
     #[inline(always)]
     fn of_kind(&self, kind: LightKind, mask: Mask8) -> Mask8 {
-        mask & U32x8::from_fn(|i| self.record[i].kind).eq(U32x8::splat(kind as u32))
+        mask & self.kind.eq(U32x8::splat(kind as u32))
     }
 }
 
@@ -225,7 +234,7 @@ trait LightModel {
 
     /// A direction to the light in the lanes of `mask`, seen from `p`, from three random words; the result's `pdf`
     /// is without the selection probability, other lanes may hold anything.
-    fn sample(scene: &Scene<'_>, light: &Chosen<'_>, p: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8;
+    fn sample(scene: &Scene<'_>, light: &Chosen, p: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8;
 
     /// Emitted power in luminance units: the weight of its selection.
     fn power(light: &Light, scene: &SceneExtent) -> f64;
@@ -239,7 +248,7 @@ macro_rules! models {
         fn sample_chosen(
             profile: Effects,
             scene: &Scene<'_>,
-            light: &Chosen<'_>,
+            light: &Chosen,
             p: Vec3x8,
             words: [U32x8; 3],
             mask: Mask8,

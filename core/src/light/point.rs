@@ -23,7 +23,7 @@ impl LightModel for Point {
     /// Sample with the irradiance I / r^2 on a surface facing the light. Nothing arrives at the point itself: no
     /// direction.
     #[inline(always)]
-    fn sample(_: &Scene<'_>, light: &Chosen<'_>, p: Vec3x8, _: [U32x8; 3], _: Mask8) -> LightSample8 {
+    fn sample(_: &Scene<'_>, light: &Chosen, p: Vec3x8, _: [U32x8; 3], _: Mask8) -> LightSample8 {
         let d = light.vector - p;
         let least = F32x8::splat(MIN_DISTANCE_SQR);
         let distance_sqr = d.length_sqr();

@@ -168,7 +168,7 @@ impl Rectangle {
 impl Shape for Rectangle {
     #[inline(always)]
     fn read(of: &impl ShapeFields) -> Self {
-        let [a, b, c, x, y, z] = of.params(|p| *p);
+        let [a, b, c, x, y, z] = of.params();
         let (u, v) = (Vec3x8::new(a, b, c), Vec3x8::new(x, y, z));
         let (mut u_length, mut v_length) = (u.length(), v.length());
         let (mut u, v) = (u / u_length, v / v_length);
@@ -228,7 +228,7 @@ impl LightModel for Rectangle {
     const DELTA: bool = false;
 
     #[inline(always)]
-    fn sample(_: &Scene<'_>, light: &Chosen<'_>, p: Vec3x8, words: [U32x8; 3], _: Mask8) -> LightSample8 {
+    fn sample(_: &Scene<'_>, light: &Chosen, p: Vec3x8, words: [U32x8; 3], _: Mask8) -> LightSample8 {
         shape_sample::<Self>(light, p, words)
     }
 

@@ -23,8 +23,8 @@ pub(super) struct Sampled8 {
 
 /// Fields of eight lights.
 pub(super) trait ShapeFields {
-    /// Numbers of `params`.
-    fn params<const N: usize>(&self, of: impl Fn(&[f32; 6]) -> [f32; N]) -> [F32x8; N];
+    /// Numbers of [`Light::params`].
+    fn params(&self) -> [F32x8; 6];
     /// Middles.
     fn vector(&self) -> Vec3x8;
     /// Lanes that also emit from the back.
@@ -32,11 +32,10 @@ pub(super) trait ShapeFields {
 }
 
 /// A light of its own per lane.
-impl ShapeFields for Chosen<'_> {
+impl ShapeFields for Chosen {
     #[inline(always)]
-    fn params<const N: usize>(&self, of: impl Fn(&[f32; 6]) -> [f32; N]) -> [F32x8; N] {
-        let lanes = self.record.map(|l| of(&l.params));
-        core::array::from_fn(|k| F32x8::from_fn(|i| lanes[i][k]))
+    fn params(&self) -> [F32x8; 6] {
+        self.params
     }
 
     #[inline(always)]
@@ -46,15 +45,15 @@ impl ShapeFields for Chosen<'_> {
 
     #[inline(always)]
     fn two_sided(&self) -> Mask8 {
-        !(U32x8::from_fn(|i| self.record[i].triangle) & U32x8::splat(SHAPE_TWO_SIDED)).eq(U32x8::splat(0))
+        !(self.triangle & U32x8::splat(SHAPE_TWO_SIDED)).eq(U32x8::splat(0))
     }
 }
 
 /// One light in all lanes.
 impl ShapeFields for Light {
     #[inline(always)]
-    fn params<const N: usize>(&self, of: impl Fn(&[f32; 6]) -> [f32; N]) -> [F32x8; N] {
-        of(&self.params).map(F32x8::splat)
+    fn params(&self) -> [F32x8; 6] {
+        self.params.map(F32x8::splat)
     }
 
     #[inline(always)]
@@ -97,7 +96,7 @@ pub(super) fn area_density(r: F32x8, h: F32x8, area: F32x8) -> F32x8 {
 
 /// Samples of lights of one shape.
 #[inline(always)]
-pub(super) fn shape_sample<S: Shape>(light: &Chosen<'_>, p: Vec3x8, words: [U32x8; 3]) -> LightSample8 {
+pub(super) fn shape_sample<S: Shape>(light: &Chosen, p: Vec3x8, words: [U32x8; 3]) -> LightSample8 {
     let s = S::read(light).sample(p, [words[0], words[1]].map(U32x8::to_unit));
     LightSample8 {
         wi: s.wi,

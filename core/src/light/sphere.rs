@@ -53,7 +53,7 @@ impl Sphere {
 impl Shape for Sphere {
     #[inline(always)]
     fn read(of: &impl ShapeFields) -> Self {
-        let [radius] = of.params(|[radius, ..]| [*radius]);
+        let [radius, ..] = of.params();
         Self { centre: of.vector(), radius, two_sided: of.two_sided() }
     }
 
@@ -114,7 +114,7 @@ impl LightModel for Sphere {
     const DELTA: bool = false;
 
     #[inline(always)]
-    fn sample(_: &Scene<'_>, light: &Chosen<'_>, p: Vec3x8, words: [U32x8; 3], _: Mask8) -> LightSample8 {
+    fn sample(_: &Scene<'_>, light: &Chosen, p: Vec3x8, words: [U32x8; 3], _: Mask8) -> LightSample8 {
         shape_sample::<Self>(light, p, words)
     }
 

@@ -23,14 +23,9 @@ pub(super) struct Spot;
 
 /// `f^2` of the module's formula for light that travels along the unit directions `d`.
 #[inline(always)]
-fn falloff(light: &Chosen<'_>, d: Vec3x8) -> F32x8 {
-    let params = light.record.map(|l| l.params);
-    let axis = Vec3x8::from_fn(|i| {
-        let [x, y, z, ..] = params[i];
-        [x, y, z]
-    });
-    let [outer, inner] = [F32x8::from_fn(|i| params[i][3]), F32x8::from_fn(|i| params[i][4])];
-    let x = (d - axis).length_sqr() * 0.5;
+fn falloff(light: &Chosen, d: Vec3x8) -> F32x8 {
+    let [x, y, z, outer, inner, _] = light.params;
+    let x = (d - Vec3x8::new(x, y, z)).length_sqr() * 0.5;
     // inside of a cone without a soft edge this is infinite
     let f = ((outer - x) / (outer - inner)).min(F32x8::ONE);
     x.lt(outer).zero_unless(f * f)
@@ -41,7 +36,7 @@ impl LightModel for Spot {
 
     /// The sample of a point light, dimmed by the angle; outside the cone it is black, so that no shadow ray is traced.
     #[inline(always)]
-    fn sample(scene: &Scene<'_>, light: &Chosen<'_>, p: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8 {
+    fn sample(scene: &Scene<'_>, light: &Chosen, p: Vec3x8, words: [U32x8; 3], mask: Mask8) -> LightSample8 {
         let all_around = point::Point::sample(scene, light, p, words, mask);
         LightSample8 { radiance: all_around.radiance * falloff(light, -all_around.wi), ..all_around }
     }

@@ -24,8 +24,8 @@ impl LightModel for Sun {
     const DELTA: bool = true;
 
     #[inline(always)]
-    fn sample(_: &Scene<'_>, light: &Chosen<'_>, _: Vec3x8, words: [U32x8; 3], _: Mask8) -> LightSample8 {
-        let width = F32x8::from_fn(|i| light.record[i].params[0]);
+    fn sample(_: &Scene<'_>, light: &Chosen, _: Vec3x8, words: [U32x8; 3], _: Mask8) -> LightSample8 {
+        let [width, ..] = light.params;
         let [x, y] = concentric_disk([words[0], words[1]].map(U32x8::to_unit));
         // A point of the unit disk goes to the cap of the sphere with the same share of the area: 1 - cos t = width r^2.
         let below = (x * x + y * y) * width;

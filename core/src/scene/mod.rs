@@ -2,13 +2,14 @@
 //!
 //! [`blob`] is the layout, `sections` finds the records, `validate` proves what everything downstream relies on
 //! (`tree`, `instances`, `geometry`, `media`, `materials`, `lights`, `environment`, one file each), `view` is what is left:
-//! slices. [`derive`] says what the transforms of an instance determine.
+//! slices, of which `gather` reads the records of eight lanes. [`derive`] says what the transforms of an instance determine.
 //! Caller's data is handled with checked arithmetic and checked access only.
 #![deny(clippy::arithmetic_side_effects, clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 pub mod blob;
 mod effects;
 mod error;
+mod gather;
 mod instances;
 mod records;
 mod sections;
@@ -17,6 +18,7 @@ mod view;
 
 pub use effects::Effects;
 pub use error::{ChildFault, Field, ObjectFault, SceneError, SectionFault, SlotFault};
+pub(crate) use gather::gather;
 pub(crate) use instances::inverse;
 pub use instances::{Derived, InstanceFault, derive};
 pub use records::Records;

@@ -16,12 +16,11 @@ pub(crate) fn environment<W: World>(world: &W, rays: &RayState8, escaped: Mask8)
     if !W::EFFECTS.intersects(any) || scene.environment.is_none() {
         return None;
     }
-    let radiance = light::environment_radiance(scene, rays.ray.d, escaped);
-    let (from, n, d) = (rays.from, rays.normal, rays.ray.d);
-    let pdf = if W::LIGHT_TREES {
-        light::environment_pdf(scene, world.lights(), from, n, d, escaped)
+    let (at, d) = ([rays.from, rays.normal], rays.ray.d);
+    let (radiance, pdf) = if W::LIGHT_TREES {
+        light::environment_met(scene, world.lights(), at, d, escaped)
     } else {
-        light::environment_pdf(scene, &world.lights().without_tree(), from, n, d, escaped)
+        light::environment_met(scene, &world.lights().without_tree(), at, d, escaped)
     };
     Some(weighted(rays, radiance, pdf))
 }

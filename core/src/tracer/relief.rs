@@ -44,7 +44,10 @@ pub(super) fn relief<W: World>(
     let textures = W::EFFECTS.contains(Effects::TEXTURES) && scene.effects.contains(Effects::TEXTURES);
     let normal_maps = W::EFFECTS.contains(Effects::NORMAL_MAPS) && scene.effects.contains(Effects::NORMAL_MAPS);
     let [wa, wb, wc] = hit.weights();
-    let corner = |k: usize| hit.of_vertex(scene, k, |v| [v.uv[0], v.uv[1], 0.0]);
+    let corner = |k: usize| {
+        let [u, v] = hit.coordinates(scene, k);
+        Vec3x8::new(u, v, F32x8::ZERO)
+    };
     let uvs = if textures { [corner(0), corner(1), corner(2)] } else { [Vec3x8::ZERO; 3] };
     let uv = uvs[0] * wa + uvs[1] * wb + uvs[2] * wc;
     let at = own.map_or([uv.x, uv.y], |own| own.coordinates([uv.x, uv.y]));

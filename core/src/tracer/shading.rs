@@ -11,8 +11,8 @@ use crate::bsdf::{self, Bsdf, Inputs8, Lobes, Visitor};
 use crate::extension::Extension;
 use crate::geometry::{self, OwnHits8, SurfaceHit8, SurfacePoint8};
 use crate::learn::cache::NO_BIN;
-use crate::scene::blob::{LAYERED_KINDS, MATERIAL_CUTOUT, MATERIAL_TWO_SIDED, MaterialKind, NONE};
-use crate::scene::{Effects, Scene};
+use crate::scene::blob::{LAYERED_KINDS, MATERIAL_CUTOUT, MATERIAL_TWO_SIDED, Material, MaterialKind, NONE};
+use crate::scene::{Effects, Scene, gather};
 use crate::texture;
 use crate::world::World;
 use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
@@ -81,6 +81,9 @@ pub(crate) fn shade<W: World>(
     }
 }
 
+/// What lanes without a material read.
+const NO_MATERIAL: &Material = &Material::new(MaterialKind::Diffuse);
+
 /// What materials make of eight hits.
 struct Materials8 {
     kind: [u32; 8],
@@ -106,34 +109,25 @@ impl Materials8 {
     ) -> Self {
         let own = if W::Intersector::SURFACES { own } else { None };
         let scene = world.scene();
-        let (mut kind, mut textures) = ([0u32; 8], [NONE; 8]);
-        let (mut two_sided, mut through, mut textured, mut cutout) = (0u32, 0u32, 0u32, 0u32);
-        let mut reflectance = [[0.0f32; 3]; 8];
-        for i in hit.mask.lanes() {
-            let Some(m) = scene.materials.get(hit.material[i] as usize) else { continue };
-            kind[i] = m.kind;
-            reflectance[i] = m.reflectance;
-            textures[i] = m.texture;
-            two_sided |= u32::from(m.flags & MATERIAL_TWO_SIDED != 0) << i;
-            through |= (bsdf::transmissive_kinds() >> m.kind & 1) << i;
-            textured |= u32::from(m.texture != NONE) << i;
-            cutout |= u32::from(m.flags & MATERIAL_CUTOUT != 0) << i;
-        }
-        let mut reflectance = Vec3x8::from_fn(|i| reflectance[i]);
+        // lanes outside the mask have material 0
+        let [[kind, flags, textures, _, red, green, blue, _], _] = gather(scene.materials, hit.material, NO_MATERIAL);
+        let [kind, flags, textures] = [kind, flags, textures].map(F32x8::to_bits);
+        let kind = U32x8::select(hit.mask, kind, U32x8::splat(0)).to_array();
+        let flagged = |bit: u32| hit.mask.and_not((flags & U32x8::splat(bit)).eq(U32x8::splat(0)));
+        let textured = hit.mask.and_not(textures.eq(U32x8::splat(NONE)));
+        let mut reflectance = Vec3x8::new(red, green, blue).zero_unless(hit.mask);
         let mut straight = F32x8::ZERO;
         let mut ns = interpolated_normals::<W>(scene, hit, ng);
         if let Some(own) = own {
             ns = own.normals(ns);
         }
-        if W::EFFECTS.contains(Effects::TEXTURES) && textured != 0 {
+        if W::EFFECTS.contains(Effects::TEXTURES) && textured.any() {
             let at = coordinates(scene, hit, own);
-            let mask = Mask8::from_bits(textured);
-            let texel = texture::lookup(scene, U32x8::new(textures), at, mask);
-            reflectance = Vec3x8::select(mask, texel, reflectance);
-            if W::EFFECTS.contains(Effects::ALPHA) && cutout != 0 {
-                let mask = mask & Mask8::from_bits(cutout);
-                let alpha = texture::alpha(scene, U32x8::new(textures), at, mask);
-                straight = mask.zero_unless(1.0 - alpha);
+            let texel = texture::lookup(scene, textures, at, textured);
+            reflectance = Vec3x8::select(textured, texel, reflectance);
+            let cutout = textured & flagged(MATERIAL_CUTOUT);
+            if W::EFFECTS.contains(Effects::ALPHA) && cutout.any() {
+                straight = cutout.zero_unless(1.0 - texture::alpha(scene, textures, at, cutout));
             }
         }
         if W::Extension::TEXTURES {
@@ -151,8 +145,8 @@ impl Materials8 {
         }
         let cos = wo.dot(ns);
         let behind = cos.lt(F32x8::ZERO);
-        let transmissive = Mask8::from_bits(through);
-        let turn = behind & Mask8::from_bits(two_sided).and_not(transmissive);
+        let transmissive = bsdf::lanes_of(bsdf::transmissive_kinds(), &kind);
+        let turn = behind & flagged(MATERIAL_TWO_SIDED).and_not(transmissive);
         let ns = Vec3x8::select(turn, -ns, ns);
         let scatters = (cos.gt(F32x8::ZERO) | turn | (transmissive & behind)) & hit.mask;
         if W::EFFECTS.intersects(Effects::STRAIGHT) && may_pass::<W>(scene) {
@@ -178,7 +172,7 @@ pub(super) fn interpolated_normals<W: World>(scene: &Scene<'_>, hit: &SurfaceHit
         return ng;
     }
     let [wa, wb, wc] = hit.weights();
-    let n = |k: usize| hit.of_vertex(scene, k, |v| v.n);
+    let n = |k: usize| hit.normals(scene, k);
     let mut sum = n(0) * wa + n(1) * wb + n(2) * wc;
     if places::<W>(scene) {
         sum = geometry::place_normals(scene, hit.instance, hit.time, sum, hit.placed());

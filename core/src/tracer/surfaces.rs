@@ -16,9 +16,9 @@ pub(crate) fn places<W: World>(scene: &Scene<'_>) -> bool {
 #[inline(always)]
 pub(super) fn coordinates(scene: &Scene<'_>, hit: &SurfaceHit8, own: Option<&OwnHits8>) -> [F32x8; 2] {
     let [wa, wb, wc] = hit.weights();
-    let uv = |k: usize| hit.of_vertex(scene, k, |v| [v.uv[0], v.uv[1], 0.0]);
-    let at = uv(0) * wa + uv(1) * wb + uv(2) * wc;
-    own.map_or([at.x, at.y], |own| own.coordinates([at.x, at.y]))
+    let [a, b, c] = [0, 1, 2].map(|k| hit.coordinates(scene, k));
+    let at = [0, 1].map(|axis: usize| a[axis] * wa + b[axis] * wb + c[axis] * wc);
+    own.map_or(at, |own| own.coordinates(at))
 }
 
 /// What is known of the surfaces of the host's own that `rays` hit, if there are any; `hit` and `point` get their places
