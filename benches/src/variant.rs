@@ -9,6 +9,7 @@ pub const MODIFIERS: &[(&str, &str)] = &[
     ("adaptive", "adaptive sampling"),
     ("shadow", "roulette of light samples and their rays"),
     ("guided", "path guiding"),
+    ("auto", "path guiding where it pays"),
     ("constant", "the cached mean as control variate of roulette"),
     ("small", "one shard, and less than 256 KiB for all that is learned"),
     ("hashed", "hashed numbers in place of Sobol' points"),
@@ -60,6 +61,9 @@ impl Variant {
         }
         if self.has("guided") {
             (s.learning.guiding, s.learning.samples) = (Guiding::On, 64);
+        }
+        if self.has("auto") {
+            s.learning.guiding = Guiding::Auto;
         }
         if self.has("constant") {
             s.control_variate = ControlVariate::Cached;

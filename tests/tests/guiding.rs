@@ -107,8 +107,8 @@ fn guided_renders_agree_with_others() {
     }
 }
 
-/// Guiding that is tried in some blocks of pixels, and in no others unless it pays there. Killed by: a choice of samples
-/// that goes with what they find, weights of samples that are not guided by a mixture's density.
+/// Guiding of some blocks of pixels, and of no others unless it pays there, by adversarial guides. Killed by: a choice of
+/// pixels that goes with what they find, weights of samples that are not guided by a mixture's density.
 #[test]
 fn watched_guides_do_not_bias() {
     let scene = blob(&cornell([32, 32]));
@@ -116,14 +116,35 @@ fn watched_guides_do_not_bias() {
     for strategy in ["classic", "ears"] {
         let mut s = guided(&scene, strategy, 5);
         s.learning.guiding = Guiding::Auto;
-        let (mut rng, mut compared) = (SplitMix(11), false);
+        let (mut rng, mut least) = (SplitMix(11), f64::INFINITY);
         let image = run(&scene, &s, &mut |_, l| {
-            compared |= l.guide_use().is_some_and(|u| u.gain.is_some());
+            let u = l.guide_use().expect("a guide that is watched");
+            assert!(!u.enabled, "{strategy}: {u:?}");
+            least = least.min(u.gain.map_or(f64::INFINITY, |g| g.gain));
             l.load_guide(&adversarial(&scene, &s, 3, &mut rng)).expect("a guide of this scene");
         });
-        assert!(compared, "{strategy}: too few samples were guided");
+        assert!(least < 0.95, "{strategy}: adversarial guides promise {least}");
         assert_equivalent(&format!("{strategy}, watched"), &image, &reference);
     }
+}
+
+/// Where light comes through glass the guide is enabled, and the mean stays. Killed by: a gain that no guide reaches, a
+/// decision that goes with the samples of the iteration that it is for.
+#[test]
+fn guides_that_pay_are_enabled() {
+    let scene = blob(&mirror_and_glass());
+    let size = [32, 32];
+    let reference = run_to(CAUSTICS, &scene, &Settings { size, ..plain(&guided(&scene, "none", 6)) }, &mut |_, _| ());
+    let mut s = Settings { size, ..guided(&scene, "ears", 6) };
+    (s.shadow_roulette, s.learning.guiding) = (true, Guiding::Auto);
+    let (mut enabled, mut last) = (0, None);
+    let image = run_to(CAUSTICS, &scene, &s, &mut |_, l| {
+        last = l.guide_use();
+        enabled += u32::from(last.is_some_and(|u| u.enabled));
+    });
+    println!("enabled after {enabled} iterations, {last:?}");
+    assert!(enabled > 0, "{last:?}");
+    assert_within(CAUSTICS, "ears, guided where it pays", &image, &reference);
 }
 
 /// Sobol' points, whose hashed lanes draw other blocks of numbers. Killed by: leaves that go with the light sample's

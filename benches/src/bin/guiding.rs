@@ -6,6 +6,7 @@
 
 use clap::Parser;
 use croupier::unstable::learn::Guiding;
+use croupier::unstable::learn::guiding::GuideUse;
 use croupier::unstable::profile::{AnyProfile, Profile, ProfileVisitor};
 use croupier::{Budget, Plan, Scene, Session, Settings, Shard, StepResult, Strategy};
 use croupier_benches::clock::Clock;
@@ -58,8 +59,8 @@ struct Args {
 const NAME: &str = "guiding";
 const SHARDS: u32 = 4;
 
-/// Means of the pixels and CPU seconds of a render.
-type Rendered = Result<(Vec<[f64; 3]>, f64), Box<dyn Error>>;
+/// Means of the pixels and CPU seconds of a render, and what it says of guiding in the end.
+type Rendered = Result<(Vec<[f64; 3]>, f64, Option<GuideUse>), Box<dyn Error>>;
 
 /// A render whose profile is to be chosen.
 struct Render<'a, 's> {
@@ -88,7 +89,7 @@ impl ProfileVisitor for Render<'_, '_> {
             session.end_iteration(&shards)?;
             done += samples;
         }
-        Ok((session.film().pixels().map(|p| p.mean()).collect(), clock.seconds()))
+        Ok((session.film().pixels().map(|p| p.mean()).collect(), clock.seconds(), session.guide_use()))
     }
 }
 
@@ -97,6 +98,10 @@ impl ProfileVisitor for Render<'_, '_> {
 struct Side {
     pictures: Vec<Vec<[f64; 3]>>,
     seconds: f64,
+    /// In how many renders the guide was enabled in the end.
+    enabled: u32,
+    /// Gains that it promised then.
+    promised: Vec<f64>,
 }
 
 impl Side {
@@ -132,7 +137,7 @@ impl Side {
 fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
     let mut results = Results::of_this_run(NAME);
     let columns = "scene, strategy, guiding, relMSE without, relMSE with, gain at equal samples, CPU s without, \
-                   CPU s with, gain in efficiency, brightness without, brightness with";
+                   CPU s with, gain in efficiency, brightness without, brightness with, enabled, gain promised";
     let seeds = args.seeds.max(2);
     let mut table = Table::new(&format!("{} samples per pixel, {seeds} seeds", args.spp), columns);
     print!("{}", table.head());
@@ -156,8 +161,11 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
                     s.learning.guiding = guiding;
                     let render = Render { scene, settings: &s, spp: args.spp };
                     let guided = guiding != Guiding::Off;
-                    let (picture, seconds) = AnyProfile::smallest(scene.effects).dispatch_guided(guided, render)?;
+                    let (picture, seconds, guide) =
+                        AnyProfile::smallest(scene.effects).dispatch_guided(guided, render)?;
                     side.pictures.push(picture);
+                    side.enabled += u32::from(guide.is_some_and(|g| g.enabled));
+                    side.promised.extend(guide.and_then(|g| g.gain).map(|g| g.gain));
                     side.seconds += seconds / seeds as f64;
                 }
             }
@@ -166,7 +174,13 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
                 let (a, b) = (off.error(&sides, args.trim), on.error(&sides, args.trim));
                 let efficiency = a * off.seconds / (b * on.seconds);
                 let numbers = [a, b, a / b, off.seconds, on.seconds, efficiency, off.brightness(), on.brightness()];
-                table.add([name.clone(), rrs.clone(), mode.clone()].into_iter().chain(numbers.map(digits)));
+                let promised = on.promised.iter().sum::<f64>() / on.promised.len() as f64;
+                let watched = match mode.as_str() {
+                    "auto" => [format!("{} of {seeds}", on.enabled), digits(promised)],
+                    _ => ["-".into(), "-".into()],
+                };
+                let numbers = numbers.map(digits).into_iter().chain(watched);
+                table.add([name.clone(), rrs.clone(), mode.clone()].into_iter().chain(numbers));
                 println!("{}", table.last());
             }
         }

@@ -3,7 +3,7 @@
 use super::adaptive::{AllocationScalars, SampleAllocation};
 use super::cache::{BINS, Cache, CacheScalars, NO_BIN, Training, VertexKind8};
 use super::estimate::{EstimateScalars, PixelEstimates};
-use super::guiding::{Assignment, COMPILED, Guide, GuideLog, GuideScalars, GuideUse, LEARNED_ENABLED, Trial, Watch};
+use super::guiding::{COMPILED, Guide, GuideLog, GuideScalars, GuideUse, LEARNED, Promise, Watch};
 use super::needs::Needs;
 use super::picture::{Picture, PictureStatistics, error_of, outliers};
 use super::settings::{Guiding, Learning, Objective};
@@ -159,31 +159,24 @@ impl<'m> LearnedState<'m> {
         COMPILED && self.learning.guiding == Guiding::Auto
     }
 
-    /// Are most samples guided?
+    /// Are the samples of all pixels guided, where the guide asks for it?
     #[inline(always)]
-    pub(crate) fn guides_most(&self) -> bool {
+    pub(crate) fn guides(&self) -> bool {
         !self.watches() || self.watch.enabled()
     }
 
-    /// What becomes of sample `sample` of the pixel in column and row `at` in iteration `iteration`.
+    /// Are samples of the pixel in column and row `at` guided in iteration `iteration`, and learned from?
     #[inline(always)]
-    pub(crate) fn assignment(&self, iteration: u64, at: [u32; 2], sample: u32) -> Assignment {
-        if self.watches() {
-            self.watch.assignment(iteration, at, sample)
-        } else {
-            Assignment { guided: true, tried: false }
-        }
+    pub(crate) fn is_guided(&self, iteration: u64, at: [u32; 2]) -> bool {
+        !self.watches() || self.watch.is_guided(iteration, at)
     }
 
     /// How many samples of a pixel are learned from in an iteration.
     #[inline(always)]
-    pub(crate) fn learned_samples(&self, assignment: Assignment) -> u32 {
-        if !self.watches() {
-            let least = if self.guide().is_some() { LEARNED_ENABLED } else { 0 };
-            return self.learning.samples.max(least);
-        }
+    pub(crate) fn learned_samples(&self, guided: bool) -> u32 {
         // without a cache nothing but the guide learns
-        self.watch.learned(if self.cache.is_some() { self.learning.samples } else { 0 }, assignment)
+        let asked = if self.cache.is_some() || !self.watches() { self.learning.samples } else { 0 };
+        if self.guide().is_some() && guided { asked.max(LEARNED) } else { asked }
     }
 
     /// Whether guiding pays, if the settings leave that open.
@@ -193,13 +186,13 @@ impl<'m> LearnedState<'m> {
 
     /// Begins to learn from the logs of path guiding; `false` if it is off.
     pub(crate) fn begin_guide(&mut self) -> bool {
-        let (keep, most) = (self.learning.decay, self.guides_most());
-        self.guide_mut().map(|g| g.begin_learning(keep, most)).is_some()
+        let keep = self.learning.decay;
+        self.guide_mut().map(|g| g.begin_learning(keep)).is_some()
     }
 
-    /// Adds what a shard has measured of guiding.
-    pub(crate) fn add_trial(&mut self, trial: &Trial) {
-        self.watch.add(trial);
+    /// Adds what a shard has found of what guiding promises.
+    pub(crate) fn add_promise(&mut self, promise: &Promise) {
+        self.watch.add(promise);
     }
 
     /// Are the shards' logs to be replayed next?
@@ -228,9 +221,8 @@ impl<'m> LearnedState<'m> {
     pub(crate) fn learn_guide(&mut self) -> (u64, bool) {
         let Some(guide) = self.guide_mut() else { return (0, true) };
         let (work, done) = guide.learn_some();
-        let useful = done && guide.is_useful();
         if done && self.watches() {
-            self.watch.decide(useful, self.learning.decay.into());
+            self.watch.decide(self.learning.decay.into());
         }
         (work, done)
     }
@@ -436,7 +428,7 @@ impl<'m> LearnedState<'m> {
     /// Discounts statistics of the scene from bin `at` on, `limit` at most; their number, and `true` after the last.
     pub(crate) fn discount(&mut self, at: usize, limit: usize) -> (usize, bool) {
         // the variance in a bin is that of the guide that was: factors must not lag behind
-        let guided = self.guide().is_some() && self.guides_most();
+        let guided = self.guide().is_some() && self.guides();
         let again = if guided { self.learning.decay } else { 1.0 };
         let keep = f64::from(self.learning.decay) * f64::from(again);
         self.cache.as_mut().map_or((0, true), |c| c.discount(keep, at, limit))

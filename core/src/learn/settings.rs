@@ -100,7 +100,7 @@ pub enum Guiding {
     /// None.
     #[default]
     Off,
-    /// While it is worth its cost, as measured by guiding a few samples and by not guiding a few. Needs kernels with it
+    /// While it is worth its cost, as guiding a part of the pixels predicts. Needs kernels with it
     /// ([`crate::unstable::profile::Profile::GUIDING`]), and an estimate of the pixels.
     Auto,
     /// Wherever the statistics promise a gain. Needs kernels with it ([`crate::unstable::profile::Profile::GUIDING`]).
@@ -138,7 +138,7 @@ settings! {
             "norm", "Norm of the errors of the three channels";
         guiding: Guiding = Guiding::Off =>
             "guiding", "Path guiding: scattering by learned distributions of directions, besides the materials' own";
-        /// Shards also need the ledger then, with 16 bytes more for each record, whatever the strategy.
+        /// Shards also need the ledger then, with 24 bytes more for each record, whatever the strategy.
         guide_bytes: usize = 8 << 20 =>
             "guide-bytes", "Memory for path guiding, the session's and the logs of all shards together";
         factors: [f32; 2] = [MIN_FACTOR, MAX_FACTOR] =>

@@ -352,8 +352,8 @@ impl SessionState<'_> {
             self.learned.end_replay();
             return 1;
         };
-        if let Some(trial) = s.guide_trial().filter(|_| f.at == 0 && self.learned.is_first_replay()) {
-            self.learned.add_trial(trial);
+        if let Some(promise) = s.guide_promise().filter(|_| f.at == 0 && self.learned.is_first_replay()) {
+            self.learned.add_promise(promise);
         }
         let limit = rays.saturating_mul(REPLAYED_PER_RAY) as usize;
         let (n, done) = s.guide_log().map_or((0, true), |log| self.learned.replay(log, f.at as usize, limit));

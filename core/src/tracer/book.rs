@@ -22,7 +22,7 @@ use crate::film::{Aov, AovLayout, AovSet, AovSums, PixelSums, REL_MSE_EPSILON};
 use crate::learn::LearnedState;
 use crate::learn::cache::NO_BIN;
 use crate::learn::cache::Training;
-use crate::learn::guiding::{self, GuideLog};
+use crate::learn::guiding::GuideLog;
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::rrs::Norm;
 use crate::settings::{MAX_PATH_LENGTH, Settings};
@@ -405,10 +405,16 @@ impl<'m> Bookkeeping<'m> {
 
     /// Notes the directions that the bounces of eight samples took, after their next event estimation.
     #[inline(never)]
-    pub(super) fn note_directions(&mut self, note: &GuideNote8, path: &Path8) {
-        for i in note.lanes.and_not(path.record.eq(U32x8::splat(NO_RECORD))).lanes() {
+    pub(super) fn note_directions(&mut self, note: &GuideNote8, samples: &Samples8) {
+        let (path, v) = (&samples.path, &samples.vertex);
+        let lanes = note.lanes.and_not(path.record.eq(U32x8::splat(NO_RECORD)));
+        if lanes.none() {
+            return;
+        }
+        let importance = self.guide.importance(v.beta, v.error_weight);
+        for i in lanes.lanes() {
             let slot = path.record.lane(i);
-            self.guide.note(slot, note, i, self.ledger.radiance(slot));
+            self.guide.note(slot, note, i, self.ledger.radiance(slot), importance.lane(i));
         }
     }
 
@@ -437,13 +443,6 @@ impl<'m> Bookkeeping<'m> {
         if let Some(done) = self.roots.close(root) {
             self.counters.camera_samples += 1;
             let pixel = done.target.pixel();
-            if W::GUIDING
-                && done.target.is_tried()
-                && let [[off, on], ..] = &mut *self.guide.trial
-            {
-                let error = guiding::error_of(done.radiance, done.target.weight(), self.norm, self.outlier);
-                if done.target.is_guided() { on } else { off }.add(error, done.rays);
-            }
             if let Some(p) = self.pixels.get_mut(pixel) {
                 p.add(done.radiance);
             }

@@ -145,9 +145,9 @@ pub(super) fn camera_samples<W: World>(
         let mut target = PixelTarget::numbered(error_weight, share, film, slot, s);
         let mut learning = settings.learning.samples;
         if W::GUIDING {
-            let assignment = learned.assignment(iteration.number, p, s);
-            target = target.with_assignment(assignment);
-            learning = learned.learned_samples(assignment);
+            let guided = learned.is_guided(iteration.number, p);
+            target = target.with_guiding(guided);
+            learning = learned.learned_samples(guided);
         }
         let Some(opened) = book.open_camera_sample(target, s < learning) else { break };
         [x[lanes], y[lanes]] = p;

@@ -3,18 +3,22 @@
 
 use super::job::Job;
 use crate::learn::Guiding;
-use crate::learn::guiding::{COMPILED, GuideLog, NO_LEAF, Trial};
+use crate::learn::guiding::{COMPILED, GuideLog, NO_LEAF, Promise};
 use crate::memory::{Carver, Measure, MemoryError};
 use bytemuck::{Pod, Zeroable};
-use croupier_simd::{F32x8, Mask8, U32x8};
+use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Directions of eight samples' bounces.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GuideNote8 {
-    /// Lanes that have one.
+    /// Lanes that could have one.
     pub lanes: Mask8,
-    /// Leaves of the guide.
+    /// Leaves of the guide; [`NO_LEAF`] where there is none to learn from.
     pub leaf: U32x8,
+    /// Lanes whose leaves have learned anything.
+    pub known: Mask8,
+    /// Second moment of the bounce without the guide over what it has.
+    pub unguided: F32x8,
     /// Share of the guide's density, see [`GuideLog::add`].
     pub share: U32x8,
     /// Points of the square, [`quantised`](crate::learn::guiding::sphere::quantised).
@@ -28,13 +32,15 @@ impl GuideNote8 {
     pub(crate) const NONE: Self = Self {
         lanes: Mask8::NONE,
         leaf: U32x8::splat(NO_LEAF),
+        known: Mask8::NONE,
+        unguided: F32x8::ONE,
         share: U32x8::splat(0),
         point: U32x8::splat(0),
         pdf: F32x8::ZERO,
     };
 }
 
-/// The direction of a sample's bounce, 16 bytes.
+/// The direction of a sample's bounce, 24 bytes.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 struct GuideNote {
@@ -44,6 +50,10 @@ struct GuideNote {
     pdf: f32,
     /// What next event estimation gave the sample, mean of rgb.
     nee: f32,
+    /// What the square of the sample's estimate counts in the error of the picture; 0 if the guide promises nothing.
+    importance: f32,
+    /// See [`GuideNote8::unguided`].
+    unguided: f32,
 }
 
 /// Notes on the samples in the ledger, by slot, and the log that they go to; nothing if guiding is off.
@@ -51,8 +61,8 @@ struct GuideNote {
 pub(crate) struct GuideNotes<'m> {
     notes: &'m mut [GuideNote],
     log: Option<GuideLog<'m>>,
-    /// Errors of samples that are not guided and of samples that are; one if they are compared, else none.
-    pub(super) trial: &'m mut [Trial],
+    /// What guiding promises; one if the settings leave open whether it pays, else none.
+    pub(super) promise: &'m mut [Promise],
 }
 
 /// Mean of the channels.
@@ -66,21 +76,21 @@ impl<'m> GuideNotes<'m> {
         if job.guide.is_some() { ledger } else { 0 }
     }
 
-    /// Number of trials.
-    fn trials(job: &Job) -> usize {
+    /// Number of promises.
+    fn promises(job: &Job) -> usize {
         usize::from(COMPILED && job.settings.learning.guiding == Guiding::Auto)
     }
 
     /// Bytes; [`Self::carve`] carves in the same order.
     pub(crate) fn measure(m: Measure, job: &Job, ledger: usize) -> Measure {
         let m = m.add::<GuideNote>(Self::capacity(job, ledger));
-        job.guide.map_or(m, |size| GuideLog::measure(m, size)).add::<Trial>(Self::trials(job))
+        job.guide.map_or(m, |size| GuideLog::measure(m, size)).add::<Promise>(Self::promises(job))
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, job: &Job, ledger: usize) -> Result<Self, MemoryError> {
         let notes = c.take_unset(Self::capacity(job, ledger))?;
         let log = job.guide.filter(|_| COMPILED).map(|size| GuideLog::carve(c, size)).transpose()?;
-        Ok(Self { notes, log, trial: c.take_unset(Self::trials(job))? })
+        Ok(Self { notes, log, promise: c.take_unset(Self::promises(job))? })
     }
 
     /// The log.
@@ -100,22 +110,35 @@ impl<'m> GuideNotes<'m> {
         if let Some(log) = self.log_mut() {
             log.clear();
         }
-        self.trial.fill(Trial::default());
+        self.promise.fill(Promise::default());
     }
 
     /// A sample begins, without a direction.
     #[inline(always)]
     pub(crate) fn open(&mut self, slot: u32) {
         if let Some(note) = self.notes.get_mut(slot as usize) {
-            note.leaf = NO_LEAF;
+            (note.leaf, note.importance) = (NO_LEAF, 0.0);
         }
     }
 
+    /// What the squares of the estimates of vertices with these weights of the paths so far, and error weights of their
+    /// pixels, count in the error of the picture. With adaptive sampling pixels with more samples count too much.
+    pub(crate) fn importance(&self, beta: Vec3x8, error_weight: Vec3x8) -> F32x8 {
+        if self.promise.is_empty() { F32x8::ZERO } else { (beta * beta * error_weight).mean() }
+    }
+
     /// Notes the direction in lane `i` of a sample whose next event estimation has given `nee`.
-    pub(crate) fn note(&mut self, slot: u32, n: &GuideNote8, i: usize, nee: [f32; 3]) {
+    pub(crate) fn note(&mut self, slot: u32, n: &GuideNote8, i: usize, nee: [f32; 3], importance: f32) {
         if let Some(note) = self.notes.get_mut(slot as usize) {
-            let leaf = n.leaf.lane(i) << 8 | n.share.lane(i) & 0xff;
-            *note = GuideNote { leaf, point: n.point.lane(i), pdf: n.pdf.lane(i), nee: mean(nee) };
+            let leaf = n.leaf.lane(i);
+            *note = GuideNote {
+                leaf: if leaf == NO_LEAF { NO_LEAF } else { leaf << 8 | n.share.lane(i) & 0xff },
+                point: n.point.lane(i),
+                pdf: n.pdf.lane(i),
+                nee: mean(nee),
+                importance: if n.known.lane(i) { importance } else { 0.0 },
+                unguided: n.unguided.lane(i),
+            };
         }
     }
 
@@ -123,10 +146,18 @@ impl<'m> GuideNotes<'m> {
     #[inline]
     pub(crate) fn close(&mut self, slot: u32, radiance: [f32; 3]) {
         let Some((n, log)) = self.notes.get(slot as usize).zip(self.log.as_mut()) else { return };
+        let all = mean(radiance);
+        let bounce = (all - n.nee).max(0.0);
+        if n.importance > 0.0
+            && let Some(promise) = self.promise.first_mut()
+        {
+            let square = all * all;
+            let without = (square + bounce * bounce * (n.unguided - 1.0)).max(0.0);
+            promise.add(n.importance * without, n.importance * square);
+        }
         if n.leaf == NO_LEAF {
             return;
         }
-        let bounce = (mean(radiance) - n.nee).max(0.0);
         log.add(n.leaf >> 8, n.leaf & 0xff, n.point, bounce * bounce, n.pdf);
     }
 }

@@ -13,7 +13,7 @@ use super::ledger::NO_RECORD;
 use super::packets::Samples8;
 use crate::bsdf::{self, Bsdf, Eval8, Inputs8, Sample8, Visitor, folded};
 use crate::extension::Extension;
-use crate::learn::guiding::{Guide, Guide8, UNKNOWN_SHARE, sphere};
+use crate::learn::guiding::{Guide, Guide8, NO_LEAF, UNKNOWN_SHARE, sphere};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 use crate::world::World;
@@ -21,6 +21,9 @@ use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
 
 /// Phong exponent from which on a lobe is too narrow for a guide: GGX widths below 0.05.
 const NARROW: f32 = 2.0 / (0.05 * 0.05) - 2.0;
+
+/// Largest ratio of second moments that a single sample tells.
+const MOST: f32 = 1e4;
 
 /// What the guide has drawn for eight samples.
 pub(super) struct Guided8<'a, 'm> {
@@ -44,8 +47,8 @@ pub(super) fn draw<'a, 'm: 'a, W: World>(
     samples: &Samples8,
 ) -> Option<Guided8<'a, 'm>> {
     let ClassKernel::Surface(kind) = samples.class.kernel() else { return None };
-    let recorded = samples.trains.and_not(samples.path.record.eq(U32x8::splat(NO_RECORD)));
-    let asked = samples.continues & (samples.guided | recorded);
+    let recorded = samples.guided.and_not(samples.path.record.eq(U32x8::splat(NO_RECORD)));
+    let asked = samples.continues & samples.guided;
     if samples.class.is_delta() || asked.none() {
         return None;
     }
@@ -60,11 +63,7 @@ pub(super) fn draw<'a, 'm: 'a, W: World>(
         return None;
     }
     // by the vertex's key: if the leaf went with the light sample's numbers, the weights of MIS would be biased
-    let mut at = guide.at(v.p, v.ns, v.key.cache_jitter(world.sampler()), lanes);
-    at.fraction = samples.guided.zero_unless(at.fraction);
-    // shares tell what other shares would do only of samples that were guided as most are
-    let most = if world.learned().guides_most() { samples.guided } else { !samples.guided };
-    at.known &= most;
+    let at = guide.at(v.p, v.ns, v.key.cache_jitter(world.sampler()), lanes);
     let recorded = lanes & recorded;
     if recorded.none() && !at.fraction.gt(F32x8::ZERO).any() {
         return None;
@@ -169,9 +168,12 @@ pub(super) fn mix(g: &Guided8<'_, '_>, both: &Both8, nee_direction: Option<Vec3x
     let valid = (chosen & both.guided.f.any_positive() & possible) | (s.valid & (delta | possible)).and_not(chosen);
     let learned = g.recorded & valid & (g.at.known | !delta);
     let known = g.at.known.select(q / (q + p) * 254.99, F32x8::splat(UNKNOWN_SHARE as f32));
+    let unguided = delta.select(own, pdf / p).min(F32x8::splat(MOST));
     let note = GuideNote8 {
-        lanes: learned,
-        leaf: g.at.leaf,
+        lanes: g.recorded,
+        leaf: U32x8::select(learned, g.at.leaf, U32x8::splat(NO_LEAF)),
+        known: g.at.known,
+        unguided: (g.at.known & learned).select(unguided, F32x8::ONE),
         share: (!delta).zero_unless(known).to_i32().to_u32(),
         point: if learned.any() { sphere::quantised(wi) } else { U32x8::splat(0) },
         pdf: (!delta).zero_unless(pdf),

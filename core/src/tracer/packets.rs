@@ -27,10 +27,8 @@ pub(crate) struct Samples8 {
     pub key: Key8,
     /// Times of the paths.
     pub time: F32x8,
-    /// Lanes that are guided, where the guide asks for it; all where the kernels contain no guiding.
+    /// Lanes that are guided, where the guide asks for it, and learned from, if they have a record.
     pub guided: Mask8,
-    /// Lanes that path guiding learns from, if they have a record.
-    pub trains: Mask8,
 }
 
 /// One ray per lane, from the camera or from a vertex.

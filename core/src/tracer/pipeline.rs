@@ -80,7 +80,7 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
                 }
             }
             if W::GUIDING {
-                book.note_directions(&scattered.note, &samples.path);
+                book.note_directions(&scattered.note, &samples);
             }
             book.break_lanes(scattered.broken, &samples.path);
             book.close_lanes::<W>(samples.active.and_not(scattered.rays.active), &samples.path);

@@ -53,11 +53,8 @@ pub(crate) fn samples<W: World>(world: &W, ring: &Ring<'_>, book: &mut Bookkeepi
     let (class, with_nee) = (taken.queue.class(), taken.queue.with_nee());
     book.counters.scatter.count(taken.lanes as u32);
     book.counters.vertex_samples += taken.lanes as u64;
-    let (mut guided, mut trains) = (active, active);
-    if W::GUIDING && world.learned().watches() {
-        let [chosen, tried] = book.roots.assignments(vertex.path.root, active);
-        (guided, trains) = (chosen, if world.learned().guides_most() { active } else { tried });
-    }
+    let guided =
+        if W::GUIDING && !world.learned().guides() { book.roots.guided(vertex.path.root, active) } else { active };
     let record = book.open_samples::<W>(vertex.path.record, taken.lanes, with_nee);
     if W::GUIDING {
         book.open_directions(record);
@@ -65,7 +62,6 @@ pub(crate) fn samples<W: World>(world: &W, ring: &Ring<'_>, book: &mut Bookkeepi
     Samples8 {
         active,
         guided,
-        trains,
         continues: active & vertex.path.depth.lt(U32x8::splat(world.max_depth())),
         class,
         with_nee,

@@ -1,7 +1,6 @@
 //! One record per camera sample in flight: what its whole tree of paths has found.
 
 use super::free_list::FreeList;
-use crate::learn::guiding::Assignment;
 use crate::memory::{Carver, Measure, MemoryError};
 use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -35,19 +34,17 @@ pub(crate) struct PixelTarget {
     pub share: f32,
     /// Film index.
     pub film: u32,
-    /// Number of the pixel in the shard, below 2^29, and in the highest bits whether the sample is its first of the
-    /// iteration, and its [`Assignment`]; see [`Self::numbered`].
+    /// Number of the pixel in the shard, below 2^30, and in the highest bits whether the sample is its first of the
+    /// iteration, and whether it may be guided; see [`Self::numbered`].
     pixel: u32,
 }
 
 /// Bit of a pixel's first sample.
 const FIRST: u32 = 1 << 31;
-/// Bit of a guided sample.
+/// Bit of a sample that may be guided.
 const GUIDED: u32 = 1 << 30;
-/// Bit of a sample that is compared with others.
-const TRIED: u32 = 1 << 29;
 /// All of them.
-const BITS: u32 = FIRST | GUIDED | TRIED;
+const BITS: u32 = FIRST | GUIDED;
 
 impl PixelTarget {
     /// The target of sample `sample`, of this iteration, of pixel `pixel` of the shard.
@@ -55,34 +52,16 @@ impl PixelTarget {
         Self { error_weight, share, film, pixel: pixel & !BITS | if sample == 0 { FIRST } else { 0 } }
     }
 
-    /// The same of a sample with this assignment.
+    /// The same of a sample that may be guided, or may not.
     #[inline(always)]
-    pub(crate) fn with_assignment(self, assignment: Assignment) -> Self {
-        let bits = if assignment.guided { GUIDED } else { 0 } | if assignment.tried { TRIED } else { 0 };
-        Self { pixel: self.pixel | bits, ..self }
-    }
-
-    /// Is the sample compared with others?
-    #[inline(always)]
-    pub(crate) fn is_tried(&self) -> bool {
-        self.pixel & TRIED != 0
-    }
-
-    /// Is the sample guided?
-    #[inline(always)]
-    pub(crate) fn is_guided(&self) -> bool {
-        self.pixel & GUIDED != 0
+    pub(crate) fn with_guiding(self, guided: bool) -> Self {
+        Self { pixel: self.pixel | if guided { GUIDED } else { 0 }, ..self }
     }
 
     /// Number of the pixel in the shard.
     #[inline(always)]
     pub(crate) fn pixel(&self) -> usize {
         (self.pixel & !BITS) as usize
-    }
-
-    /// What a squared error of the pixel counts in the error of the picture, per channel.
-    pub(crate) fn weight(&self) -> [f32; 3] {
-        self.error_weight.map(|x| x * (self.share * self.share))
     }
 
     /// Is it the pixel's first sample of the iteration?
@@ -173,14 +152,12 @@ impl<'m> Roots<'m> {
         F32x8::from_fn(|i| self.slots.get(slots[i] as usize).map_or(0.0, |root| root.time))
     }
 
-    /// Lanes of `mask` whose camera samples are guided, and those whose are compared.
+    /// Lanes of `mask` whose camera samples may be guided.
     #[inline(always)]
-    pub(crate) fn assignments(&self, slots: U32x8, mask: Mask8) -> [Mask8; 2] {
+    pub(crate) fn guided(&self, slots: U32x8, mask: Mask8) -> Mask8 {
         let slots = slots.to_array();
-        let words: [u32; 8] =
-            core::array::from_fn(|i| self.slots.get(slots[i] as usize).map_or(0, |root| root.target.pixel));
-        let words = U32x8::new(words);
-        [GUIDED, TRIED].map(|bit| mask.and_not((words & U32x8::splat(bit)).eq(U32x8::splat(0))))
+        let words = U32x8::from_fn(|i| self.slots.get(slots[i] as usize).map_or(0, |root| root.target.pixel));
+        mask.and_not((words & U32x8::splat(GUIDED)).eq(U32x8::splat(0)))
     }
 
     /// The root in a slot.

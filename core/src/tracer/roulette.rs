@@ -107,7 +107,7 @@ pub(crate) fn roulette<W: World>(
         }
     }
     // throughput undoes guiding: simple rules play by the albedos that it would have without (EARS, section 6.4)
-    let by_albedo = W::GUIDING && guides_most(world) && strategy.space().is_none();
+    let by_albedo = W::GUIDING && guides(world) && strategy.space().is_none();
     let vertices = Vertices8 {
         beta: if by_albedo { Vec3x8::grey(v.albedo_product) } else { v.beta },
         last_weight: a.weight,
@@ -154,11 +154,11 @@ pub(crate) fn roulette<W: World>(
     Decision8 { n, with_nee }
 }
 
-/// Are most samples guided?
+/// Are samples guided?
 #[inline(always)]
-fn guides_most<W: World>(world: &W) -> bool {
+fn guides<W: World>(world: &W) -> bool {
     let learned = world.learned();
-    learned.guide().is_some() && learned.guides_most()
+    learned.guide().is_some() && learned.guides()
 }
 
 /// How many of the `n` samples of each vertex draw a light sample, if each does with probability `nee_probability`: one

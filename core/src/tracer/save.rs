@@ -9,7 +9,7 @@
 //! | 4 per pixel and plane | their auxiliary sums |
 //! | 48 per bin | learned sums of the bins in use |
 //! | 4 per bin | their shadow rays |
-//! | 72, and 12 per direction | with path guiding: directions offered to its log, the trial, and those that it holds |
+//! | 56, and 12 per direction | with path guiding: directions offered to its log, the promise, and those that it holds |
 //!
 //! Numbers have the byte order of the machine; the first bytes tell machines of the other order. The identity of scene,
 //! plan and iteration says where the sums belong, so all of it must agree. All bytes are checked before anything is
@@ -23,7 +23,7 @@ use super::shard::Shard;
 use crate::counters::Counters;
 use crate::film::{AovLayout, PixelSums};
 use crate::learn::cache::Training;
-use crate::learn::guiding::{GuideLog, Trial};
+use crate::learn::guiding::{GuideLog, Promise};
 use crate::scene::blob::content_hash;
 use crate::world::{Identity, Iteration, World};
 use bytemuck::{Pod, Zeroable};
@@ -181,8 +181,8 @@ fn pixel_bytes(job: &Job) -> usize {
 struct GuideHeader {
     /// Directions offered to the log.
     offered: u64,
-    /// Samples that were not guided, and samples that were.
-    trial: Trial,
+    /// What guiding promises.
+    promise: Promise,
 }
 
 /// Length of a saved shard, bytes.
@@ -287,8 +287,8 @@ impl<'b> SavedShard<'b> {
         if let Some(at) = Training::unsound(records, shadows) {
             return Err(SavedShardError::Numbers { what: "bin", at: at as u64 });
         }
-        if let Some(at) = self.guide.trial.iter().position(|sums| !sums.is_sound()) {
-            return Err(SavedShardError::Numbers { what: "trial of path guiding", at: at as u64 });
+        if !self.guide.promise.is_sound() {
+            return Err(SavedShardError::Numbers { what: "promise of path guiding", at: 0 });
         }
         match GuideLog::unsound(log) {
             Some(at) => Err(SavedShardError::Numbers { what: "direction", at: at as u64 }),
@@ -335,8 +335,8 @@ impl Shard<'_> {
         let none: [&[u8]; 2] = [&[]; 2];
         let [records, shadows] = book.training.as_ref().map_or(none, Training::sums);
         let log = self.guide_log().map_or(none[0], GuideLog::bytes);
-        let trial = self.guide_trial().copied().unwrap_or_default();
-        let guide = self.guide_log().map(|log| GuideHeader { offered: log.offered().into(), trial });
+        let promise = self.guide_promise().copied().unwrap_or_default();
+        let guide = self.guide_log().map(|log| GuideHeader { offered: log.offered().into(), promise });
         let guide = guide.as_ref().map_or(none[0], bytemuck::bytes_of);
         let parts = [bytemuck::bytes_of(&header), pixels, rays, aovs, records, shadows, guide, log];
         let mut rest = &mut *out;
@@ -378,7 +378,7 @@ impl Shard<'_> {
         if let Some(guide) = book.guide.log_mut() {
             guide.load(saved.guide.offered as u32, log);
         }
-        book.guide.trial.fill(saved.guide.trial);
+        book.guide.promise.fill(saved.guide.promise);
         Ok(())
     }
 }

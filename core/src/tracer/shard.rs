@@ -7,7 +7,7 @@ use super::state::{State, StateRecord};
 use crate::counters::Counters;
 use crate::film::PixelSums;
 use crate::learn::cache::Training;
-use crate::learn::guiding::{GuideLog, Trial};
+use crate::learn::guiding::{GuideLog, Promise};
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::tiles::TILE_PIXELS;
 use crate::world::{Identity, World};
@@ -227,9 +227,9 @@ impl<'m> Shard<'m> {
         self.state.book.guide.log()
     }
 
-    /// What guided samples and others have cost in this iteration, if they are compared.
-    pub(crate) fn guide_trial(&self) -> Option<&Trial> {
-        self.state.book.guide.trial.first()
+    /// What path guiding promises in this iteration, if the settings leave open whether it pays.
+    pub(crate) fn guide_promise(&self) -> Option<&Promise> {
+        self.state.book.guide.promise.first()
     }
 
     /// Has the shard finished this iteration of this scene?

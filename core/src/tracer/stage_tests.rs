@@ -128,7 +128,6 @@ fn floor_samples(shard: &mut Shard<'_>, kind: MaterialKind, with_nee: bool) -> S
     Samples8 {
         active: Mask8::all_lanes(),
         guided: Mask8::all_lanes(),
-        trains: Mask8::all_lanes(),
         continues: Mask8::all_lanes(),
         class: PacketClass::of_kind(kind as u32).expect("a class"),
         with_nee,

@@ -15,7 +15,7 @@ pub use error::DriveError;
 pub use forecast::{Forecast, UNKNOWN, forecast};
 pub use observe::{Observer, Progress, Unobserved};
 pub use part::{Part, PartError, Share};
-pub use result::{CacheRecord, IterationRecord, Rendered};
+pub use result::{CacheRecord, GuideRecord, IterationRecord, Rendered};
 pub use target::Target;
 
 use crate::blob::AlignedBytes;
@@ -238,6 +238,12 @@ pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
         checkpoint_error: saver.error,
         threads: pool.current_num_threads().min(shards.len()),
         iterations,
+        guide: session.guide().map(|g| GuideRecord {
+            leaves: g.leaves(),
+            nodes: g.nodes(),
+            share: g.mean_fraction(),
+            watched: session.guide_use(),
+        }),
         cache: used.filter(|_| options.save_cache).map(save).transpose()?,
         calibration: used.filter(|_| options.calibrate).and_then(|c| calibrate::calibrate(c, &scene)),
     })

@@ -531,6 +531,7 @@ fn add(parts: &[Checked], common: Common) -> Result<Merged, MergeError> {
         checkpoint_error: None,
         threads: 0,
         iterations: Vec::new(),
+        guide: None,
         cache: saved,
         calibration: None,
     };

@@ -11,8 +11,8 @@ use crate::statistics::Statistics;
 use croupier::unstable::STACK_BYTES;
 use croupier::unstable::denoise::{Planes, scratch_len};
 use croupier::unstable::film::{Aov, PixelStats};
-use croupier::unstable::learn::ControlVariate;
 use croupier::unstable::learn::cache::CacheSize;
+use croupier::unstable::learn::{ControlVariate, Guiding};
 use croupier::unstable::profile::AnyProfile;
 use croupier::unstable::rrs;
 use croupier::unstable::rrs::Ears;
@@ -48,16 +48,19 @@ pub struct RenderOptions {
 }
 
 impl RenderOptions {
-    /// Defaults with this strategy: roulette of light samples with those whose rule it is
-    /// ([`Strategy::is_efficiency_aware`]), 16 shards, all layers, 64 samples per pixel.
+    /// Defaults with this strategy: roulette of light samples, and path guiding where it pays, with those that are
+    /// efficiency-aware ([`Strategy::is_efficiency_aware`]), 16 shards, all layers, 64 samples per pixel.
     pub fn new(strategy: Strategy) -> Self {
-        let settings = Settings {
+        let mut settings = Settings {
             strategy,
             shards: 16,
             aovs: true.into(),
             shadow_roulette: strategy.is_efficiency_aware(),
             ..Settings::default()
         };
+        if strategy.is_efficiency_aware() {
+            settings.learning.guiding = Guiding::Auto;
+        }
         Self {
             settings,
             target: Target::Spp(64),

@@ -1,7 +1,7 @@
 //! Figures of paths, iterations and time, to compare roulette strategies with (EARS, SIGGRAPH 2022, Table 1, Fig. 9 and
 //! section 6.2).
 
-use crate::drive::{self, Forecast, IterationRecord, Rendered, Target};
+use crate::drive::{self, Forecast, GuideRecord, IterationRecord, Rendered, Target};
 use croupier::Settings;
 use serde::Serialize;
 use std::fmt;
@@ -13,6 +13,9 @@ pub struct Statistics {
     pub paths: Paths,
     /// Figures of every iteration.
     pub iterations: Vec<IterationFigures>,
+    /// Figures of path guiding; absent if it is off.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub guiding: Option<GuidingFigures>,
     /// Time by part of the work.
     pub time: Vec<Part>,
 }
@@ -58,6 +61,24 @@ pub struct IterationFigures {
     pub forecast: Option<Forecast>,
 }
 
+/// What path guiding has learned in the end, and whether it pays.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GuidingFigures {
+    /// Whether all pixels are guided; else some blocks of them are, to see whether it pays.
+    pub enabled: bool,
+    /// Predicted gain: squared error of the picture without guiding over that with it, at equal samples; absent if it was
+    /// not asked for, or before enough samples.
+    pub gain: Option<f64>,
+    /// Relative standard error of the gain.
+    pub gain_error: Option<f64>,
+    /// Mean share of guided samples where the guide is asked, over the contributions that it learned from, 0 to 1.
+    pub share: f64,
+    /// Leaves of the octrees of places.
+    pub leaves: u32,
+    /// Nodes of the trees of directions.
+    pub nodes: u32,
+}
+
 /// Time of a part of the work.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Part {
@@ -94,6 +115,7 @@ impl Statistics {
                 first_factor: (hits > 0.0).then(|| first(|a| a.factor[0]) / hits),
             },
             iterations: iterations.collect(),
+            guiding: r.guide.map(GuidingFigures::of),
             time: time(r),
         }
     }
@@ -107,6 +129,20 @@ impl Statistics {
             }
         }
         self
+    }
+}
+
+impl GuidingFigures {
+    fn of(g: GuideRecord) -> Self {
+        let gain = g.watched.and_then(|w| w.gain);
+        Self {
+            enabled: g.watched.is_none_or(|w| w.enabled),
+            gain: gain.map(|g| g.gain),
+            gain_error: gain.map(|g| g.error),
+            share: g.share,
+            leaves: g.leaves,
+            nodes: g.nodes,
+        }
     }
 }
 
@@ -178,6 +214,21 @@ impl fmt::Display for Statistics {
         write_table(f, &table)?;
         if let Some(n) = self.iterations.last().and_then(|i| i.subdivisions_refused).filter(|n| *n > 0) {
             writeln!(f, "{n} subdivisions refused so far for lack of memory")?;
+        }
+        if let Some(g) = &self.guiding {
+            let head = ["guiding", "predicted gain", "its relative error", "guided share", "leaves", "nodes"];
+            let mut table = vec![head.map(String::from).to_vec()];
+            let pixels = if g.enabled { "all pixels" } else { "some blocks" };
+            table.push(vec![
+                pixels.into(),
+                optional(g.gain),
+                optional(g.gain_error),
+                format!("{:.1} %", 100.0 * g.share),
+                g.leaves.to_string(),
+                g.nodes.to_string(),
+            ]);
+            writeln!(f)?;
+            write_table(f, &table)?;
         }
         writeln!(f)?;
         let mut table = vec![["part", "s", "share"].map(String::from).to_vec()];

@@ -46,5 +46,5 @@ pub use log::{GuideLog, NO_LEAF, UNKNOWN_SHARE};
 pub(crate) use shared::GuideScalars;
 pub use shared::{Guide, Guide8};
 pub use size::GuideSize;
-pub(crate) use watch::{Assignment, LEARNED_ENABLED, Trial, Watch, error_of};
 pub use watch::{GuideGain, GuideUse};
+pub(crate) use watch::{LEARNED, Promise, Watch};

@@ -42,7 +42,7 @@ const GRID: u32 = 6;
 impl Guide<'_> {
     /// Learns from the logs of all shards of an iteration, in their order; old sums are multiplied by `keep`, 0 to 1.
     pub fn learn<'a, 'b: 'a>(&mut self, keep: f32, logs: impl Iterator<Item = &'a GuideLog<'b>> + Clone) {
-        self.begin_learning(keep, true);
+        self.begin_learning(keep);
         loop {
             if self.wants_logs() {
                 logs.clone().for_each(|log| {
@@ -56,11 +56,10 @@ impl Guide<'_> {
         }
     }
 
-    /// Begins to learn from an iteration in which samples were `guided` as leaves say, or none was.
-    pub(crate) fn begin_learning(&mut self, keep: f32, guided: bool) {
+    /// Begins to learn from an iteration.
+    pub(crate) fn begin_learning(&mut self, keep: f32) {
         let keep = if keep >= 0.0 { keep.min(1.0) } else { 0.0 };
-        let guided = u32::from(guided);
-        self.scalars.rebuild = Rebuild { pass: DISCOUNT_NODES, round: 0, index: 0, keep, guided, reserved: 0 };
+        self.scalars.rebuild = Rebuild { pass: DISCOUNT_NODES, round: 0, index: 0, keep };
     }
 
     /// Are logs to be replayed next?
@@ -161,8 +160,7 @@ impl Guide<'_> {
         if first {
             let FrozenLeaf { root, .. } = self.frozen[leaf];
             let share = self.frozen[leaf].share();
-            let fraction = if self.scalars.rebuild.guided != 0 { f32::from(share) / 65_536.0 } else { 0.0 };
-            self.leaves[leaf].add(square, hit.share(), fraction, weight);
+            self.leaves[leaf].add(square, hit.share(), f32::from(share) / 65_536.0, weight);
             if root == UNIFORM && pdf > 0.0 {
                 let Some(root) = self.take_node() else { return };
                 self.frozen[leaf].root = root;

@@ -89,9 +89,6 @@ pub(crate) struct Rebuild {
     pub(super) index: u32,
     /// Part of the old sums that is kept.
     pub(super) keep: f32,
-    /// Not 0: the shares that leaves have were those of the samples that are learned from; else none was guided.
-    pub(super) guided: u32,
-    pub(super) reserved: u32,
 }
 
 /// All of a guide but its tables.
@@ -279,11 +276,6 @@ impl<'m> Guide<'m> {
     /// Number of directions that the shards' logs had no room for, of all iterations: logs kept a random part of all.
     pub fn thinned(&self) -> u64 {
         self.scalars.thinned
-    }
-
-    /// Would any sample be guided?
-    pub(crate) fn is_useful(&self) -> bool {
-        self.frozen.iter().take(self.tree.leaves() as usize).any(|l| l.share() > 0)
     }
 
     /// Mean share of guided samples, over the contributions that were learned from.

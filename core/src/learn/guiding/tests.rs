@@ -303,7 +303,7 @@ fn pieces_do_not_change_what_is_learned() {
                     let at = guide.at(p, p, [F32x8::splat(0.5); 3], Mask8::all_lanes());
                     log.add(at.leaf.lane(0), random.next(), random.next(), random.unit(), random.unit());
                 }
-                guide.begin_learning(0.75, true);
+                guide.begin_learning(0.75);
                 loop {
                     let mut at = 0;
                     while guide.wants_logs() {

@@ -59,10 +59,11 @@ fn default(row: &SettingInfo) -> String {
     let usual = RenderOptions::default().settings;
     match row.name {
         "shards" => format!("{}, as many as --cache-bytes has room for if that is fewer", usual.shards),
-        "shadow-roulette" => {
+        "shadow-roulette" | "guiding" => {
             let strategies = Strategy::TABLE.iter().filter_map(|(name, _)| Strategy::parse(name).ok());
             let aware: Vec<_> = strategies.filter(Strategy::is_efficiency_aware).map(|s| s.name()).collect();
-            format!("true with {}", aware.join(" and "))
+            let value = usual.get(row.name).map_or_else(String::new, |value| value.to_string());
+            format!("{value} with {}", aware.join(" and "))
         }
         name => usual.get(name).map_or_else(String::new, |value| value.to_string()),
     }

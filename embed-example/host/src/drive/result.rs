@@ -4,6 +4,7 @@ use super::calibrate::Calibration;
 use super::schedule::Work;
 use croupier::unstable::film::{Aov, PixelAov, PixelStats};
 use croupier::unstable::learn::PictureStatistics;
+use croupier::unstable::learn::guiding::GuideUse;
 use croupier::{Counters, ErrorEstimate};
 
 /// One finished iteration.
@@ -39,6 +40,19 @@ pub struct CacheRecord {
     pub subdivisions_refused: u64,
 }
 
+/// What path guiding has learned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GuideRecord {
+    /// Leaves of the octrees.
+    pub leaves: u32,
+    /// Nodes of all leaves.
+    pub nodes: u32,
+    /// Mean share of guided samples where the guide is asked, over the contributions that were learned from.
+    pub share: f64,
+    /// Whether it pays, if that was left to the render.
+    pub watched: Option<GuideUse>,
+}
+
 /// A finished render.
 #[derive(Clone, Debug)]
 pub struct Rendered {
@@ -72,6 +86,8 @@ pub struct Rendered {
     pub threads: usize,
     /// Records of all iterations, the one that was stopped included.
     pub iterations: Vec<IterationRecord>,
+    /// What path guiding has learned, if it is on.
+    pub guide: Option<GuideRecord>,
     /// Saved cache, if asked for.
     pub cache: Option<Vec<u8>>,
     /// Seconds of a look-up and of recording a sample, if asked for and anything is looked up.
