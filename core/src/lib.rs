@@ -210,6 +210,10 @@ pub mod unstable {
     pub mod rrs {
         pub use crate::rrs::*;
     }
+    /// Samples of the next iteration.
+    pub mod schedule {
+        pub use crate::session::{LARGEST_ITERATION, Target, Work, next_iteration};
+    }
     /// The scene blob and its records.
     pub mod scene {
         pub use crate::scene::*;

@@ -2,8 +2,10 @@
 
 mod error;
 mod finish;
+mod schedule;
 
 pub use error::SessionError;
+pub use schedule::{LARGEST_ITERATION, Target, Work, next_iteration};
 
 use crate::accel::{Intersector, WideBvh};
 use crate::counters::Counters;

@@ -137,6 +137,11 @@ impl Settings {
         FilmLayout { size: self.size, weights: self.adaptive, rays: self.counts_rays(), aovs: self.aovs }
     }
 
+    /// Does anything learn between iterations, so that the cost of a camera sample changes?
+    pub fn learns(&self) -> bool {
+        self.strategy.needs_image() || self.shadow_roulette || self.adaptive || self.guides()
+    }
+
     /// Are the rays of every pixel counted?
     pub(crate) fn counts_rays(&self) -> bool {
         self.aovs.has(Aov::Cost) || self.adaptive

@@ -1,7 +1,7 @@
 //! How the driver divides a render into iterations.
 
+use croupier::unstable::schedule::{LARGEST_ITERATION, Work, next_iteration};
 use croupier::{ErrorEstimate, Film, Scene, Settings, Strategy};
-use croupier_host::drive::schedule::{LARGEST_ITERATION, Work, next};
 use croupier_host::drive::{Observer, Options, Progress, Rendered, Target, Unobserved, drive};
 use croupier_tests::scenes::{blob, everything};
 use std::time::Duration;
@@ -37,15 +37,15 @@ fn growth_is_in_work_for_strategies_that_learn() {
         (work(8, 8, 0.8), LARGEST_ITERATION),
     ] {
         for target in TARGETS {
-            assert_eq!(next(target, true, &all, &last, bad_error()), samples, "{target:?} {last:?}");
-            assert_eq!(next(target, false, &all, &last, bad_error()), 16, "{target:?} {last:?}");
+            assert_eq!(next_iteration(target, true, &all, &last, bad_error()), samples, "{target:?} {last:?}");
+            assert_eq!(next_iteration(target, false, &all, &last, bad_error()), 16, "{target:?} {last:?}");
         }
     }
     for target in TARGETS {
-        assert_eq!(next(target, true, &Work::default(), &Work::default(), None), 1);
+        assert_eq!(next_iteration(target, true, &Work::default(), &Work::default(), None), 1);
         // figures that make no sense are harmless
         for odd in [work(1, 0, 0.0), work(u32::MAX, u64::MAX, f64::INFINITY), work(3, 1, f64::NAN)] {
-            assert!(next(target, true, &odd, &odd, bad_error()) <= LARGEST_ITERATION);
+            assert!(next_iteration(target, true, &odd, &odd, bad_error()) <= LARGEST_ITERATION);
         }
     }
 }
@@ -58,24 +58,24 @@ fn no_iteration_is_longer_than_what_is_left() {
     for learns in [false, true] {
         let [rays, seconds] = if learns { [200.0, 0.4] } else { [100.0, 0.25] };
         for left in [0.0f64, 0.5, 1.0, 3.5, 7.0] {
-            let n = next(Target::Rays(4000 + (left * rays) as u64), learns, &all, &last, None);
+            let n = next_iteration(Target::Rays(4000 + (left * rays) as u64), learns, &all, &last, None);
             assert_eq!(f64::from(n), left.floor(), "{learns} {left}");
-            let n = next(Target::Seconds(10.0 + left * seconds + 1e-9), learns, &all, &last, None);
+            let n = next_iteration(Target::Seconds(10.0 + left * seconds + 1e-9), learns, &all, &last, None);
             assert_eq!(f64::from(n), left.floor(), "{learns} {left}");
         }
         for left in [0, 1, 7] {
-            assert_eq!(next(Target::Spp(40 + left), learns, &all, &last, None), left);
+            assert_eq!(next_iteration(Target::Spp(40 + left), learns, &all, &last, None), left);
         }
         let slow = [all, last].map(|w| Work { seconds: 1e9 * w.seconds, ..w });
-        let spp = |w: &[Work; 2]| next(Target::Spp(500), learns, &w[0], &w[1], None);
+        let spp = |w: &[Work; 2]| next_iteration(Target::Spp(500), learns, &w[0], &w[1], None);
         assert_eq!(spp(&slow), spp(&[all, last]));
-        assert_eq!(next(Target::Seconds(1.0), learns, &all, &last, None), 0);
+        assert_eq!(next_iteration(Target::Seconds(1.0), learns, &all, &last, None), 0);
     }
     // 4000 rays at an error of 0.03 and a target of 0.02: 2000 more, at 200 each
     let error = Some(ErrorEstimate { rel_mse: 0.03, ..ErrorEstimate::default() });
-    assert_eq!(next(Target::Error(0.02), true, &all, &last, error), 10);
-    assert_eq!(next(Target::Error(0.03), true, &all, &last, error), 0);
-    assert_eq!(next(Target::Error(0.5), true, &work(3, 10, 1.0), &work(1, 5, 1.0), error), 1);
+    assert_eq!(next_iteration(Target::Error(0.02), true, &all, &last, error), 10);
+    assert_eq!(next_iteration(Target::Error(0.03), true, &all, &last, error), 0);
+    assert_eq!(next_iteration(Target::Error(0.5), true, &work(3, 10, 1.0), &work(1, 5, 1.0), error), 1);
 }
 
 fn render(strategy: &str, target: Target, threads: usize, observer: &dyn Observer) -> Rendered {
@@ -124,12 +124,12 @@ fn iterations_of_a_render_follow_the_plan() {
     let r = render("ears", Target::Rays(2_000_000), 2, &Unobserved);
     let (mut all, mut last) = (Work::default(), Work::default());
     for i in &r.iterations {
-        let planned = next(Target::Rays(2_000_000), true, &all, &last, Some(i.error));
+        let planned = next_iteration(Target::Rays(2_000_000), true, &all, &last, Some(i.error));
         assert_eq!(i.work.samples, planned, "after {all:?} {last:?}");
         last = i.work;
         all = work(all.samples + last.samples, all.rays + last.rays, 0.0);
     }
-    assert_eq!(next(Target::Rays(2_000_000), true, &all, &last, None), 0);
+    assert_eq!(next_iteration(Target::Rays(2_000_000), true, &all, &last, None), 0);
     assert!(r.iterations.len() > 6 && all.rays > 1_500_000, "{all:?}");
     let parts = |f: fn(&croupier_host::drive::IterationRecord) -> f64| r.iterations.iter().map(f).sum::<f64>();
     let sum = parts(|i| i.tracing + i.merging + i.estimating + i.learning);

@@ -266,11 +266,6 @@ impl<'m> Bookkeeping<'m> {
         U32x8::new(out)
     }
 
-    /// The samples of these records begin without a direction that path guiding would learn from.
-    pub(super) fn open_directions(&mut self, records: U32x8) {
-        records.to_array().into_iter().for_each(|record| self.guide.open(record));
-    }
-
     /// Adds radiance to the roots and ledger records of the lanes in `mask`; `beyond` says by which part of the path. What is not finite is counted, not added.
     #[inline]
     pub(super) fn accumulate(&mut self, mask: Mask8, path: &Path8, found: &Contribution8, beyond: Beyond) {
@@ -415,6 +410,7 @@ impl<'m> Bookkeeping<'m> {
         for i in lanes.lanes() {
             let slot = path.record.lane(i);
             self.guide.note(slot, note, i, self.ledger.radiance(slot), importance.lane(i));
+            self.ledger.mark_noted(slot);
         }
     }
 
@@ -464,7 +460,9 @@ impl<'m> Bookkeeping<'m> {
             self.ledger.close(record, |f| log(training, counters, &f));
         } else {
             self.ledger.close(record, |f| {
-                guide.close(f.slot, f.radiance);
+                if f.noted {
+                    guide.close(f.slot, f.radiance);
+                }
                 log(training, counters, &f);
             });
         }

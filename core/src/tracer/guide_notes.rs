@@ -113,14 +113,6 @@ impl<'m> GuideNotes<'m> {
         self.promise.fill(Promise::default());
     }
 
-    /// A sample begins, without a direction.
-    #[inline(always)]
-    pub(crate) fn open(&mut self, slot: u32) {
-        if let Some(note) = self.notes.get_mut(slot as usize) {
-            (note.leaf, note.importance) = (NO_LEAF, 0.0);
-        }
-    }
-
     /// What the squares of the estimates of vertices with these weights of the paths so far, and error weights of their
     /// pixels, count in the error of the picture. With adaptive sampling pixels with more samples count too much.
     pub(crate) fn importance(&self, beta: Vec3x8, error_weight: Vec3x8) -> F32x8 {
@@ -142,7 +134,7 @@ impl<'m> GuideNotes<'m> {
         }
     }
 
-    /// The sample has ended with this estimate.
+    /// The sample of a note has ended with this estimate.
     #[inline]
     pub(crate) fn close(&mut self, slot: u32, radiance: [f32; 3]) {
         let Some((n, log)) = self.notes.get(slot as usize).zip(self.log.as_mut()) else { return };

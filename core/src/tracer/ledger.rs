@@ -25,8 +25,10 @@ const HAS_LAST: u32 = 1 << 30;
 const WITH_NEE: u32 = 1 << 29;
 /// The sample in `last` had next event estimation.
 const LAST_WITH_NEE: u32 = 1 << 28;
+/// Path guiding has a note on the sample.
+const NOTED: u32 = 1 << 27;
 /// Bits of `open` that count.
-const OPEN: u32 = LAST_WITH_NEE - 1;
+const OPEN: u32 = NOTED - 1;
 
 /// One unfinished sample, 64 bytes.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -55,6 +57,8 @@ struct LedgerRecord {
 pub struct Finished {
     /// Slot that it had.
     pub slot: u32,
+    /// Whether path guiding has a note on it ([`Ledger::mark_noted`]).
+    pub noted: bool,
     /// Where it is logged.
     pub bin: u32,
     /// Estimate, rgb.
@@ -176,6 +180,13 @@ impl<'m> Ledger<'m> {
         self.records.get(slot as usize).map_or([0.0; 3], |r| r.radiance)
     }
 
+    /// Path guiding notes where the bounce went.
+    pub(crate) fn mark_noted(&mut self, slot: u32) {
+        if let Some(r) = self.get(slot) {
+            r.open |= NOTED;
+        }
+    }
+
     /// Part of a sample's estimate is lost to the ledger.
     pub(crate) fn mark_incomplete(&mut self, slot: u32) {
         if let Some(r) = self.get(slot) {
@@ -213,7 +224,8 @@ impl<'m> Ledger<'m> {
                 for c in 0..3 {
                     p.radiance[c] += p.inner[c] * done.radiance[c];
                 }
-                log(Finished { slot, bin: p.bin, radiance: done.radiance, value, cost: done.cost, pair });
+                let noted = done.open & NOTED != 0;
+                log(Finished { slot, noted, bin: p.bin, radiance: done.radiance, value, cost: done.cost, pair });
             }
             slot = done.parent;
         }

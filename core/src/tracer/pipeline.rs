@@ -22,6 +22,7 @@ use super::book::Beyond;
 use super::camera_rays::camera_rays;
 use super::emission;
 use super::first_surfaces::first_surfaces;
+use super::guide_notes::GuideNote8;
 use super::job::Job;
 use super::medium::{Collision8, arrive_in_media, cross_media};
 use super::nee::{sample_lights, shadow_rays};
@@ -70,7 +71,8 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
         Refill::Samples(taken) => {
             let samples = samples(world, ring, book, &taken);
             let light = sample_lights(world, &samples);
-            let scattered = scatter(world, &samples, light.as_ref().map(|l| l.wi));
+            let mut note = GuideNote8::NONE;
+            let scattered = scatter(world, &samples, light.as_ref().map(|l| l.wi), &mut note);
             if let Some(light) = light {
                 let roulette = settings.shadow_roulette;
                 if let Some(mut shadow) = shadow_rays(world, book, &samples, &light, &scattered.nee, roulette) {
@@ -80,7 +82,7 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
                 }
             }
             if W::GUIDING {
-                book.note_directions(&scattered.note, &samples);
+                book.note_directions(&note, &samples);
             }
             book.break_lanes(scattered.broken, &samples.path);
             book.close_lanes::<W>(samples.active.and_not(scattered.rays.active), &samples.path);

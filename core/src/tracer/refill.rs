@@ -56,9 +56,6 @@ pub(crate) fn samples<W: World>(world: &W, ring: &Ring<'_>, book: &mut Bookkeepi
     let guided =
         if W::GUIDING && !world.learned().guides() { book.roots.guided(vertex.path.root, active) } else { active };
     let record = book.open_samples::<W>(vertex.path.record, taken.lanes, with_nee);
-    if W::GUIDING {
-        book.open_directions(record);
-    }
     Samples8 {
         active,
         guided,

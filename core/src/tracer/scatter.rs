@@ -20,8 +20,6 @@ pub(crate) struct Scattered8 {
     pub rays: RayState8,
     /// Lanes whose weight is not finite.
     pub broken: Mask8,
-    /// What path guiding learns from.
-    pub note: GuideNote8,
 }
 
 /// One class's kernel on a packet.
@@ -57,9 +55,15 @@ impl<'s> Visitor<'s> for Kernel<'_, 's> {
     }
 }
 
-/// Samples the BSDFs of a packet, and evaluates them in the world directions `nee`.
+/// Samples the BSDFs of a packet, and evaluates them in the world directions `nee`. `note` becomes what path guiding learns
+/// from, if it asked: a result of its size would be copied for all packets.
 #[inline(always)]
-pub(crate) fn scatter<W: World>(world: &W, samples: &Samples8, nee: Option<Vec3x8>) -> Scattered8 {
+pub(crate) fn scatter<W: World>(
+    world: &W,
+    samples: &Samples8,
+    nee: Option<Vec3x8>,
+    note: &mut GuideNote8,
+) -> Scattered8 {
     if W::GUIDING
         && let Some(guide) = world.learned().guide()
         && let Some(guided) = guided::draw(guide, world, samples)
@@ -68,7 +72,8 @@ pub(crate) fn scatter<W: World>(world: &W, samples: &Samples8, nee: Option<Vec3x
         && let Some(both) = dispatch::<W, _>(kind, GuidedKernel::new(from, samples, nee, &guided))
     {
         let m = guided::mix(&guided, &both, nee);
-        return onwards(world, samples, m.nee, &m.sample, m.wi, m.note);
+        *note = m.note;
+        return onwards(world, samples, m.nee, &m.sample, m.wi);
     }
     let kernel = Kernel { scene: world.scene(), samples, nee, u: samples.key.scattering(world.sampler()) };
     // a class outside the profile cannot be: sessions refuse such scenes
@@ -78,19 +83,12 @@ pub(crate) fn scatter<W: World>(world: &W, samples: &Samples8, nee: Option<Vec3x
         _ => None,
     };
     let (nee, s, frame) = scattered.unwrap_or_else(nothing);
-    onwards(world, samples, nee, &s, frame.to_world(s.wi), GuideNote8::NONE)
+    onwards(world, samples, nee, &s, frame.to_world(s.wi))
 }
 
 /// The rays of the samples `s` in the world directions `wi`.
 #[inline(always)]
-fn onwards<W: World>(
-    world: &W,
-    samples: &Samples8,
-    nee: Eval8,
-    s: &Sample8,
-    wi: Vec3x8,
-    note: GuideNote8,
-) -> Scattered8 {
+fn onwards<W: World>(world: &W, samples: &Samples8, nee: Eval8, s: &Sample8, wi: Vec3x8) -> Scattered8 {
     let v = &samples.vertex;
     let beta = v.beta * s.weight;
     let valid = samples.continues & s.valid;
@@ -99,7 +97,6 @@ fn onwards<W: World>(
     Scattered8 {
         nee,
         broken: valid.and_not(finite),
-        note,
         rays: RayState8 {
             active: valid & beta.any_positive() & finite,
             ray: Ray8::unbounded(geometry::offset(v.p, v.ng, v.error, wi), wi).at(samples.time),

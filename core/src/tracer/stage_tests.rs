@@ -8,6 +8,7 @@ use super::camera_rays::{CameraCursor, camera_rays};
 use super::class::PacketClass;
 use super::emission;
 use super::first_surfaces::FirstSurfaces8;
+use super::guide_notes::GuideNote8;
 use super::ledger::NO_RECORD;
 use super::media_set::MediaSet8;
 use super::nee::{sample_lights, shadow_rays};
@@ -262,7 +263,7 @@ fn shadow_rays_bring_weighted_radiance() {
             s.vertex.nee_probability = F32x8::splat(0.5);
             s.vertex.beta = Vec3x8::splat(1.0, 2.0, 4.0);
             let l = sample_lights(world, &s).expect("light samples");
-            let f = scatter(world, &s, Some(l.wi)).nee;
+            let f = scatter(world, &s, Some(l.wi), &mut { GuideNote8::NONE }).nee;
             let rays = shadow_rays(world, &mut shard.state.book, &s, &l, &f, false).expect("rays");
             let (mut area, mut far) = (0, 0);
             for i in rays.active.lanes() {
@@ -316,7 +317,7 @@ fn scattering_samples_the_bsdf() {
             s.continues = Mask8::from_bits(0b0111_1111);
             s.vertex.beta = Vec3x8::from_fn(|i| if i == 6 { [f32::INFINITY; 3] } else { [2.0; 3] });
             let up = Vec3x8::splat(0.0, 0.0, 1.0);
-            let out = scatter(world, &s, Some(up));
+            let out = scatter(world, &s, Some(up), &mut { GuideNote8::NONE });
             assert_eq!((out.rays.active.bits(), out.broken.bits()), (0b0011_1111, 0b0100_0000));
             for i in 0..6 {
                 let cos = out.rays.ray.d.lane(i)[2];

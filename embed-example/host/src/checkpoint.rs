@@ -12,13 +12,13 @@
 //! the scene, the version of this crate and every setting, and names what differs. The hashes of the file guard against
 //! accidents. Somebody who forges them gets another picture, never a panic: the core checks what it reads from a block.
 
-use crate::drive::schedule::Work;
 use crate::drive::{CacheRecord, IterationRecord};
 use crate::image::{ImageError, write_whole};
 use crate::text;
 use bytemuck::{Pod, Zeroable};
 use croupier::unstable::learn::PictureStatistics;
 use croupier::unstable::scene::blob::content_hash;
+use croupier::unstable::schedule::Work;
 use croupier::{Counters, ErrorEstimate, Settings};
 use std::fs::{self, File};
 use std::io::{self, Read, Write};

@@ -7,16 +7,14 @@ mod forecast;
 mod observe;
 mod part;
 mod result;
-pub mod schedule;
-mod target;
 
 pub use calibrate::Calibration;
+pub use croupier::unstable::schedule::{self, Target};
 pub use error::DriveError;
 pub use forecast::{Forecast, UNKNOWN, forecast};
 pub use observe::{Observer, Progress, Unobserved};
 pub use part::{Part, PartError, Share};
 pub use result::{CacheRecord, GuideRecord, IterationRecord, Rendered};
-pub use target::Target;
 
 use crate::blob::AlignedBytes;
 use crate::checkpoint::{self, Schedule};
@@ -170,7 +168,8 @@ pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
     while !stopped_early {
         let (last, error) = iterations.last().map_or((Work::default(), None), |i| (i.work, Some(i.error)));
         let now = Work { seconds: observer.seconds().unwrap_or_else(|| start.elapsed().as_secs_f64()), ..all };
-        let next = begun.unwrap_or_else(|| schedule::next(share.target, learns(settings), &now, &last, error));
+        let next =
+            begun.unwrap_or_else(|| schedule::next_iteration(share.target, settings.learns(), &now, &last, error));
         // shards of a small picture finish in a single step and never ask the observer
         stopped_early = next > 0 && all.samples > 0 && observer.stop();
         let done = next == 0 || stopped_early;
@@ -191,7 +190,7 @@ pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
             session.begin_iteration(samples);
         }
         let end = match share.target {
-            Target::Error(e) => forecast(e, learns(settings), &iterations),
+            Target::Error(e) => forecast(e, settings.learns(), &iterations),
             _ => None,
         };
         let run = Run { session: &session, observer, start, all, last, samples, error, end, rays: AtomicU64::new(0) };
@@ -208,7 +207,7 @@ pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
         if let Some(seconds) = observer.seconds() {
             record.work.seconds = seconds - now.seconds;
         }
-        record.picture = learns(settings).then(|| session.picture_statistics()[0]);
+        record.picture = settings.learns().then(|| session.picture_statistics()[0]);
         iterations.push(record);
         if stopped_early {
             break;
@@ -329,11 +328,6 @@ impl Saver<'_> {
         self.last = Instant::now();
         self.saved = progress.work.samples;
     }
-}
-
-/// Does anything learn between iterations, so that the cost of a camera sample changes?
-pub fn learns(s: &Settings) -> bool {
-    s.strategy.needs_image() || s.shadow_roulette || s.adaptive
 }
 
 pub(crate) fn save(cache: &Cache<'_>) -> Result<Vec<u8>, CacheError> {

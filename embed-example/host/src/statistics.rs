@@ -125,7 +125,7 @@ impl Statistics {
     pub fn with_forecasts(mut self, r: &Rendered, target: Target, settings: &Settings) -> Self {
         if let Target::Error(e) = target {
             for (n, figures) in self.iterations.iter_mut().enumerate() {
-                figures.forecast = drive::forecast(e, drive::learns(settings), &r.iterations[..=n]);
+                figures.forecast = drive::forecast(e, settings.learns(), &r.iterations[..=n]);
             }
         }
         self

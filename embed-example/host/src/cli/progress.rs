@@ -71,8 +71,8 @@ impl Rendering {
 
 impl Observer for Rendering {
     fn progress(&self, p: &Progress) {
-        let left = self.target.seconds_left(p);
-        self.bar.set_message(message(p, left, self.target.seconds_left_interval(p)));
+        let left = p.seconds_left(self.target);
+        self.bar.set_message(message(p, left, p.seconds_left_interval(self.target)));
         if let Some(left) = left.filter(|left| p.seconds + left > 0.0) {
             self.bar.set_position((p.seconds / (p.seconds + left) * STEPS as f64) as u64);
         }
@@ -116,22 +116,22 @@ mod tests {
     #[test]
     fn time_left() {
         let mut p = Progress { spp: 16.0, rays: 1_000_000, seconds: 10.0, relmse_estimate: Some(0.04), forecast: None };
-        assert_eq!(Target::Spp(64).seconds_left(&p), Some(30.0));
-        assert_eq!(Target::Seconds(12.5).seconds_left(&p), Some(2.5));
-        assert_eq!(Target::Rays(4_000_000).seconds_left(&p), Some(30.0));
-        let left = Target::Error(0.01).seconds_left(&p).unwrap();
+        assert_eq!(p.seconds_left(Target::Spp(64)), Some(30.0));
+        assert_eq!(p.seconds_left(Target::Seconds(12.5)), Some(2.5));
+        assert_eq!(p.seconds_left(Target::Rays(4_000_000)), Some(30.0));
+        let left = p.seconds_left(Target::Error(0.01)).unwrap();
         assert!((left - 30.0).abs() < 1e-9, "{left}");
-        assert_eq!(Target::Error(0.1).seconds_left(&p), Some(0.0));
+        assert_eq!(p.seconds_left(Target::Error(0.1)), Some(0.0));
         assert_eq!(message(&p, Some(185.0), None), "16 spp, relMSE 4.00e-2, 0.1 Mrays/s, 3:05 min left");
-        assert_eq!(Target::Error(0.01).seconds_left_interval(&p), None);
+        assert_eq!(p.seconds_left_interval(Target::Error(0.01)), None);
         p.forecast = Some(Forecast { seconds: 70.0, interval: [55.0, 100.0] });
-        assert_eq!(Target::Error(0.01).seconds_left(&p), Some(60.0));
-        let interval = Target::Error(0.01).seconds_left_interval(&p);
+        assert_eq!(p.seconds_left(Target::Error(0.01)), Some(60.0));
+        let interval = p.seconds_left_interval(Target::Error(0.01));
         assert!(message(&p, Some(60.0), interval).ends_with("1:00 min left (45 s to 1:30 min)"));
-        assert_eq!(Target::Spp(64).seconds_left_interval(&p), None);
+        assert_eq!(p.seconds_left_interval(Target::Spp(64)), None);
         let nothing = Progress::default();
         for target in [Target::Spp(4), Target::Rays(4), Target::Error(0.1)] {
-            assert_eq!(target.seconds_left(&nothing), None);
+            assert_eq!(nothing.seconds_left(target), None);
         }
         assert_eq!(message(&nothing, None, None), "0 spp, relMSE ?, 0.0 Mrays/s, ? left");
         assert_eq!([duration(0.2), duration(59.0), duration(7620.0)], ["1 s", "59 s", "2:07 h"]);

@@ -75,8 +75,8 @@ fn spread(iterations: &[IterationRecord], mean: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::schedule::Work;
     use super::*;
+    use croupier::unstable::schedule::Work;
     use croupier::{Counters, ErrorEstimate};
 
     /// An iteration, and the error of the picture after it with an interval of 10 % to either side.

@@ -1,32 +1,8 @@
 //! Progress and observers of a render.
 
+use super::Target;
 use super::forecast::Forecast;
-use super::target::Target;
 use croupier::Film;
-
-impl Target {
-    /// Seconds left, if work goes on at the speed so far and the squared error falls as 1 / work; by the forecast where
-    /// there is one. `None` while nothing is known.
-    pub fn seconds_left(&self, p: &Progress) -> Option<f64> {
-        let by_part = |part: f64| p.seconds * (1.0 / part - 1.0);
-        let left = match *self {
-            Self::Spp(n) => by_part(p.spp / f64::from(n)),
-            Self::Seconds(s) => s - p.seconds,
-            Self::Rays(n) => by_part(p.rays as f64 / n as f64),
-            Self::Error(e) => match p.forecast {
-                Some(end) => end.seconds - p.seconds,
-                None => by_part(e / p.relmse_estimate?),
-            },
-        };
-        left.is_finite().then(|| left.max(0.0))
-    }
-
-    /// 95 % interval of the seconds left, where there is a forecast: for [`Target::Error`].
-    pub fn seconds_left_interval(&self, p: &Progress) -> Option<[f64; 2]> {
-        let end = p.forecast.filter(|_| matches!(self, Self::Error(_)))?;
-        Some(end.interval.map(|s| (s - p.seconds).max(0.0)))
-    }
-}
 
 /// Progress of a render.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -45,6 +21,30 @@ pub struct Progress {
     /// When the render will end, by the iterations before the one under way: for [`Target::Error`], from 4 samples per
     /// pixel on.
     pub forecast: Option<Forecast>,
+}
+
+impl Progress {
+    /// Seconds left until `target`, if work goes on at the speed so far and the squared error falls as 1 / work; by the
+    /// forecast where there is one. `None` while nothing is known.
+    pub fn seconds_left(&self, target: Target) -> Option<f64> {
+        let by_part = |part: f64| self.seconds * (1.0 / part - 1.0);
+        let left = match target {
+            Target::Spp(n) => by_part(self.spp / f64::from(n)),
+            Target::Seconds(s) => s - self.seconds,
+            Target::Rays(n) => by_part(self.rays as f64 / n as f64),
+            Target::Error(e) => match self.forecast {
+                Some(end) => end.seconds - self.seconds,
+                None => by_part(e / self.relmse_estimate?),
+            },
+        };
+        left.is_finite().then(|| left.max(0.0))
+    }
+
+    /// 95 % interval of the seconds left, where there is a forecast: for [`Target::Error`].
+    pub fn seconds_left_interval(&self, target: Target) -> Option<[f64; 2]> {
+        let end = self.forecast.filter(|_| matches!(target, Target::Error(_)))?;
+        Some(end.interval.map(|s| (s - self.seconds).max(0.0)))
+    }
 }
 
 /// Observer of a render, who may end it. Called from the thread that called [`drive`](super::drive) and from its workers.

@@ -4,7 +4,7 @@
 //! numbers, so that parts draw other random numbers and are independent. The combs that round roulette factors are told
 //! apart by the numbers of iterations. Each part learns from its own samples alone.
 
-use super::target::Target;
+use super::Target;
 use std::fmt;
 use std::str::FromStr;
 

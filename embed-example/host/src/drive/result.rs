@@ -1,10 +1,10 @@
 //! Results of a render: sums of the pixels, and a record of every iteration.
 
 use super::calibrate::Calibration;
-use super::schedule::Work;
 use croupier::unstable::film::{Aov, PixelAov, PixelStats};
 use croupier::unstable::learn::PictureStatistics;
 use croupier::unstable::learn::guiding::GuideUse;
+use croupier::unstable::schedule::Work;
 use croupier::{Counters, ErrorEstimate};
 
 /// One finished iteration.

@@ -275,7 +275,7 @@ fn forecasts(subject: &Subject<'_>, effort: &Effort, record: &SceneRecord) -> Re
     let run = |&(strategy, target, seed): &(&str, f64, u64)| {
         let settings = settings_of(subject, strategy).unwrap_or(subject.settings);
         let rendered = render(subject, settings, seed, Target::Error(target), None)?.rendered;
-        let learns = drive::learns(&settings);
+        let learns = settings.learns();
         let mut passed = 0.0;
         let made = rendered.iterations.iter().enumerate().filter_map(|(n, i)| {
             passed += i.work.seconds;
