@@ -16,10 +16,10 @@ Values of a pass that are not finite count as 0. Where something is wrong the li
 
 The picture is what a user of Mitsuba gets from the scene's mitsuba.xml with the integrator's own roulette: mitsuba.xml
 was made for references, which have none. Path length, size and filter are left as they are. A render is a mean of equal
-passes with seeds of their own, as many as come nearest to the seconds asked for. Their size is such that there are
-PASSES of them, because the multijittered sampler stratifies the samples of one pass. Counted is the CPU time of this
-process, all threads, without loading and compiling: the kernels are compiled, and the speed measured, before the first
-render with a sampler.
+passes with seeds of their own. They are few and large, about PASSES, because the multijittered sampler stratifies the
+samples of one pass. How many need the seconds asked for is measured before the first render with a sampler, which also
+compiles the kernels; all renders with this sampler then have the same samples. Counted is the CPU time of this process,
+all threads, without loading and compiling.
 """
 import json
 import os
@@ -99,8 +99,8 @@ class Renderer:
         self.scene = mi.load_file(str(prepared(scene, folder)))
         self.size = [int(n) for n in self.scene.sensors()[0].film().size()]
         self.picture = folder / "picture.raw"
-        # samples per pixel of a pass, by sampler and seconds
-        self.sizes = {}
+        # samples per pixel of a pass and number of passes, by sampler and seconds
+        self.plans = {}
 
     def ready(self):
         return {"mitsuba": self.mi.__version__, "variant": VARIANT, "threads": THREADS, "size": self.size}
@@ -111,21 +111,23 @@ class Renderer:
         image = self.np.array(self.mi.render(self.scene, sensor=SAMPLERS.index(sampler), spp=spp, seed=seed))
         return image[..., :3], time.process_time() - start
 
-    def pass_size(self, sampler, seconds):
-        """Samples per pixel, from passes that are compiled once and then grow until their time can be measured."""
+    def plan(self, sampler, seconds):
+        """Samples per pixel of a pass and number of passes."""
         key = (sampler, seconds)
-        if key not in self.sizes:
+        if key not in self.plans:
             largest = max(1, LARGEST_PASS // (self.size[0] * self.size[1]))
             spp = 1
-            while True:
-                # the first of two is compiled
-                _, took = [self.timed(sampler, spp, 0) for _ in range(2)][1]
-                if took >= 0.05 * seconds or spp >= largest:
-                    break
+            # passes grow until their time can be measured
+            while (took := self.compiled(sampler, spp)) < 0.05 * seconds and spp < largest:
                 spp = self.rounded(sampler, 2 * spp)
-            self.sizes[key] = self.rounded(sampler, min(max(1, round(spp * seconds / took / PASSES)), largest))
-            self.timed(sampler, self.sizes[key], 0)
-        return self.sizes[key]
+            spp = self.rounded(sampler, min(max(1, round(spp * seconds / took / PASSES)), largest))
+            self.plans[key] = spp, max(1, round(seconds / self.compiled(sampler, spp)))
+        return self.plans[key]
+
+    def compiled(self, sampler, spp):
+        """CPU time of a pass that is not the first of its kind."""
+        self.timed(sampler, spp, 0)
+        return self.timed(sampler, spp, 1)[1]
 
     def rounded(self, sampler, spp):
         """The number of samples that the sampler takes in place of this one: strata fill a rectangle."""
@@ -137,14 +139,13 @@ class Renderer:
         sampler, seconds, seed = request["sampler"], float(request["seconds"]), int(request["seed"])
         if sampler not in SAMPLERS:
             raise Fault(f"no sampler {sampler!r}; there are: {', '.join(SAMPLERS)}")
-        spp = self.pass_size(sampler, seconds)
-        total, passes, used, strange = 0, 0, 0.0, 0
-        # one pass more comes nearer to the time asked for, or not
-        while passes == 0 or used + 0.5 * used / passes < seconds:
-            image, took = self.timed(sampler, spp, (seed + 1) * SEEDS + passes)
+        spp, passes = self.plan(sampler, seconds)
+        total, used, strange = 0, 0.0, 0
+        for i in range(passes):
+            image, took = self.timed(sampler, spp, (seed + 1) * SEEDS + i)
             strange += int(image.size - self.np.isfinite(image).sum())
             total = total + self.np.nan_to_num(image.astype(self.np.float64), posinf=0, neginf=0)
-            passes, used = passes + 1, used + took
+            used += took
         (total / passes).astype("<f4").tofile(self.picture)
         return {"samples": spp * passes, "passes": passes, "core_seconds": used, "not_finite": strange,
                 "picture": str(self.picture)}
