@@ -92,11 +92,13 @@ class Renderer:
         try:
             # the library is looked for when something is computed
             dr.eval(dr.arange(mi.Float, 8) + 1)
-            dr.set_thread_count(THREADS)
         except Exception as e:
             raise Fault(f"{e} (LLVM's shared library is a package such as libllvm19; DRJIT_LIBLLVM_PATH tells where "
                         "it is)") from e
+        # this thread waits for another one where EXR files are read, so with one thread alone for ever
+        dr.set_thread_count(2)
         self.scene = mi.load_file(str(prepared(scene, folder)))
+        dr.set_thread_count(THREADS)
         self.size = [int(n) for n in self.scene.sensors()[0].film().size()]
         self.picture = folder / "picture.raw"
         # samples per pixel of a pass and number of passes, by sampler and seconds
