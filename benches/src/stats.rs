@@ -73,8 +73,8 @@ pub fn jackknife(without: &[f64]) -> Option<f64> {
     Some(student(n - 1.0) * ((n - 1.0) / n * squares).sqrt())
 }
 
-/// What 97.5 % of Student's distribution are below, within 4 % of it from two degrees of freedom on: the normal quantile
-/// and its expansion (Abramowitz and Stegun 26.7.5).
+/// What 97.5 % of Student's distribution are below, within 4 % of it from two degrees of freedom on: the normal
+/// quantile and its expansion (Abramowitz and Stegun 26.7.5).
 fn student(degrees: f64) -> f64 {
     const TERMS: [f64; 4] = [1.96, 2.372, 2.823, 2.556];
     TERMS.iter().rev().fold(0.0, |sum, term| sum / degrees + term)

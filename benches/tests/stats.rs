@@ -20,8 +20,8 @@ fn intervals_of_the_median_are_those_of_the_sign_test() {
     }
 }
 
-/// Of a mean, the jackknife gives its standard error exactly; quantiles of t from tables. Killed by: the wrong factor of
-/// the squares, the normal quantile in place of Student's, an expansion with a wrong term.
+/// Of a mean, the jackknife gives its standard error exactly; quantiles of t from tables. Killed by: the wrong factor
+/// of the squares, the normal quantile in place of Student's, an expansion with a wrong term.
 #[test]
 fn the_jackknife_of_a_mean_is_its_standard_error() {
     for (n, t) in [(3, 4.303), (4, 3.182), (6, 2.571), (11, 2.228), (31, 2.042)] {

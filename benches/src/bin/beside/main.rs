@@ -2,20 +2,20 @@
 //!
 //! Sides are strategies of this library and the two samplers of Mitsuba's path tracer, with its own roulette
 //! (`benches/mitsuba/render.py`, in a process of its own). Each renders every scene with the same number of seeds for
-//! the same core-seconds: the CPU time of one thread, without loading, baking and compiling. For a seed all sides render
-//! in turn, in an order that is rotated from seed to seed, so that what else the machine does hits all of them.
+//! the same core-seconds: the CPU time of one thread, without loading, baking and compiling. For a seed all sides
+//! render in turn, in an order that is rotated from seed to seed, so that what else the machine does hits all of them.
 //!
 //! The error needs no reference, whose noise would be in it: it is the variance of a pixel between the pictures of a
-//! side, over the square of its mean (plus 0.01), which is that over all pictures of all sides ([`Measured::of`]). It is
-//! the mean over channels and pixels without the worst ones of the side itself; how many are left out matters where a
-//! few bright samples carry the error, so there is a table for each of three shares. The figure is this error x the
-//! mean core-seconds, and does not depend on where a render ended as long as its error falls as 1 / cost. Ratios are the
-//! figure of the better one of Mitsuba's samplers over that of a strategy, with the interval of the jackknife over the
-//! seeds ([`gains`]); above 1 the strategy is better.
+//! side, over the square of its mean (plus 0.01), which is that over all pictures of all sides ([`Measured::of`]). It
+//! is the mean over channels and pixels without the worst ones of the side itself; how many are left out matters where
+//! a few bright samples carry the error, so there is a table for each of three shares. The figure is this error x the
+//! mean core-seconds, and does not depend on where a render ended as long as its error falls as 1 / cost. Ratios are
+//! the figure of the better one of Mitsuba's samplers over that of a strategy, with the interval of the jackknife over
+//! the seeds ([`gains`]); above 1 the strategy is better.
 //!
 //! Errors mean nothing if the sides render different pictures. A table compares the mean picture of each with that of
-//! the other renderer, in blocks of 16x16 pixels: their mean relative difference, and z-scores as in `references`, which
-//! has notes about where Mitsuba's pictures are known to be wrong.
+//! the other renderer, in blocks of 16x16 pixels: their mean relative difference, and z-scores as in `references`,
+//! which has notes about where Mitsuba's pictures are known to be wrong.
 //!
 //! `--write` puts a run of all scenes of the folder into `benches/results/beside.md`.
 

@@ -137,8 +137,9 @@ pub(crate) struct Agreement {
 #[derive(Clone, Copy)]
 pub(crate) struct LogRatio(pub(crate) f64, pub(crate) Option<f64>);
 
-/// How much better each of `ours` is than the best of `others`, by [`TRIMS`]. Intervals are those of the jackknife: a seed is left out of all sides at
-/// once, since its renders shared the state of the machine, and the best of the others is chosen anew.
+/// How much better each of `ours` is than the best of `others`, by [`TRIMS`]. Intervals are those of the jackknife: a
+/// seed is left out of all sides at once, since its renders shared the state of the machine, and the best of the others
+/// is chosen anew.
 pub(crate) fn gains(
     sides: &[Side],
     all: &Measured,
