@@ -52,6 +52,8 @@ pub struct Run {
     pub snapshots: Vec<Snapshot>,
     /// The last of them.
     pub end: Snapshot,
+    /// The picture.
+    pub picture: Rgb,
 }
 
 impl Run {
@@ -86,10 +88,10 @@ pub fn render(
     let pixel_estimate = variant.truth().then_some(&*subject.image.pixels);
     let options = Options { threads: 1, pixel_estimate, ..Options::new(variant.apply(settings), target) };
     drive_scene(scene, &options, &watch)?;
-    let snapshots = watch.state.into_inner().unwrap_or_else(PoisonError::into_inner).snapshots;
-    let snapshots = snapshots.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let end = *snapshots.last().ok_or("a render without an iteration")?;
-    Ok(Run { seed, pixels: subject.image.pixels.len(), snapshots, end })
+    let state = watch.state.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let snapshots = state.snapshots.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let (end, picture) = snapshots.last().copied().zip(state.picture).ok_or("a render without an iteration")?;
+    Ok(Run { seed, pixels: subject.image.pixels.len(), snapshots, end, picture })
 }
 
 /// Takes the snapshots.
@@ -108,21 +110,26 @@ struct State {
     /// CPU time of the calling thread that went into snapshots.
     paused: f64,
     snapshots: Vec<Result<Snapshot, CompareError>>,
+    /// The newest picture.
+    picture: Option<Rgb>,
 }
 
 impl Watch<'_> {
-    fn snapshot(&self, film: &Film<'_>, core_seconds: f64, wall_seconds: f64) -> Result<Snapshot, CompareError> {
-        let [width, height] = film.size().map(|s| s as usize);
-        let pixels = film.pixels().map(|p| p.mean().map(|x| x as f32)).collect();
-        let image = Rgb { width, height, pixels };
+    fn snapshot(
+        &self,
+        film: &Film<'_>,
+        image: &Rgb,
+        core_seconds: f64,
+        wall_seconds: f64,
+    ) -> Result<Snapshot, CompareError> {
         let sum = |f: fn(PixelStats) -> u64| film.pixels().map(f).sum::<u64>();
         Ok(Snapshot {
             core_seconds,
             wall_seconds,
             samples: sum(|p| p.samples),
             rays: sum(|p| p.rays),
-            error: relmse(&image, &self.subject.image, false)?.value,
-            robust: self.subject.error_beyond_noise(&image, self.outliers)?,
+            error: relmse(image, &self.subject.image, false)?.value,
+            robust: self.subject.error_beyond_noise(image, self.outliers)?,
         })
     }
 }
@@ -140,8 +147,12 @@ impl Observer for Watch<'_> {
         let cpu = self.seconds();
         let now = cpu_seconds();
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let snapshot = self.snapshot(film, cpu.unwrap_or(seconds), seconds);
+        let [width, height] = film.size().map(|s| s as usize);
+        let pixels = film.pixels().map(|p| p.mean().map(|x| x as f32)).collect();
+        let image = Rgb { width, height, pixels };
+        let snapshot = self.snapshot(film, &image, cpu.unwrap_or(seconds), seconds);
         state.snapshots.push(snapshot);
+        state.picture = Some(image);
         state.paused += cpu_seconds().zip(now).map_or(0.0, |(b, a)| b - a);
     }
 

@@ -61,6 +61,25 @@ pub fn geometric_mean(values: &[f64]) -> f64 {
     (values.iter().map(|x| x.ln()).sum::<f64>() / values.len() as f64).exp()
 }
 
+/// Half the width of the 95 % interval of a figure, from the figures with each of the seeds left out in turn (the
+/// jackknife, with Student's t for as few as there are). `None` of fewer than three, or if one is not finite.
+pub fn jackknife(without: &[f64]) -> Option<f64> {
+    let n = without.len() as f64;
+    if without.len() < 3 || without.iter().any(|x| !x.is_finite()) {
+        return None;
+    }
+    let mean = without.iter().sum::<f64>() / n;
+    let squares = without.iter().map(|x| (x - mean).powi(2)).sum::<f64>();
+    Some(student(n - 1.0) * ((n - 1.0) / n * squares).sqrt())
+}
+
+/// What 97.5 % of Student's distribution are below, within 4 % of it from two degrees of freedom on: the normal
+/// quantile and its expansion (Abramowitz and Stegun 26.7.5).
+fn student(degrees: f64) -> f64 {
+    const TERMS: [f64; 4] = [1.96, 2.372, 2.823, 2.556];
+    TERMS.iter().rev().fold(0.0, |sum, term| sum / degrees + term)
+}
+
 /// When an error first comes down to `level`, from points (time, error) in the order of time: a line in logarithms
 /// between the two points around it. A curve that starts below gives its first time; one that ends above, `None`.
 pub fn time_to(curve: &[(f64, f64)], level: f64) -> Option<f64> {

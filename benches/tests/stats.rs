@@ -20,6 +20,23 @@ fn intervals_of_the_median_are_those_of_the_sign_test() {
     }
 }
 
+/// Of a mean, the jackknife gives its standard error exactly; quantiles of t from tables. Killed by: the wrong factor
+/// of the squares, the normal quantile in place of Student's, an expansion with a wrong term.
+#[test]
+fn the_jackknife_of_a_mean_is_its_standard_error() {
+    for (n, t) in [(3, 4.303), (4, 3.182), (6, 2.571), (11, 2.228), (31, 2.042)] {
+        let values: Vec<f64> = (0..n).map(|i| f64::from(i * i % 7)).collect();
+        let (count, sum) = (f64::from(n), values.iter().sum::<f64>());
+        let without: Vec<f64> = values.iter().map(|x| (sum - x) / (count - 1.0)).collect();
+        let squares = values.iter().map(|x| (x - sum / count).powi(2)).sum::<f64>();
+        let expected = t * (squares / (count - 1.0) / count).sqrt();
+        let found = jackknife(&without).unwrap();
+        assert!((found / expected - 1.0).abs() < if n < 6 { 0.04 } else { 0.002 }, "{n}: {found}, {expected}");
+    }
+    assert_eq!(jackknife(&[1.0, 2.0]), None);
+    assert_eq!(jackknife(&[1.0, 2.0, f64::NAN]), None);
+}
+
 /// Error 2 / t. Killed by: interpolation without logarithms, the last crossing for the first.
 #[test]
 fn times_are_interpolated_in_logarithms() {
