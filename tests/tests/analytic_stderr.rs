@@ -198,7 +198,7 @@ fn share(pixels: &[PixelStats], [w, h]: [usize; 2], i: usize) -> f64 {
         let w = (contrast / (contrast + v[c].max(noise))).max(1.0 - v[c] / (m[c] - mean).powi(2));
         let e = mean + w * (m[c] - mean);
         let of_others = u * u * noise / window + (1.0 - u).powi(2) * block_noise / block;
-        let square = e * e - w * w * v[c] - (1.0 - w).powi(2) * of_others;
+        let square = e * e - 0.9 * w * w * v[c] - (1.0 - w).powi(2) * of_others;
         v[c] / (square.max(0.0) + REL_MSE_EPSILON)
     };
     (channel(0) + channel(1) + channel(2)) / 3.0

@@ -74,9 +74,32 @@ pub const REL_MSE_EPSILON: f64 = 1e-2;
 /// Part of a variance that is taken off a squared mean to estimate the squared expectation. All of it would be unbiased,
 /// but leaves next to nothing to divide by where a pixel has found its light once, and a few such pixels would make up
 /// the whole sum.
-const TAKEN_OFF: f64 = 0.9;
+pub(super) const TAKEN_OFF: f64 = 0.9;
 
 /// Denominator of relMSE, of a mean and its variance.
 pub(super) fn relative_denominator(mean: f64, variance: f64) -> f64 {
     (mean * mean - TAKEN_OFF * variance).max(0.0) + REL_MSE_EPSILON
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Killed by: an interval of what is not resolved, a factor of a picture that does not tell it.
+    #[test]
+    fn what_is_not_resolved_has_no_interval() {
+        let e =
+            ErrorEstimate { low: 1.0, high: 3.0, independence: 0.5, effective_pixels: RESOLVED, ..Default::default() };
+        assert_eq!((e.interval(), e.pixel_variance_factor()), (Some([1.0, 3.0]), 0.5));
+        let few = ErrorEstimate { effective_pixels: RESOLVED - 1.0, ..e };
+        assert_eq!((few.interval(), few.pixel_variance_factor()), (None, 1.0));
+        assert_eq!(ErrorEstimate::default().pixel_variance_factor(), 1.0);
+    }
+
+    /// Killed by: all of the variance taken off where a pixel has found its light once.
+    #[test]
+    fn one_hit_leaves_something_to_divide_by() {
+        assert!((relative_denominator(100.0, 1e4) - 1000.01).abs() < 1e-9);
+        assert_eq!(relative_denominator(1.0, 4.0), REL_MSE_EPSILON);
+    }
 }
