@@ -56,7 +56,7 @@ const WITHOUT: (&str, f64) = ("instructions-before-media", 0.5);
 /// shadow rays, which they blocked before.
 const CHANGED: &[&str] = &["kitchen"];
 const SCENES: [&str; 3] = ["built-in", "cbox", "kitchen"];
-/// `ears+shadow` is what the program calls `ears`.
+/// `ears+shadow` is what the program calls `ears`, but for path guiding.
 const STRATEGIES: [&str; 3] = ["classic", "ears", "ears+shadow"];
 /// Samples per pixel of the iterations: learned factors are in use from the second on.
 const ITERATIONS: [u32; 4] = [1, 1, 2, 4];

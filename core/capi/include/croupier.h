@@ -911,7 +911,7 @@ typedef struct croupier_counters {
 typedef struct croupier_pixel {
   // Mean radiance.
   float mean[3];
-  // Standard error of the mean.
+  // Standard error of the mean, right on average over the picture from the second iteration on.
   float standard_error[3];
   // Camera samples; 0 before the end of the first iteration.
   uint32_t samples;
@@ -924,14 +924,14 @@ typedef struct croupier_error_estimate {
   // sizeof(croupier_error_estimate), set by the program.
   uint32_t struct_size;
   // 1 if the samples tell the error. 0 if few pixels cause most of it: more of their kind are probably not found yet,
-  // rel_mse is a lower bound then, and the interval means nothing.
+  // or one that is found counts for too much. There is no interval then: the error is low at least.
   uint32_t resolved;
   // Mean over pixels and channels of variance / (expectation^2 + 0.01), without the worst 0.01 % of the pixels, times
   // independence. The expectation is estimated from the pixel and those around it.
   double rel_mse;
   // Lower end of its 95 % confidence interval.
   double low;
-  // Upper end.
+  // Upper end; infinite if the error is not resolved.
   double high;
   // The same mean over all pixels.
   double rel_mse_all;

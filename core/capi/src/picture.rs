@@ -9,8 +9,8 @@ use crate::session::{croupier_session, session_at};
 use crate::shard::{croupier_shard, shard_at};
 use crate::status::croupier_status::{self, *};
 use bytemuck::{Pod, Zeroable};
-use croupier::Counters;
-use croupier::unstable::film::{Aov, PixelStats};
+use croupier::unstable::film::Aov;
+use croupier::{Counters, Film};
 
 /// A pixel of the picture so far. Linear Rec. 709.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -18,7 +18,7 @@ use croupier::unstable::film::{Aov, PixelStats};
 pub struct croupier_pixel {
     /// Mean radiance.
     pub mean: [f32; 3],
-    /// Standard error of the mean.
+    /// Standard error of the mean, right on average over the picture from the second iteration on.
     pub standard_error: [f32; 3],
     /// Camera samples; 0 before the end of the first iteration.
     pub samples: u32,
@@ -27,30 +27,16 @@ pub struct croupier_pixel {
 }
 
 impl croupier_pixel {
-    fn from_core(p: &PixelStats) -> Self {
+    fn of(film: &Film<'_>, index: usize) -> Self {
         let clamped = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
+        let p = film.pixel(index);
         Self {
             mean: p.mean().map(|x| x as f32),
-            standard_error: p.variance_of_mean().map(square_root),
+            standard_error: film.standard_error(index).map(|x| x as f32),
             samples: clamped(p.samples),
             rays: clamped(p.rays),
         }
     }
-}
-
-/// Square root of a number that is not negative, to the precision of the result.
-fn square_root(x: f64) -> f32 {
-    use croupier::unstable::simd::F32x8;
-    // the range of `f32` is smaller: factors that are exact, and their square roots
-    const FAR: f64 = (1u64 << 60) as f64;
-    const BACK: f32 = (1u32 << 30) as f32;
-    let (scale, back) = match x {
-        x if x < 1e-20 => (FAR, 1.0 / BACK),
-        x if x > 1e20 => (1.0 / FAR, BACK),
-        _ => (1.0, 1.0),
-    };
-    let root = F32x8::splat((x * scale) as f32).safe_sqrt().lane(0);
-    root * back
 }
 
 /// Auxiliary values of pixels. Where nothing else is said, planes hold means over the camera samples, those that missed
@@ -109,14 +95,14 @@ pub struct croupier_error_estimate {
     /// sizeof(croupier_error_estimate), set by the program.
     pub struct_size: u32,
     /// 1 if the samples tell the error. 0 if few pixels cause most of it: more of their kind are probably not found yet,
-    /// rel_mse is a lower bound then, and the interval means nothing.
+    /// or one that is found counts for too much. There is no interval then: the error is low at least.
     pub resolved: u32,
     /// Mean over pixels and channels of variance / (expectation^2 + 0.01), without the worst 0.01 % of the pixels, times
     /// independence. The expectation is estimated from the pixel and those around it.
     pub rel_mse: f64,
     /// Lower end of its 95 % confidence interval.
     pub low: f64,
-    /// Upper end.
+    /// Upper end; infinite if the error is not resolved.
     pub high: f64,
     /// The same mean over all pixels.
     pub rel_mse_all: f64,
@@ -287,7 +273,7 @@ pub unsafe extern "C" fn croupier_session_pixels(
             return Err(Fault::new(CROUPIER_RANGE, "first pixel").at(first as u64));
         }
         for (i, pixel) in to.iter_mut().enumerate() {
-            *pixel = croupier_pixel::from_core(&film.pixel(first.saturating_add(i)));
+            *pixel = croupier_pixel::of(film, first.saturating_add(i));
         }
         Ok(())
     })
@@ -366,8 +352,8 @@ pub unsafe extern "C" fn croupier_session_error_estimate(
         let shown = croupier_error_estimate {
             resolved: e.is_resolved().into(),
             rel_mse: e.rel_mse,
-            low: e.low,
-            high: e.high,
+            low: if e.is_resolved() { e.low } else { e.at_least },
+            high: if e.is_resolved() { e.high } else { f64::INFINITY },
             rel_mse_all: e.rel_mse_all,
             independence: e.independence,
             ..croupier_error_estimate::empty()

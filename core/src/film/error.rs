@@ -16,10 +16,12 @@ pub struct ErrorEstimate {
     /// Mean over pixels and channels of variance / (expectation^2 + 0.01), without the worst 0.01 % of pixels, times
     /// `independence`. The expectation is estimated from the pixel and those around it.
     pub rel_mse: f64,
-    /// Lower end of the 95 % confidence interval of `rel_mse`.
+    /// Lower end of the 95 % confidence interval of `rel_mse`; see [`Self::interval`].
     pub low: f64,
     /// Upper end of that interval.
     pub high: f64,
+    /// What the true relMSE is at least, whatever few pixels cause the rest: each counts with less than a quarter.
+    pub at_least: f64,
     /// Mean as of `rel_mse`, over all pixels.
     pub rel_mse_all: f64,
     /// Variance of the pixels over that of independent samples, measured between iterations; 1 while there are too few.
@@ -33,11 +35,23 @@ pub struct ErrorEstimate {
 const RESOLVED: f64 = 64.0;
 
 impl ErrorEstimate {
-    /// Whether the samples tell the error. If few pixels cause most of what is found (heavy tails), more of their kind are
-    /// probably not found yet: `rel_mse` is a lower bound then, and the interval means nothing. Pictures of
-    /// less than some hundred pixels are never resolved.
+    /// Whether the samples tell the error: 64 effective pixels or more. If fewer cause most of what is found (heavy tails),
+    /// more of their kind are probably not found yet, or one that is found counts for more than it is: then the error is
+    /// `at_least` so large, and `low` and `high` mean nothing. Pictures of less than some hundred pixels are never resolved.
     pub fn is_resolved(&self) -> bool {
         self.effective_pixels >= RESOLVED
+    }
+
+    /// 95 % confidence interval of `rel_mse`; `None` where the samples do not tell it.
+    pub fn interval(&self) -> Option<[f64; 2]> {
+        self.is_resolved().then_some([self.low, self.high])
+    }
+
+    /// What squared standard errors of pixels ([`PixelStats::variance_of_mean`](crate::unstable::film::PixelStats)) are to
+    /// be multiplied by so that they are right on average over the picture, with Sobol' points, roulette and splitting
+    /// too: `independence`, or 1 while the samples do not tell it.
+    pub fn pixel_variance_factor(&self) -> f64 {
+        if self.is_resolved() && self.independence > 0.0 { self.independence } else { 1.0 }
     }
 
     /// Figure of merit of a render that took `work`, in any unit: 1 / (relMSE x work). It is about the same however long
@@ -57,7 +71,35 @@ impl ErrorEstimate {
 /// Constant in the denominator of relMSE, added to the squared mean so that black pixels do not dominate.
 pub const REL_MSE_EPSILON: f64 = 1e-2;
 
+/// Part of a variance that is taken off a squared mean to estimate the squared expectation. All of it would be unbiased,
+/// but leaves next to nothing to divide by where a pixel has found its light once, and a few such pixels would make up
+/// the whole sum.
+pub(super) const TAKEN_OFF: f64 = 0.9;
+
 /// Denominator of relMSE, of a mean and its variance.
 pub(super) fn relative_denominator(mean: f64, variance: f64) -> f64 {
-    (mean * mean - variance).max(0.0) + REL_MSE_EPSILON
+    (mean * mean - TAKEN_OFF * variance).max(0.0) + REL_MSE_EPSILON
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Killed by: an interval of what is not resolved, a factor of a picture that does not tell it.
+    #[test]
+    fn what_is_not_resolved_has_no_interval() {
+        let e =
+            ErrorEstimate { low: 1.0, high: 3.0, independence: 0.5, effective_pixels: RESOLVED, ..Default::default() };
+        assert_eq!((e.interval(), e.pixel_variance_factor()), (Some([1.0, 3.0]), 0.5));
+        let few = ErrorEstimate { effective_pixels: RESOLVED - 1.0, ..e };
+        assert_eq!((few.interval(), few.pixel_variance_factor()), (None, 1.0));
+        assert_eq!(ErrorEstimate::default().pixel_variance_factor(), 1.0);
+    }
+
+    /// Killed by: all of the variance taken off where a pixel has found its light once.
+    #[test]
+    fn one_hit_leaves_something_to_divide_by() {
+        assert!((relative_denominator(100.0, 1e4) - 1000.01).abs() < 1e-9);
+        assert_eq!(relative_denominator(1.0, 4.0), REL_MSE_EPSILON);
+    }
 }

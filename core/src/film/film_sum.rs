@@ -54,7 +54,7 @@ impl<'m> FilmSum<'m> {
     pub fn finish(&mut self) -> &Film<'m> {
         let (film, digits) = (&mut self.film, &mut *self.digits);
         let mut selection = Selection::default();
-        selection.begin(digits);
+        film.begin_errors(&mut selection, digits);
         loop {
             film.show_errors(0, usize::MAX, &mut selection, digits);
             if selection.end_visit(Film::outliers, digits) {

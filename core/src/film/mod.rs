@@ -39,7 +39,7 @@ use aov::AovPlanes;
 use bytemuck::{Pod, Zeroable};
 use independence::{Differences, Independence};
 use pixel::PixelWeights;
-use surroundings::{Block, SIDE, UNSURE_SHARE};
+use surroundings::{SIDE, Span, UNSURE_SHARE, relative_errors};
 
 /// What a film holds of each pixel besides its mean and error.
 #[derive(Clone, Copy, Debug)]
@@ -182,6 +182,13 @@ impl<'m> Film<'m> {
         (0..n).map(|i| self.aovs.sums(i, self.samples(i)))
     }
 
+    /// Standard error of a pixel's mean per channel, right on average over the picture: that of independent samples, times
+    /// the root of [`ErrorEstimate::pixel_variance_factor`]. See [`Self::pixel`] for pixels without samples.
+    pub fn standard_error(&self, index: usize) -> [f64; 3] {
+        let factor = self.scalars.error.pixel_variance_factor();
+        self.pixel(index).variance_of_mean().map(|v| (factor * v).sqrt_newton())
+    }
+
     /// Adds the sums of an iteration to a pixel, each sample with weight `w` if samples have weights.
     #[inline]
     pub(crate) fn merge(&mut self, pixel: usize, sums: &PixelSums, rays: u32, aov: &[f32], w: f64) {
@@ -191,19 +198,21 @@ impl<'m> Film<'m> {
         if fresh {
             *p = PixelSums::default();
         }
-        match self.weights.get_mut(pixel) {
+        let all = match self.weights.get_mut(pixel) {
             Some(weights) => {
                 if fresh {
                     *weights = PixelWeights::default();
                 }
-                self.scalars.differences.add(&before, sums, w);
                 p.merge_weighted(weights, sums, w);
+                p.stats(Some(weights), 0)
             }
             None => {
-                self.scalars.differences.add(&before, sums, 1.0);
                 p.merge(sums);
+                p.stats(None, 0)
             }
-        }
+        };
+        let w_alike = if self.weights.is_empty() { 1.0 } else { w };
+        self.scalars.differences.add(&before, sums, w_alike, &all);
         if let Some(r) = self.rays.get_mut(pixel) {
             *r = if fresh { rays } else { r.saturating_add(rays) };
         }
@@ -245,31 +254,35 @@ impl<'m> Film<'m> {
         u64::from(columns) * u64::from(rows)
     }
 
-    /// Column, row and index of the pixels of a block.
-    fn block(&self, block: u64) -> impl Iterator<Item = ([u32; 2], usize)> + use<> {
-        let (size, grid) = (self.size, self.block_grid());
+    /// Columns and rows of a block.
+    fn block(&self, block: u64) -> [Span; 2] {
+        let grid = self.block_grid();
         let columns = u64::from(grid[0]);
         let at = [block % columns, block / columns];
-        let [x, y]: [core::ops::Range<u32>; 2] = core::array::from_fn(|k| {
-            let edge = |i: u64| (i * u64::from(size[k]) / u64::from(grid[k])) as u32;
-            edge(at[k])..edge(at[k] + 1)
-        });
-        y.flat_map(move |row| {
-            x.clone().map(move |column| ([column, row], row as usize * size[0] as usize + column as usize))
+        core::array::from_fn(|k| {
+            let size = self.size[k];
+            let edge = |i: u64| (i * u64::from(size) / u64::from(grid[k])) as u32;
+            Span { from: edge(at[k]), to: edge(at[k] + 1), size }
         })
+    }
+
+    /// Begins a selection among the errors of the pixels.
+    pub(crate) fn begin_errors(&self, s: &mut Selection, counters: &mut [u32]) {
+        match Self::outliers(self.pixels.len() as u64) {
+            0 => s.begin_with_all(counters),
+            _ => s.begin(counters),
+        }
     }
 
     /// Shows the errors of pixels from block `at` on to the selection, some `limit` pixels. Blocks and pixels shown.
     pub(crate) fn show_errors(&self, at: u64, limit: usize, s: &mut Selection, counters: &mut [u32]) -> [u64; 2] {
         let (mut blocks, mut pixels) = (0, 0);
         while pixels < limit as u64 && at + blocks < self.blocks() {
-            let own = || self.block(at + blocks).map(|(place, i)| (place, self.pixel(i)));
-            let block = Block::of(own());
-            for (place, p) in own() {
-                let e = block.relative_error(place, &p);
+            let pixel = |x: u32, y: u32| self.pixel(y as usize * self.size[0] as usize + x as usize);
+            relative_errors(self.block(at + blocks), pixel, |e| {
                 s.show_with(e.error, [e.other, e.unsure], counters);
                 pixels += 1;
-            }
+            });
             blocks += 1;
         }
         [blocks, pixels]
@@ -295,6 +308,7 @@ impl<'m> Film<'m> {
             rel_mse: ratio * mean,
             low: (ratio * mean - half).max(0.0),
             high: ratio * mean + half,
+            at_least: ratio * (mean - t.sum_beside[1] / m).max(0.0),
             rel_mse_all: ratio * (t.sum + t.rest) / self.pixels.len().max(1) as f64,
             independence: ratio,
             effective_pixels: if t.sum_sqr > 0.0 { t.sum * t.sum / t.sum_sqr } else { m },

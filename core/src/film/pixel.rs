@@ -151,9 +151,10 @@ impl PixelStats {
         self.sum.map(|s| s / w)
     }
 
-    /// Squared standard error of the mean per channel, for independent samples. With roulette or splitting that is an
-    /// upper bound: one comb rounds a packet, and the roundings of its samples cancel (standard errors of up to twice
-    /// the true ones were measured). One sample has no measurable variance: its square is used.
+    /// Squared standard error of the mean per channel, for independent samples. With Sobol' points, roulette or splitting
+    /// that is an upper bound: one comb rounds a packet, and the roundings of its samples cancel (standard errors of up
+    /// to twice the true ones were measured). [`Film::standard_error`](super::Film::standard_error) corrects it. One sample
+    /// has no measurable variance: its square is used.
     pub fn variance_of_mean(&self) -> [f64; 3] {
         let (w, w2, m) = (self.weight, self.weight_sqr, self.mean());
         // w^2 - w2 is w^2 (1 - 1 / n) for n samples of equal weight

@@ -49,6 +49,12 @@ impl Selection {
         counters.fill(0);
     }
 
+    /// Begins with the last visit, which leaves nothing out: for those who know that before.
+    pub(crate) fn begin_with_all(&mut self, counters: &mut [u32]) {
+        self.begin(counters);
+        (self.limit, self.visit) = (f32::INFINITY, SHIFTS.len() as u32);
+    }
+
     /// Takes the next value of the visit that is under way.
     #[inline(always)]
     pub(crate) fn show(&mut self, x: f64, counters: &mut [u32]) {
@@ -135,6 +141,16 @@ mod tests {
         assert_eq!(of(3, &[9.0, 3.0, 3.0, 3.0, 1.0]), (2, 4.0, 15.0));
         assert_eq!(of(1, &[0.0; 4]), (3, 0.0, 0.0));
         assert_eq!(of(9, &[2.0, 1.0]), (0, 0.0, 3.0));
+    }
+
+    /// One visit sums what several that leave nothing out do. Killed by: a limit of 0.
+    #[test]
+    fn all_values_need_one_visit() {
+        let (mut s, mut counters) = (Selection::default(), [7; DIGITS]);
+        s.begin_with_all(&mut counters);
+        [1.0, 3.0, 2.0].iter().for_each(|x| s.show(*x, &mut counters));
+        assert!(s.end_visit(|_| 1, &mut counters));
+        assert_eq!((s.count, s.sum, s.sum_sqr, s.rest), (3, 6.0, 14.0, 0.0));
     }
 
     /// Values that differ in any digit, against sorting. Killed by: a digit that is masked or shifted wrongly, a limit

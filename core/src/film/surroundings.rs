@@ -2,31 +2,41 @@
 //!
 //! The pixel's own mean will not do. A firefly raises mean and variance together and hides its own error (states 0.2 of it
 //! in a pool lit through water); a pixel that has found its light once of many times has a variance as large as its squared
-//! mean, so that next to nothing is left to divide by (390 times the error at the edges of small lights). So the picture is
-//! cut into blocks of 16 to 31 pixels a side, and a pixel takes what the others of its block say, as far as it does not
-//! know better:
+//! mean, so that next to nothing is left to divide by (390 times the error at the edges of small lights). So a pixel takes
+//! what others say, as far as it does not know better: those of the window of 5x5 pixels around it, and the window in
+//! turn what its block says, one of 16 to 31 pixels a side into which the picture is cut:
 //!
 //! ```text
-//! e = mu + w (m - mu)        m, v: mean of the pixel and its variance; mu: mean of the others
-//! w = max(c / (c + max(v, mean of the others' variances)), 1 - k v / (m - mu)^2)
-//! D = max(e^2 - Var e, 0) + 0.01
+//! mu = b + u (l - b)         l, b: means of the others in the window and in the block
+//! u = c_b / (c_b + max(noise of the others in window, in block) / pixels of the window)
+//! e = mu + w (m - mu)        m, v: mean of the pixel and its variance
+//! w = max(c_l / (c_l + max(v, noise in the window)), 1 - k v / (m - mu)^2)
+//! D = max(e^2 - Var e, 0) + 0.01        with 0.9 of the pixel's own part of Var e
 //! ```
 //!
-//! c is the variance among the others beyond their noise: where the block has contrast, pixels are what their samples say
-//! (Lee, "Digital image enhancement and noise filtering by use of local statistics", 1980). The second term keeps pixels
-//! that stand out beyond their own noise (the positive part of James and Stein, "Estimation with quadratic loss", 1961). The
-//! others are those of other parity in column or row: the pixel is in none of their sums, and nothing is subtracted
+//! Noise is the mean of the others' variances, c the variance among them beyond it: where there is contrast, pixels are what
+//! their samples say (Lee, "Digital image enhancement and noise filtering by use of local statistics", 1980). Blocks alone
+//! stated half the error where a bright window lies in them, which lends its contrast to all their pixels; windows alone
+//! state three times the error where most pixels have found nothing yet. The second term of w keeps pixels that stand out
+//! beyond their own noise (the positive part of James and Stein, "Estimation with quadratic loss", 1961). The others in the
+//! block are those of other parity in column or row: the pixel is in none of the sums, and nothing is subtracted
 //! (NUMERICS STA-4). k = 1 is the estimate; k = [`DOUBT`] says how much depends on this choice, which widens the interval.
 //!
 //! So does what a pixel's own noise makes of its denominator: where q = v / D is large, at the edges of lamps, in
 //! caustics, D is hardly known. Each pixel adds q^2 / (q + [`UNSURE`]), all of q where it is large, next to nothing where
 //! it is small, and [`UNSURE_SHARE`] of the sum counts. Both numbers were found with the benchmark `intervals`.
 
-use super::error::{REL_MSE_EPSILON, relative_denominator};
+use super::error::{REL_MSE_EPSILON, TAKEN_OFF, relative_denominator};
 use super::pixel::PixelStats;
 
 /// Pixels a side of the smallest block.
 pub(super) const SIDE: u32 = 16;
+/// Columns, or rows, of the window on either side of a pixel.
+pub(super) const REACH: u32 = 2;
+/// Rows of the window.
+const ROWS: usize = 2 * REACH as usize + 1;
+/// Most columns of a block with those that its windows reach.
+const COLUMNS: usize = (2 * SIDE - 1 + 2 * REACH) as usize;
 /// Fewer other pixels say nothing.
 const ENOUGH: f64 = 8.0;
 /// The other k.
@@ -36,7 +46,20 @@ const UNSURE: f64 = 0.25;
 /// Part of what is unsure by which an interval is widened to both sides.
 pub(super) const UNSURE_SHARE: f64 = 0.5;
 
-/// Sums over some pixels of a block, or their means, by channel.
+/// Mean of a pixel and its variance, by channel.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    mean: [f64; 3],
+    variance: [f64; 3],
+}
+
+impl Seen {
+    fn of(p: &PixelStats) -> Self {
+        Self { mean: p.mean(), variance: p.variance_of_mean() }
+    }
+}
+
+/// Sums over some pixels, by channel.
 #[derive(Clone, Copy, Default)]
 struct Sums {
     pixels: f64,
@@ -48,16 +71,17 @@ struct Sums {
 }
 
 impl Sums {
-    fn add(&mut self, p: &PixelStats) {
-        let (m, v) = (p.mean(), p.variance_of_mean());
+    #[inline(always)]
+    fn add(&mut self, p: &Seen) {
         self.pixels += 1.0;
         for c in 0..3 {
-            self.mean[c] += m[c];
-            self.square[c] += m[c] * m[c];
-            self.variance[c] += v[c];
+            self.mean[c] += p.mean[c];
+            self.square[c] += p.mean[c] * p.mean[c];
+            self.variance[c] += p.variance[c];
         }
     }
 
+    #[inline(always)]
     fn join(&mut self, o: &Self) {
         self.pixels += o.pixels;
         for c in 0..3 {
@@ -68,7 +92,7 @@ impl Sums {
     }
 }
 
-/// The pixels of one parity of a block, as those of the other three parities see them.
+/// What other pixels say of one.
 #[derive(Clone, Copy, Default)]
 struct Others {
     pixels: f64,
@@ -77,6 +101,16 @@ struct Others {
     contrast: [f64; 3],
     /// Mean of their variances.
     noise: [f64; 3],
+}
+
+impl From<Sums> for Others {
+    #[inline(always)]
+    fn from(s: Sums) -> Self {
+        let n = 1.0 / s.pixels.max(1.0);
+        let (mean, noise) = (s.mean.map(|x| x * n), s.variance.map(|x| x * n));
+        let contrast = core::array::from_fn(|c| (s.square[c] * n - mean[c] * mean[c] - noise[c]).max(0.0));
+        Self { pixels: s.pixels, mean, contrast, noise }
+    }
 }
 
 /// Relative squared errors of a pixel, means over channels.
@@ -90,64 +124,118 @@ pub(super) struct PixelError {
     pub unsure: f64,
 }
 
-/// A block of pixels.
-pub(super) struct Block([Others; 4]);
+/// Columns or rows `from..to` of a block, within `0..size` of the picture.
+#[derive(Clone, Copy)]
+pub(super) struct Span {
+    pub from: u32,
+    pub to: u32,
+    pub size: u32,
+}
+
+impl Span {
+    fn is_inside(self, at: u32) -> bool {
+        (self.from..self.to).contains(&at)
+    }
+
+    /// The same with those that windows reach.
+    fn reach(self) -> core::ops::Range<u32> {
+        self.from.saturating_sub(REACH)..self.to.saturating_add(REACH).min(self.size)
+    }
+}
 
 /// Parity of column and row, 0 to 3.
 fn parity(column: u32, row: u32) -> usize {
     (row & 1) as usize * 2 + (column & 1) as usize
 }
 
-impl Block {
-    /// Of these pixels, with column and row of each.
-    pub(super) fn of(pixels: impl Iterator<Item = ([u32; 2], PixelStats)>) -> Self {
-        let mut sums = [Sums::default(); 4];
-        for ([x, y], p) in pixels {
-            sums[parity(x, y) & 3].add(&p);
+/// Shows the relative squared errors of the pixels of a block, row by row. `pixel` gives those at a column and row of the
+/// picture; it is asked for each pixel twice, and for those that windows reach.
+pub(super) fn relative_errors(
+    [x, y]: [Span; 2],
+    pixel: impl Fn(u32, u32) -> PixelStats,
+    mut show: impl FnMut(PixelError),
+) {
+    let mut sums = [Sums::default(); 4];
+    for row in y.from..y.to {
+        for column in x.from..x.to {
+            sums[parity(column, row) & 3].add(&Seen::of(&pixel(column, row)));
         }
-        Self(core::array::from_fn(|own| {
-            let mut all = Sums::default();
-            sums.iter().enumerate().filter(|(class, _)| *class != own).for_each(|(_, s)| all.join(s));
-            let n = all.pixels.max(1.0);
-            let mean = all.mean.map(|x| x / n);
-            let noise = all.variance.map(|x| x / n);
-            let contrast = core::array::from_fn(|c| (all.square[c] / n - mean[c] * mean[c] - noise[c]).max(0.0));
-            Others { pixels: all.pixels, mean, contrast, noise }
-        }))
     }
-
-    /// Relative squared error of a pixel of the block, and how well it is known.
-    pub(super) fn relative_error(&self, [x, y]: [u32; 2], p: &PixelStats) -> PixelError {
-        let (m, v) = (p.mean(), p.variance_of_mean());
-        let others = &self.0[parity(x, y) & 3];
-        let mut sum = PixelError::default();
-        for c in 0..3 {
-            // without an error there is nothing to divide
-            if v[c] > 0.0 {
-                let [q, other] = [1.0, DOUBT].map(|k| v[c] / others.denominator(c, [m[c], v[c]], k));
-                sum.error += q / 3.0;
-                sum.other += other / 3.0;
-                sum.unsure += q * (q / (q + UNSURE)) / 3.0;
-            }
+    let block: [Others; 4] = core::array::from_fn(|own| {
+        let mut all = Sums::default();
+        sums.iter().enumerate().filter(|(class, _)| *class != own).for_each(|(_, s)| all.join(s));
+        all.into()
+    });
+    // the rows of the windows, each where the one before the first was
+    let mut seen = [[Seen::default(); COLUMNS]; ROWS];
+    let left = x.reach().start;
+    for row in y.reach().start..y.to.saturating_add(REACH) {
+        if row < y.size {
+            let line = &mut seen[row as usize % ROWS];
+            line.iter_mut().zip(x.reach()).for_each(|(s, column)| *s = Seen::of(&pixel(column, row)));
         }
-        sum
+        let middle = row.wrapping_sub(REACH);
+        if !y.is_inside(middle) {
+            continue;
+        }
+        let rows = Span { from: middle, to: middle + 1, size: y.size }.reach();
+        let column_of = |i: usize| {
+            let mut s = Sums::default();
+            rows.clone().for_each(|r| s.add(&seen[r as usize % ROWS][i]));
+            s
+        };
+        let mut columns = [Sums::default(); COLUMNS];
+        columns.iter_mut().enumerate().take(x.reach().len()).for_each(|(i, s)| *s = column_of(i));
+        for column in x.from..x.to {
+            let at = (column - left) as usize % COLUMNS;
+            let own = seen[middle as usize % ROWS][at];
+            let mut window = Sums::default();
+            rows.clone().filter(|r| *r != middle).for_each(|r| window.add(&seen[r as usize % ROWS][at]));
+            let reach = Span { from: column, to: column + 1, size: x.size }.reach();
+            for i in (reach.start - left) as usize..(reach.end - left) as usize {
+                if i != at {
+                    window.join(&columns[i % COLUMNS]);
+                }
+            }
+            show(relative_error(&own, &window.into(), &block[parity(column, middle) & 3]));
+        }
     }
 }
 
-impl Others {
-    fn denominator(&self, c: usize, [m, v]: [f64; 2], k: f64) -> f64 {
-        if self.pixels < ENOUGH {
-            return relative_denominator(m, v);
+/// Relative squared error of a pixel, and how well it is known.
+fn relative_error(p: &Seen, window: &Others, block: &Others) -> PixelError {
+    let mut sum = PixelError::default();
+    for c in 0..3 {
+        let (m, v) = (p.mean[c], p.variance[c]);
+        // without an error there is nothing to divide
+        if v > 0.0 {
+            let [q, other] = [1.0, DOUBT].map(|k| v / denominator(c, [m, v], k, window, block));
+            sum.error += q / 3.0;
+            sum.other += other / 3.0;
+            sum.unsure += q * (q / (q + UNSURE)) / 3.0;
         }
-        let (mean, contrast, noise) = (self.mean[c], self.contrast[c], self.noise[c]);
-        let off = (m - mean) * (m - mean);
-        let stands_out = if off > k * v { 1.0 - k * v / off } else { 0.0 };
-        // v > 0
-        let w = (contrast / (contrast + v.max(noise))).max(stands_out);
-        let e = mean + w * (m - mean);
-        let variance = w * w * v + (1.0 - w) * (1.0 - w) * noise / self.pixels;
-        (e * e - variance).max(0.0) + REL_MSE_EPSILON
     }
+    sum
+}
+
+/// D of a pixel of mean m and variance v > 0.
+#[inline(always)]
+fn denominator(c: usize, [m, v]: [f64; 2], k: f64, window: &Others, block: &Others) -> f64 {
+    if block.pixels < ENOUGH || window.pixels < ENOUGH {
+        return relative_denominator(m, v);
+    }
+    let (noise, contrast) = (window.noise[c], window.contrast[c]);
+    let [unsure, surer] = [noise.max(block.noise[c]) / window.pixels, block.contrast[c]];
+    let u = if surer > 0.0 { surer / (surer + unsure) } else { 0.0 };
+    let mean = block.mean[c] + u * (window.mean[c] - block.mean[c]);
+    let off = (m - mean) * (m - mean);
+    let stands_out = if off > k * v { 1.0 - k * v / off } else { 0.0 };
+    let w = (contrast / (contrast + v.max(noise))).max(stands_out);
+    let e = mean + w * (m - mean);
+    let of_window = u * u * noise / window.pixels;
+    let of_block = (1.0 - u) * (1.0 - u) * block.noise[c] / block.pixels;
+    let variance = TAKEN_OFF * w * w * v + (1.0 - w) * (1.0 - w) * (of_window + of_block);
+    (e * e - variance).max(0.0) + REL_MSE_EPSILON
 }
 
 #[cfg(test)]
@@ -163,12 +251,13 @@ mod tests {
         PixelStats { sum: [mean * w; 3], spread: [spread; 3], weight: w, weight_sqr: w, samples: n, rays: 0 }
     }
 
-    /// Means of error, other error and what is unsure over a block of 16 x 16 pixels.
+    /// Means of error, other error and what is unsure over rows of 16 pixels, a block of 16 x 16 if there are as many.
     fn errors(pixels: &[PixelStats]) -> [f64; 3] {
-        let placed = || pixels.iter().enumerate().map(|(i, p)| ([i as u32 % 16, i as u32 / 16], *p));
-        let block = Block::of(placed());
-        let each = placed().map(|(place, p)| block.relative_error(place, &p));
-        let sum = each.fold([0.0; 3], |[a, b, c], e| [a + e.error, b + e.other, c + e.unsure]);
+        let n = pixels.len() as u32;
+        let spans = [n.min(16), n.div_ceil(16)].map(|size| Span { from: 0, to: size, size });
+        let mut sum = [0.0; 3];
+        let one = |x: u32, y: u32| pixels.get((y * 16 + x) as usize).copied().unwrap_or_default();
+        relative_errors(spans, one, |e| sum = [sum[0] + e.error, sum[1] + e.other, sum[2] + e.unsure]);
         sum.map(|x| x / pixels.len() as f64)
     }
 
@@ -229,6 +318,21 @@ mod tests {
         assert!((error / truth - 1.0).abs() < 0.05, "{error} {truth}");
     }
 
+    /// A bright window in the block does not lend its contrast to dark pixels with rare light. Killed by: blocks
+    /// alone, windows that hold their own pixel, all of a pixel's variance taken off (3 times the truth).
+    #[test]
+    fn bright_windows_do_not_hide_rare_light() {
+        let truth = 0.75 * (1.0 / 0.05 - 1.0) / 32.0 / 1.01;
+        let found = |seed: u32| {
+            let mut pixels = rare(32, 0.05, seed * 77 + 1);
+            (0..256).filter(|i| i % 16 < 4).for_each(|i| pixels[i] = pixel(32, 100.0, 1e-6));
+            errors(&pixels)[0]
+        };
+        let found = (0..60).map(found).sum::<f64>() / 60.0;
+        // at the edge of the window pixels count by their own
+        assert!((0.8..2.0).contains(&(found / truth)), "{found} of {truth}");
+    }
+
     /// What is unsure is all of the error where pixels are noise, and a small part of it where they are not. Killed by: a
     /// pixel's error that counts by its variance, not by its relative one.
     #[test]
@@ -257,6 +361,6 @@ mod tests {
             }
         }
         let [a, ..] = errors(&[pixel(4, 2.0, 0.1)]);
-        assert!((a - 0.1 / (4.0 - 0.1 + 0.01)).abs() < 1e-12);
+        assert!((a - 0.1 / (4.0 - 0.09 + 0.01)).abs() < 1e-12);
     }
 }

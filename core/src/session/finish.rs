@@ -257,7 +257,7 @@ impl SessionState<'_> {
             GUIDE => self.learn_guide(shards, rays),
             DENSITIES => {
                 if self.learned.density_of_next(&self.film) {
-                    self.finishing.selection.begin(self.digits);
+                    self.film.begin_errors(&mut self.finishing.selection, self.digits);
                     self.next_stage();
                 }
                 RAYS_PER_DENSITY

@@ -106,8 +106,11 @@ pub struct RenderStats {
     /// Estimated relMSE of the whole image; `None` below two samples per pixel.
     pub relmse_estimate: Option<f64>,
     /// 95 % confidence interval of the estimated relMSE; `None` below two samples per pixel, and where the samples do not
-    /// tell ([`croupier::ErrorEstimate::is_resolved`]): then the estimate is a lower bound.
+    /// tell ([`croupier::ErrorEstimate::is_resolved`]).
     pub relmse_interval: Option<[f64; 2]>,
+    /// What the relMSE is at least, where the samples do not tell it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relmse_at_least: Option<f64>,
     /// Figure of merit, 1 / (estimated relMSE x million rays) ([`croupier::ErrorEstimate::figure_of_merit`]): it tells
     /// renders of a scene from each other, on any machine and whatever their length.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -378,7 +381,8 @@ fn stats(r: &Rendered) -> RenderStats {
         seconds: r.seconds,
         mrays_per_s: r.mrays_per_s(),
         relmse_estimate: (r.spp > 1).then_some(r.error.rel_mse),
-        relmse_interval: (r.spp > 1 && r.error.is_resolved()).then_some([r.error.low, r.error.high]),
+        relmse_interval: r.error.interval().filter(|_| r.spp > 1),
+        relmse_at_least: (r.spp > 1 && !r.error.is_resolved()).then_some(r.error.at_least),
         figure_of_merit: Some(r.error.figure_of_merit(c.rays() as f64 * 1e-6)).filter(|f| r.spp > 1 && f.is_finite()),
         lane_utilisation: lanes.iter().map(|(n, u)| (*n, u.share())).collect(),
         counters: counters.into_iter().collect(),

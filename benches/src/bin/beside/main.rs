@@ -51,12 +51,12 @@ struct Args {
     /// Only these scenes; several with commas.
     #[arg(long = "scene", value_name = "NAME", value_delimiter = ',')]
     only: Vec<String>,
-    /// Strategies of ours, written as in `efficiency`; several with commas. `ears+shadow` is the program's default.
+    /// Strategies of ours, written as in `efficiency`; several with commas. `ears+shadow+auto` is the program's default.
     #[arg(
         long = "strategy",
         value_name = "NAME",
         value_delimiter = ',',
-        default_values = ["classic", "adrrs", "ears+shadow"]
+        default_values = ["classic", "adrrs", "ears+shadow+auto"]
     )]
     strategies: Vec<String>,
     /// Independent seeds, at least 2; intervals need 3.

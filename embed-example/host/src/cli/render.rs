@@ -329,7 +329,7 @@ fn print(r: &Report<'_>) -> Outcome {
         match r.stats.relmse_interval {
             Some([a, b]) => format!(", estimated relMSE {e:.3e} ({a:.3e} to {b:.3e})"),
             // few pixels cause most of it, and more such are not found yet
-            None => format!(", estimated relMSE at least {e:.3e} (unresolved)"),
+            None => format!(", relMSE unresolved: at least {:.3e}", r.stats.relmse_at_least.unwrap_or(e)),
         }
     });
     let millions = rays as f64 * 1e-6;

@@ -100,9 +100,11 @@ impl Rendered {
         self.pixels.iter().map(|p| p.mean().map(|x| x as f32)).collect()
     }
 
-    /// Standard error of the mean radiance, row by row, rgb.
+    /// Standard error of the mean radiance, row by row, rgb; right on average over the picture
+    /// ([`ErrorEstimate::pixel_variance_factor`]).
     pub fn stderr(&self) -> Vec<[f32; 3]> {
-        self.pixels.iter().map(|p| p.variance_of_mean().map(|v| v.sqrt() as f32)).collect()
+        let factor = self.error.pixel_variance_factor();
+        self.pixels.iter().map(|p| p.variance_of_mean().map(|v| (factor * v).sqrt() as f32)).collect()
     }
 
     /// Channels of an auxiliary value, if it was asked for.

@@ -180,6 +180,7 @@ pub(super) fn measure(
                 low: w.rendered.error.low,
                 high: w.rendered.error.high,
                 resolved: w.rendered.error.is_resolved(),
+                at_least: w.rendered.error.at_least,
             });
             record.stated.push(Stated { strategy: strategy.into(), spp: *spp, renders: renders.collect() });
         }

@@ -244,8 +244,11 @@ pub(super) struct StatedError {
     /// Ends of the 95 % interval.
     pub(super) low: f64,
     pub(super) high: f64,
-    /// The render gives the interval; without it the estimate is a lower bound.
+    /// The render gives the interval; otherwise a lower bound.
     pub(super) resolved: bool,
+    /// The lower bound.
+    #[serde(default)]
+    pub(super) at_least: f64,
 }
 
 /// A render to an error that was given, and what it predicted.

@@ -165,7 +165,7 @@ impl Verdicts {
                     v.held += usize::from(holds);
                 } else {
                     v.unresolved += 1;
-                    v.at_least += usize::from(truth >= r.estimate);
+                    v.at_least += usize::from(truth >= r.at_least);
                     v.would_miss += usize::from(!holds);
                 }
             }
@@ -353,6 +353,7 @@ mod tests {
             low: estimate - by,
             high: estimate + by,
             resolved,
+            at_least: estimate,
         };
         let renders = vec![
             render(0.9, 1.0, 0.1, true),
