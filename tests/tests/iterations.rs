@@ -20,6 +20,7 @@ fn bad_error() -> Option<ErrorEstimate> {
         rel_mse_all: 1.0,
         independence: 1.0,
         effective_pixels: 1000.0,
+        ..ErrorEstimate::default()
     })
 }
 

@@ -33,7 +33,7 @@ fn at_a_third(scene: Scene<'_>, strategy: &str, seed: u64, target: f64) -> f64 {
     let settings = Settings { size: [96; 2], seed, aovs: false.into(), ..options.settings };
     let options = croupier_host::drive::Options::new(settings, Target::Error(target));
     let r = drive_scene(scene, &options, &Clock::default()).unwrap();
-    let learns = croupier_host::drive::learns(&settings);
+    let learns = settings.learns();
     let seconds: f64 = r.iterations.iter().map(|i| i.work.seconds).sum();
     let (mut passed, mut made) = (0.0, None);
     for (n, i) in r.iterations.iter().enumerate() {
