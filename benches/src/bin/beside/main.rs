@@ -69,7 +69,7 @@ struct Args {
     #[arg(long, value_name = "PATH", default_value = "python3")]
     python: PathBuf,
     /// Write benches/results/beside.md; needs everything.
-    #[arg(long, conflicts_with_all = ["only", "strategies", "seeds", "seconds"])]
+    #[arg(long, conflicts_with_all = ["only", "strategies"])]
     write: bool,
 }
 
