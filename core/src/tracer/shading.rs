@@ -82,7 +82,7 @@ pub(crate) fn shade<W: World>(
 }
 
 /// What lanes without a material read.
-const NO_MATERIAL: &Material = &Material::new(MaterialKind::Diffuse);
+const NO_MATERIAL: &Material = &Material::new(MaterialKind::LAMBERTIAN);
 
 /// What materials make of eight hits.
 struct Materials8 {

@@ -12,7 +12,8 @@ use croupier::unstable::STACK_BYTES;
 use croupier::unstable::denoise::{Planes, scratch_len};
 use croupier::unstable::film::{Aov, PixelStats};
 use croupier::unstable::learn::cache::CacheSize;
-use croupier::unstable::learn::{ControlVariate, Guiding};
+use croupier::unstable::learn::guiding::GuideSize;
+use croupier::unstable::learn::{ControlVariate, Guiding, Learning};
 use croupier::unstable::profile::AnyProfile;
 use croupier::unstable::rrs;
 use croupier::unstable::rrs::Ears;
@@ -83,6 +84,27 @@ impl RenderOptions {
         let fits = |shards: &u32| !learns || CacheSize::within(s.learning.cache_bytes, *shards).is_some();
         s.shards = (1..=s.shards).rev().find(fits).unwrap_or(1);
     }
+
+    /// Gives path guiding where it pays a third of the bytes of the cache, at most those that it has; guides nothing if
+    /// these are too few for so many shards.
+    pub fn fit_guide(&mut self) {
+        let Settings { shards, learning, .. } = &mut self.settings;
+        if learning.guiding == Guiding::Auto {
+            learning.guide_bytes = learning.guide_bytes.min(learning.cache_bytes / 3);
+            if GuideSize::within(learning.guide_bytes, *shards).is_none() {
+                learning.guiding = Guiding::Off;
+            }
+        }
+    }
+}
+
+/// Settings for kernels that contain no path guiding, those with ray sources of their own: what would be guided where it
+/// pays is not.
+pub(crate) fn unguided(mut settings: Settings) -> Settings {
+    if settings.learning.guiding == Guiding::Auto {
+        settings.learning.guiding = Guiding::Off;
+    }
+    settings
 }
 
 /// With efficiency-aware roulette and splitting.
@@ -169,6 +191,7 @@ impl PlanSummary {
         let plan = Plan::new(settings)?;
         let bytes = |p: &Plan| p.session().size as u64 + p.shard().size as u64 * u64::from(settings.shards);
         let without_learning = Settings {
+            learning: Learning { guiding: Guiding::Off, ..settings.learning },
             strategy: Strategy::None(rrs::None),
             adaptive: false,
             shadow_roulette: false,

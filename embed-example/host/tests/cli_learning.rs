@@ -70,6 +70,8 @@ fn every_setting_is_a_flag_with_help_and_default() {
         ("shards", "16, as many as --cache-bytes has room for if that is fewer"),
         ("aovs", "true"),
         ("shadow-roulette", "true with ear and ears"),
+        ("guiding", "auto with ear and ears"),
+        ("guide-bytes", "8388608, at most a third of --cache-bytes"),
     ];
     let own_range = [("size", "at most 2^30 pixels"), ("max-depth", "from 1 to 200")];
     let of = |list: &[(&str, &str)], name: &str| list.iter().find(|x| x.0 == name).map(|x| x.1.to_string());
@@ -328,8 +330,8 @@ fn every_flag_changes_the_picture() {
     assert!(counter(budget, "splits") == 0 && counter(budget, "splits_limited_by_budget") > 1000, "{budget}");
     let ledger = of("--ledger");
     assert!(counter(ledger, "ledger_full") > 1000, "{ledger}");
-    // 68 bytes a record, in two shards
-    assert_eq!((learning(base) - learning(ledger)) / (2 * (2048 - 16)), 68, "{ledger}");
+    // 68 bytes a record and 24 for path guiding, in two shards
+    assert_eq!((learning(base) - learning(ledger)) / (2 * (2048 - 16)), 68 + 24, "{ledger}");
     let samples = of("--learn-samples");
     assert!(counter(samples, "samples_logged") < counter(base, "samples_logged") / 2, "{samples}");
     assert!(leaves(of("--subdivide-count")) > 2 * leaves(base));

@@ -30,6 +30,9 @@ impl SettingsFlags {
         if given("shards").is_none() {
             options.fit_shards();
         }
+        if given("guiding").is_none() && given("guide-bytes").is_none() {
+            options.fit_guide();
+        }
         Ok(options)
     }
 }
@@ -59,6 +62,10 @@ fn default(row: &SettingInfo) -> String {
     let usual = RenderOptions::default().settings;
     match row.name {
         "shards" => format!("{}, as many as --cache-bytes has room for if that is fewer", usual.shards),
+        "guide-bytes" => {
+            let bytes = usual.get(row.name).map_or_else(String::new, |value| value.to_string());
+            format!("{bytes}, at most a third of --cache-bytes")
+        }
         "shadow-roulette" | "guiding" => {
             let strategies = Strategy::TABLE.iter().filter_map(|(name, _)| Strategy::parse(name).ok());
             let aware: Vec<_> = strategies.filter(Strategy::is_efficiency_aware).map(|s| s.name()).collect();

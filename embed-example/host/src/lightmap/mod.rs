@@ -87,7 +87,7 @@ impl LightmapOptions {
     /// 64 samples for each texel with the strategy and the settings of [`crate::render::RenderOptions`], a gutter of 4
     /// texels, texels filled that see more backs than fronts.
     pub fn new(size: [u32; 2]) -> Self {
-        let settings = Settings { size, ..crate::render::RenderOptions::default().settings };
+        let settings = Settings { size, ..crate::render::unguided(crate::render::RenderOptions::default().settings) };
         Self { settings, target: Target::Spp(64), threads: 0, denoise: false, gutter: 4, most_backs: 0.5 }
     }
 }
@@ -162,7 +162,7 @@ pub fn render_lightmap(
     let source = TexelSource(&texels);
     let backs = validity::back_shares(&scene, &surface.opaque, &source);
     let aovs = options.settings.aovs.with(LightmapOptions::AOVS);
-    let settings = Settings { size, aovs, ..options.settings.with_scene(&scene) };
+    let settings = Settings { size, aovs, ..crate::render::unguided(options.settings.with_scene(&scene)) };
     let drive = Options { threads: options.threads, ..Options::new(settings, options.target) };
     let rendered = drive_extended::<Full, _>(scene, source, &drive, observer)?;
     let plane = |aov: Aov| -> Vec<[f32; 3]> {

@@ -72,7 +72,7 @@ pub struct ProbeOptions {
 /// fronts.
 impl Default for ProbeOptions {
     fn default() -> Self {
-        let settings = crate::render::RenderOptions::default().settings;
+        let settings = crate::render::unguided(crate::render::RenderOptions::default().settings);
         Self { settings, rays: 1024, threads: 0, most_backs: 0.5 }
     }
 }
@@ -172,8 +172,12 @@ pub fn render_probes(
         return Err(ProbeError::Position { probe });
     }
     let source = ProbeSource::new(positions, side, options.settings.seed);
-    let settings =
-        Settings { size: source.size(), aovs: AovSet::NONE, adaptive: false, ..options.settings.with_scene(&scene) };
+    let settings = Settings {
+        size: source.size(),
+        aovs: AovSet::NONE,
+        adaptive: false,
+        ..crate::render::unguided(options.settings.with_scene(&scene))
+    };
     let plan = Plan::new(&settings)?;
     let block = |size: usize| AlignedBytes::try_zeroed(size).ok_or(DriveError::Memory(size));
     let mut shared = block(plan.session().size)?;

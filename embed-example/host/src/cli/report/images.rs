@@ -25,7 +25,7 @@ const FORECAST: [&str; 2] = ["classic", "ears"];
 const DEPTHS: [u32; 12] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24, 32];
 
 /// Changes of one setting each: name and value. What this build does not have, or not with this value, is left out.
-const KNOBS: [[&str; 2]; 22] = [
+const KNOBS: [[&str; 2]; 23] = [
     ["rrs", "none"],
     ["rrs", "classic"],
     ["rrs", "adrrs"],
@@ -36,6 +36,7 @@ const KNOBS: [[&str; 2]; 22] = [
     ["control-variate", "cached"],
     ["adaptive", "true"],
     ["sampler", "hashed"],
+    ["guiding", "off"],
     ["guiding", "on"],
     ["pixel-estimator", "blocks"],
     ["objective", "absolute"],
