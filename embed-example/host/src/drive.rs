@@ -393,11 +393,13 @@ impl<P: Profile + Sync, X: Extension + Sync> Run<'_, '_, '_, P, X> {
     }
 
     fn one(&self, shard: &mut Shard<'_>) -> bool {
-        let mut stopped = false;
+        // counters begin anew with the first step of an iteration
+        let (mut stopped, mut before) = (false, 0);
         loop {
-            let before = shard.counters().rays();
             let progress = shard.step(self.session, Budget { rays: STEP_RAYS });
-            let worked = shard.counters().rays().saturating_sub(before);
+            let now = shard.counters().rays();
+            let worked = now.saturating_sub(before);
+            before = now;
             let rays = self.rays.fetch_add(worked, Ordering::Relaxed) + worked;
             self.observer.progress(&self.progress(rays));
             if progress == StepResult::Done {

@@ -30,7 +30,7 @@ impl Observer for Clock {
 /// Predicted over actual time when a third of it has passed, of a render to an error.
 fn at_a_third(scene: Scene<'_>, strategy: &str, seed: u64, target: f64) -> f64 {
     let options = RenderOptions::new(Strategy::parse(strategy).unwrap());
-    let settings = Settings { size: [96; 2], seed, aovs: false.into(), ..options.settings };
+    let settings = Settings { size: [96; 2], seed, aovs: false.into(), ..options.settings }.with_scene(&scene);
     let options = croupier_host::drive::Options::new(settings, Target::Error(target));
     let r = drive_scene(scene, &options, &Clock::default()).unwrap();
     let learns = settings.learns();
