@@ -38,6 +38,7 @@
 //! | `tracer` | packets, the refill ring, stages, books | files, threads, clocks |
 //! | `record` | scalars of a suspended session | what they stand for |
 //! | `plan` | how many bytes a render needs | where they come from |
+//! | `schedule` | how many samples an iteration takes | clocks, who renders them |
 //! | `session` | iterations: merge, learn, begin again | how paths are traced |
 //!
 //! [`unstable`] shows most of them to hosts that want more than the names at the top.
@@ -100,6 +101,7 @@ mod rng;
 mod rrs;
 mod sampler;
 mod scene;
+mod schedule;
 mod session;
 mod setting;
 mod settings;
@@ -212,7 +214,7 @@ pub mod unstable {
     }
     /// Samples of the next iteration.
     pub mod schedule {
-        pub use crate::session::{LARGEST_ITERATION, Target, Work, next_iteration};
+        pub use crate::schedule::*;
     }
     /// The scene blob and its records.
     pub mod scene {

@@ -2,10 +2,9 @@
 
 mod error;
 mod finish;
-mod schedule;
+mod next;
 
 pub use error::SessionError;
-pub use schedule::{LARGEST_ITERATION, Target, Work, next_iteration};
 
 use crate::accel::{Intersector, WideBvh};
 use crate::counters::Counters;
