@@ -71,7 +71,7 @@ fn every_setting_is_a_flag_with_help_and_default() {
         ("aovs", "true"),
         ("shadow-roulette", "true with ear and ears"),
         ("guiding", "auto with ear and ears"),
-        ("guide-bytes", "8388608, at most a third of --cache-bytes"),
+        ("guide-bytes", "8MiB, at most a third of --cache-bytes"),
     ];
     let own_range = [("size", "at most 2^30 pixels"), ("max-depth", "from 1 to 200")];
     let of = |list: &[(&str, &str)], name: &str| list.iter().find(|x| x.0 == name).map(|x| x.1.to_string());
@@ -91,7 +91,7 @@ fn every_setting_is_a_flag_with_help_and_default() {
         }
         // every default is a value that the flag takes
         let given = Settings::TABLE.iter().map(|row| match row.name {
-            "rrs" | "shards" | "shadow-roulette" => format!("--{}={}", row.name, s.get(row.name).unwrap()),
+            "rrs" | "shards" | "shadow-roulette" | "guiding" | "guide-bytes" => format!("--{}={}", row.name, s.get(row.name).unwrap()),
             name => format!("--{name}={}", of(&own_default, name).unwrap_or_else(|| s.get(name).unwrap().to_string())),
         });
         let given: Vec<String> = given.collect();
