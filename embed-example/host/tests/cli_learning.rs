@@ -91,7 +91,9 @@ fn every_setting_is_a_flag_with_help_and_default() {
         }
         // every default is a value that the flag takes
         let given = Settings::TABLE.iter().map(|row| match row.name {
-            "rrs" | "shards" | "shadow-roulette" | "guiding" | "guide-bytes" => format!("--{}={}", row.name, s.get(row.name).unwrap()),
+            "rrs" | "shards" | "shadow-roulette" | "guiding" | "guide-bytes" => {
+                format!("--{}={}", row.name, s.get(row.name).unwrap())
+            }
             name => format!("--{name}={}", of(&own_default, name).unwrap_or_else(|| s.get(name).unwrap().to_string())),
         });
         let given: Vec<String> = given.collect();
