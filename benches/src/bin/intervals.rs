@@ -182,8 +182,8 @@ struct Kept {
 /// Rows of a scene from an earlier run with the same key.
 fn kept(file: &Path, key: &str) -> Option<Vec<Judged>> {
     let text = std::fs::read_to_string(file).ok()?;
-    let all = text.lines().filter_map(|line| serde_json::from_str::<Kept>(line).ok());
-    all.filter(|k| k.key == key).last().map(|k| k.rows)
+    let mut all = text.lines().filter_map(|line| serde_json::from_str::<Kept>(line).ok());
+    all.rfind(|k| k.key == key).map(|k| k.rows)
 }
 
 /// What relMSE divides by, from all renders of a scene: those of a row alone would leave so much noise in it that the

@@ -9,6 +9,7 @@ use croupier_simd::F32x8;
 /// whose index is out of range have the words of `none`. `R` is a record of `ROWS` rows of eight words; what is not read
 /// of the result costs next to nothing.
 #[inline(always)]
+#[expect(clippy::indexing_slicing, reason = "lanes and rows are below the lengths of their arrays")]
 pub(crate) fn gather<R: Pod, const ROWS: usize>(records: &[R], index: [u32; 8], none: &R) -> [[F32x8; 8]; ROWS]
 where
     [[f32; 8]; ROWS]: Pod,
@@ -30,6 +31,7 @@ mod tests {
 
     /// Killed by: a lane or a word in the place of another, an index that is trusted.
     #[test]
+    #[expect(clippy::indexing_slicing, reason = "words are below the lengths of their arrays")]
     fn each_lane_has_the_words_of_its_record() {
         let records: [[u32; 16]; 5] = array::from_fn(|i| array::from_fn(|k| 0x7f80_0001 + (100 * i + k) as u32));
         let index = [3, 0, 4, 5, u32::MAX, 1, 2, 3];
