@@ -57,7 +57,7 @@ struct LedgerRecord {
 pub struct Finished {
     /// Slot that it had.
     pub slot: u32,
-    /// Whether path guiding has a note on it ([`Ledger::mark_noted`]).
+    /// Whether path guiding has a note on it.
     pub noted: bool,
     /// Where it is logged.
     pub bin: u32,
