@@ -170,7 +170,8 @@ pub fn place_normals(scene: &Scene<'_>, instances: [U32x8; 2], time: F32x8, norm
     normals
 }
 
-/// Instances around the triangle of light `index` with this [`Light::instance`](crate::scene::blob::Light::instance); [`NONE`] where there is none.
+/// Instances around the triangle of light `index` with this [`instance`](crate::scene::blob::Light::instance); [`NONE`]
+/// where there is none.
 pub fn instances_of_light(scene: &Scene<'_>, index: u32, instance: u32) -> [u32; 2] {
     let Some(outer) = instance.checked_sub(1) else { return [NONE; 2] };
     let inner = || {
