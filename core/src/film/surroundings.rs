@@ -181,7 +181,7 @@ pub(super) fn relative_errors(
         let rows = Span { from: middle, to: middle + 1, size: y.size }.reach();
         let column_of = |i: usize| {
             let mut s = Sums::default();
-            rows.clone().for_each(|r| s.add(&seen[r as usize % ROWS][i]));
+            rows.clone().filter_map(|r| seen[r as usize % ROWS].get(i)).for_each(|p| s.add(p));
             s
         };
         let mut columns = [Sums::default(); COLUMNS];

@@ -50,8 +50,8 @@ const ABSORBED_PER_RAY: u64 = 4;
 const REPLAYED_PER_RAY: u64 = 4;
 /// Rays in the time of which the density of a tile is computed.
 const RAYS_PER_DENSITY: u64 = 24;
-/// Pixels whose contribution to the error is computed in the time of a ray.
-const ESTIMATED_PER_RAY: u64 = 1;
+/// Rays in the time of which a pixel's contribution to the error is computed, from the window around it.
+const RAYS_PER_ESTIMATED: u64 = 4;
 
 /// Shards as callers give them.
 pub(super) trait Shards<'a, 'b: 'a>: IntoIterator<Item = &'a Shard<'b>> + Clone {}
@@ -97,7 +97,7 @@ impl SessionState<'_> {
     /// The budget is in units of a ray of the tracer, some 300 instructions, where the rays of [`Shard::step`] take their
     /// shading along; many small calls and one big call give the same bits. It is exceeded by a few pixels, or by a piece
     /// of work that is larger than it: the largest are a row of the denoiser that loads 16 others, 4 units per column, and
-    /// a block of pixels whose errors are computed, up to 31 x 31 pixels at one unit each. Each call looks at all shards
+    /// a block of pixels whose errors are computed, up to 31 x 31 pixels at four units each. Each call looks at all shards
     /// first, at some 20 instructions each, whatever the budget. A budget of 0 checks the shards and does nothing. Until
     /// the end the film has the iteration in some pixels and not in others, and the estimates of before.
     /// [`Self::begin_iteration`] abandons what is left to do: pixels that have been merged keep the iteration, others do
@@ -364,17 +364,17 @@ impl SessionState<'_> {
     /// Estimates the error of the film.
     fn estimate_error(&mut self, rays: u64) -> u64 {
         let Finishing { selection, at, .. } = &mut self.finishing;
-        let limit = rays.saturating_mul(ESTIMATED_PER_RAY).min(1 << 30) as usize;
+        let limit = (rays / RAYS_PER_ESTIMATED).clamp(1, 1 << 30) as usize;
         let [blocks, n] = self.film.show_errors(*at, limit, selection, self.digits);
         *at += blocks;
         if *at < self.film.blocks() {
-            return 1 + n / ESTIMATED_PER_RAY;
+            return 1 + n * RAYS_PER_ESTIMATED;
         }
         *at = 0;
         if selection.end_visit(Film::outliers, self.digits) {
             self.film.estimate_error(selection);
             self.next_stage();
         }
-        8 + n / ESTIMATED_PER_RAY
+        8 + n * RAYS_PER_ESTIMATED
     }
 }

@@ -16,8 +16,9 @@ pub(crate) fn places<W: World>(scene: &Scene<'_>) -> bool {
 #[inline(always)]
 pub(super) fn coordinates(scene: &Scene<'_>, hit: &SurfaceHit8, own: Option<&OwnHits8>) -> [F32x8; 2] {
     let [wa, wb, wc] = hit.weights();
-    let [a, b, c] = [0, 1, 2].map(|k| hit.coordinates(scene, k));
-    let at = [0, 1].map(|axis: usize| a[axis] * wa + b[axis] * wb + c[axis] * wc);
+    let of = |k: usize| hit.coordinates(scene, k);
+    let ([au, av], [bu, bv], [cu, cv]) = (of(0), of(1), of(2));
+    let at = [au * wa + bu * wb + cu * wc, av * wa + bv * wb + cv * wc];
     own.map_or(at, |own| own.coordinates(at))
 }
 
