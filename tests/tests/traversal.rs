@@ -272,6 +272,19 @@ fn invalid_rays_hit_nothing() {
         Ray { o: [0.0; 3], d, tmin: 0.1 / s, tmax: 10.0 / s }
     });
     assert_eq!(bvh.closest(&packet(&rays), Mask8::first(5)).hit.count(), 5);
+    // and are not disturbed by others beside them, whichever lane those have
+    let near = |i: usize| Ray::new([0.01 * i as f32, 0.0, 0.0], [1.0, 0.5, 0.25 + 0.01 * i as f32]);
+    for (lane, axis, x) in (0..8).flat_map(|lane| special.map(|x| (lane, 1 + lane % 2, x))) {
+        for of_origin in [false, true] {
+            let mut rays = [0, 1, 2, 3, 4, 5, 6, 7].map(near);
+            let changed = if of_origin { &mut rays[lane].o } else { &mut rays[lane].d };
+            changed[axis] = x;
+            let hit = bvh.closest(&packet(&rays), Mask8::all_lanes());
+            let alone = rays.map(|r| bvh.closest(&packet(&[r]), Mask8::first(1)));
+            assert_eq!(hit.hit.bits(), 255 ^ 1 << lane, "{x} in axis {axis} of lane {lane}");
+            assert!((0..8).all(|i| hit.triangle.lane(i) == alone[i].triangle.lane(0)));
+        }
+    }
     let empty = WideBvh::from_parts(&[], &[]);
     assert!(empty.closest(&packet(&rays), Mask8::all_lanes()).hit.none());
     assert!(empty.occluded(&packet(&rays), Mask8::all_lanes()).none());

@@ -94,6 +94,24 @@ fn trees_hold_every_triangle_once_inside_all_boxes() {
     }
 }
 
+// Killed by: parts of the binary tree in the order in which threads finish them.
+#[test]
+fn trees_do_not_depend_on_the_number_of_threads() {
+    let mut triangles = soup(20_000, [0.0; 3], 1.0, 0.1, &mut Rng(5));
+    triangles.extend(vec![[[0.25, 0.5, 0.5], [0.5, 0.25, 0.5], [0.5; 3]]; 300]);
+    let with_threads = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| build(&triangles, Effort::Medium))
+    };
+    let one = with_threads(1);
+    for threads in [2, 5] {
+        let tree = with_threads(threads);
+        assert!(bytemuck::cast_slice::<Node, u8>(&tree.nodes) == bytemuck::cast_slice::<Node, u8>(&one.nodes));
+        assert!(bytemuck::cast_slice::<Leaf, u8>(&tree.leaves) == bytemuck::cast_slice::<Leaf, u8>(&one.leaves));
+        assert_eq!(tree.depth, one.depth);
+    }
+}
+
 // Killed by: dropping the fallback to median splits (the exponential row then needs hundreds of levels).
 #[test]
 fn depth_is_bounded_for_hostile_geometry() {

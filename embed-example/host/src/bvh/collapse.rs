@@ -4,9 +4,11 @@
 //! `cost[i][j]` is the least cost of the subtree i as at most j siblings: one wide node or leaf (j = 1), or its
 //! children with k and j - k of them.
 
-use super::binary::{Binary, Bounds};
+use super::binary::{Binary, BinaryTree, Bounds, split};
 use bytemuck::Zeroable;
 use croupier::unstable::scene::blob::{LEAF_BIT, Leaf, MAX_TREE_DEPTH, NONE, Node};
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// Cost of a visited node per half area; measured, in units of a leaf's eight-triangle test.
 const NODE_COST: f32 = 1.0;
@@ -28,74 +30,92 @@ pub struct Tree {
 }
 
 /// Decision of the dynamic programme for one binary node.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Zeroable)]
+#[repr(C)]
 struct Plan {
     /// Least cost as at most j + 1 siblings.
     cost: [f32; WIDTH - 1],
+    triangles: u32,
     /// As at most j siblings: this many for the first child; 0: no better than j - 1 siblings. `split[8]`: the children
     /// of a wide node.
     split: [u8; WIDTH + 1],
+    /// Levels of wide nodes as at most j + 1 siblings; 0 for a leaf.
+    height: [u8; WIDTH - 1],
     /// As one sibling: a leaf, not a node.
     leaf: bool,
-    triangles: u32,
-    /// Levels of wide nodes as one sibling; 0 for a leaf.
-    height: u8,
 }
 
-/// The wide tree of `tree`.
-pub(super) fn widen(tree: &[Binary], triangles: &[[[f32; 3]; 3]]) -> Tree {
-    if tree.is_empty() {
-        return Tree::default();
-    }
-    let plans = plan(tree);
-    let mut w = Writer { tree, plans: &plans, triangles, out: Tree::default() };
-    w.node(Source::Binary(0), 1);
-    w.out
-}
-
-fn plan(tree: &[Binary]) -> Vec<Plan> {
-    let zero = Plan { cost: [0.0; 7], split: [0; 9], leaf: true, triangles: 1, height: 0 };
-    let mut plans = vec![zero; tree.len()];
-    let root = tree[0].bounds.half_area().max(f64::MIN_POSITIVE);
-    for i in (0..tree.len()).rev() {
-        let n = &tree[i];
-        let area = (n.bounds.half_area() / root) as f32;
-        if n.leaf {
-            plans[i].cost = [area * LEAF_COST; 7];
-            continue;
+impl Plan {
+    /// The plan for `node`, whose half area is `area` of the root's; `children` are those of its children.
+    fn new(node: &Binary, area: f32, children: [&Self; 2]) -> Self {
+        let mut p = Self { leaf: true, triangles: 1, ..Self::zeroed() };
+        if node.leaf {
+            p.cost = [area * LEAF_COST; WIDTH - 1];
+            return p;
         }
-        let (l, r) = (plans[n.index as usize], plans[n.index as usize + 1]);
+        let [l, r] = children;
         let best = |j: usize| {
-            let mut best = (f32::INFINITY, 1u8);
+            let mut best = (f32::INFINITY, 1);
             for k in j.saturating_sub(7).max(1)..j.min(8) {
                 let c = l.cost[k - 1] + r.cost[j - k - 1];
                 if c < best.0 {
-                    best = (c, k as u8);
+                    best = (c, k);
                 }
             }
             best
         };
-        let p = &mut plans[i];
+        let height = |j: usize, k: usize| l.height[k - 1].max(r.height[j - k - 1]);
         p.triangles = l.triangles + r.triangles;
-        let (inner, split) = best(WIDTH);
+        let (inner, k) = best(WIDTH);
         let as_node = area * NODE_COST + inner;
         let as_leaf = if p.triangles as usize <= WIDTH { area * LEAF_COST } else { f32::INFINITY };
-        p.split[WIDTH] = split;
+        p.split[WIDTH] = k as u8;
         p.leaf = as_leaf <= as_node;
         p.cost[0] = as_leaf.min(as_node);
+        p.height[0] = if p.leaf { 0 } else { height(WIDTH, k).saturating_add(1) };
         for j in 2..WIDTH {
             let (c, k) = best(j);
-            (p.cost[j - 1], p.split[j]) = if c < p.cost[j - 2] { (c, k) } else { (p.cost[j - 2], 0) };
+            let divided = c < p.cost[j - 2];
+            p.cost[j - 1] = if divided { c } else { p.cost[j - 2] };
+            p.split[j] = if divided { k as u8 } else { 0 };
+            p.height[j - 1] = if divided { height(j, k) } else { p.height[j - 2] };
         }
+        p
     }
-    // levels of wide nodes in the subtree if it becomes one sibling
-    for i in (0..tree.len()).rev() {
-        if !plans[i].leaf {
-            let mut children = Vec::with_capacity(WIDTH);
-            wide_children(tree, &plans, i, &mut children);
-            let below = children.iter().map(|&c| plans[c].height).max().unwrap_or(0);
-            plans[i].height = below.saturating_add(1);
+}
+
+/// The wide tree of `tree`.
+pub(super) fn widen(tree: &BinaryTree, triangles: &[[[f32; 3]; 3]]) -> Tree {
+    if tree.nodes.is_empty() {
+        return Tree::default();
+    }
+    let plans = plan(tree);
+    let mut w = Writer { tree: &tree.nodes, plans: &plans, triangles, out: Tree::default(), leaves: Vec::new() };
+    w.node(Source::Binary(0), 1);
+    w.out.leaves = w.leaves.par_iter().map(|source| w.leaf(source)).collect();
+    w.out
+}
+
+fn plan(BinaryTree { nodes, parts }: &BinaryTree) -> Vec<Plan> {
+    let root = nodes[0].bounds.half_area().max(f64::MIN_POSITIVE);
+    let of = |i: usize, start: usize, plans: &[Plan]| {
+        let n = &nodes[i];
+        let first = if n.leaf { 0 } else { n.index as usize - start };
+        // not read of leaves
+        let children = [first, first + 1].map(|c| plans.get(c).unwrap_or(&plans[0]));
+        Plan::new(n, (n.bounds.half_area() / root) as f32, children)
+    };
+    let mut plans: Vec<Plan> = bytemuck::zeroed_vec(nodes.len());
+    let top = parts[0].end;
+    let of_parts = split(&mut plans[top..], &parts[1..]);
+    let of_part = |(part, plans): (&Range<usize>, &mut [Plan])| {
+        for i in (0..plans.len()).rev() {
+            plans[i] = of(part.start + i, part.start, plans);
         }
+    };
+    parts[1..].par_iter().zip(of_parts).for_each(of_part);
+    for i in (0..top).rev() {
+        plans[i] = of(i, 0, &plans);
     }
     plans
 }
@@ -130,7 +150,10 @@ struct Writer<'a> {
     tree: &'a [Binary],
     plans: &'a [Plan],
     triangles: &'a [[[f32; 3]; 3]],
+    /// Nodes, and no leaves.
     out: Tree,
+    /// What the leaves hold.
+    leaves: Vec<Source>,
 }
 
 impl Writer<'_> {
@@ -153,7 +176,7 @@ impl Writer<'_> {
         children
             .sort_by(|(a, a_leaf, _), (b, b_leaf, _)| b_leaf.cmp(a_leaf).then(b.half_area().total_cmp(&a.half_area())));
         for (slot, (bounds, leaf, source)) in children.into_iter().enumerate() {
-            let child = if leaf { self.leaf(source) } else { self.node(source, level + 1) };
+            let child = if leaf { self.add_leaf(source) } else { self.node(source, level + 1) };
             let node = &mut self.out.nodes[me];
             node.child[slot] = child;
             for k in 0..3 {
@@ -183,7 +206,7 @@ impl Writer<'_> {
     /// rebuild its children by median splits?
     fn fits(&self, i: usize, level: u32) -> bool {
         let p = &self.plans[i];
-        let as_planned = level + u32::from(p.height) - 1 <= MAX_TREE_DEPTH;
+        let as_planned = level + u32::from(p.height[0]) - 1 <= MAX_TREE_DEPTH;
         as_planned || level + median_levels(p.triangles as usize) <= MAX_TREE_DEPTH
     }
 
@@ -232,10 +255,21 @@ impl Writer<'_> {
         parts.into_iter().map(Source::Median).collect()
     }
 
-    fn leaf(&mut self, source: Source) -> u32 {
+    /// A leaf with what `source` holds; the child's value.
+    fn add_leaf(&mut self, source: Source) -> u32 {
+        let count = match &source {
+            Source::Binary(i) => self.plans[*i].triangles as usize,
+            Source::Median(ids) => ids.len(),
+        };
+        let index = self.leaves.len() as u32;
+        self.leaves.push(source);
+        LEAF_BIT | (count.min(WIDTH) as u32) << 27 | index
+    }
+
+    fn leaf(&self, source: &Source) -> Leaf {
         let mut ids = match source {
-            Source::Binary(i) => self.gather(i),
-            Source::Median(ids) => ids,
+            Source::Binary(i) => self.gather(*i),
+            Source::Median(ids) => ids.clone(),
         };
         ids.sort_unstable();
         let mut leaf = Leaf { p: [[0.0; 8]; 9], triangle: [NONE; 8] };
@@ -245,9 +279,7 @@ impl Writer<'_> {
                 leaf.p[row][slot] = *x;
             }
         }
-        let index = self.out.leaves.len() as u32;
-        self.out.leaves.push(leaf);
-        LEAF_BIT | (ids.len().min(WIDTH) as u32) << 27 | index
+        leaf
     }
 }
 
