@@ -252,7 +252,8 @@ fn point_error_is_the_stated_bound() {
     }
 }
 
-/// Killed by: r instead of r^2, 4 pi in the irradiance, the direction away from the light, missing flags.
+/// Killed by: r instead of r^2, 4 pi in the irradiance, the direction away from the light, missing flags, squared
+/// distances without a least one.
 #[test]
 fn delta_lights_have_their_closed_forms() {
     let owner = LightScene::default()
@@ -285,12 +286,17 @@ fn delta_lights_have_their_closed_forms() {
     }
     assert!(chi_square_in_order(&seen, &[2000.0, 6000.0]) > 1e-6);
     // At the light itself no direction; nearby a clamped irradiance; far away none.
-    for (offset, valid) in [(0.0, false), (1e-11, true), (1e6, true), (1e25, false)] {
+    for (offset, valid) in [(0.0, false), (1e-25, true), (1e-11, true), (1e6, true), (1e25, false)] {
         let owner = LightScene::default().delta(LightKind::Point, [0.0; 3], [1.0; 3]).finish();
         let s = draw(&owner, Vec3x8::splat(offset, 0.0, 0.0), &mut rng);
         assert_eq!(s.valid.all(), valid, "{offset}");
         assert_eq!([s.clamped.any(), s.clamped.all()], [offset < 1e-10; 2], "{offset}");
         assert!(s.radiance.is_finite().all() && s.pdf.is_finite().all());
+        assert!(
+            !valid || offset > 1e-10 || s.radiance.x.eq(1.0 / F32x8::splat(1e-20)).all(),
+            "{offset}: {:?}",
+            s.radiance.x
+        );
     }
 }
 

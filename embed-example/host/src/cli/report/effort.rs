@@ -50,20 +50,20 @@ impl Effort {
         repeats: 21,
     };
 
-    /// Everything.
+    /// Everything, with all arguments of the functions.
     pub(super) const FULL: Self = Self {
         name: "full",
-        pixels: 128 * 128,
+        pixels: 96 * 96,
         scenes: 3,
         all_strategies: true,
-        reference: 60.0,
-        curve: 8.0,
-        seeds: 16,
-        knob: 2.0,
+        reference: 30.0,
+        curve: 3.0,
+        seeds: 10,
+        knob: 0.8,
         stated: &[8, 32, 128],
-        stated_seeds: 48,
-        forecasts: 20,
-        forecast: 6.0,
+        stated_seeds: 40,
+        forecasts: 16,
+        forecast: 3.0,
         stride: 1,
         repeats: 41,
     };
