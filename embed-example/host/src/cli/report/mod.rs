@@ -42,6 +42,7 @@ use croupier_host::text;
 use effort::Effort;
 use ledger::{FORMAT, Format, Ledger};
 use renders::Subject;
+use serde_json::{Number, Value};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -95,8 +96,23 @@ pub(crate) fn run(args: &Args) -> Outcome {
             note(&format!("{} has no function that is not there yet", text::path(path)));
         }
     }
-    let written = write(args, &ledger)?;
+    let mut value = serde_json::to_value(&ledger)?;
+    shorten(&mut value);
+    let written = write(args, &serde_json::from_value(value)?)?;
     say(&format!("wrote {}", written.iter().map(|p| text::path(p)).collect::<Vec<_>>().join(", ")))
+}
+
+/// Nine digits: as many as tell numbers of `f32` apart, in half the bytes.
+fn shorten(value: &mut Value) {
+    match value {
+        Value::Number(n) if n.is_f64() => {
+            let short = n.as_f64().and_then(|x| Number::from_f64(format!("{x:.8e}").parse().ok()?));
+            *n = short.unwrap_or_else(|| n.clone());
+        }
+        Value::Array(all) => all.iter_mut().for_each(shorten),
+        Value::Object(all) => all.values_mut().for_each(shorten),
+        _ => (),
+    }
 }
 
 fn read(path: &Path) -> Result<Ledger, Box<dyn Error>> {

@@ -96,7 +96,8 @@ fn headlines(ledger: &Ledger) -> Vec<Value> {
     for (strategy, line) in calibration(ledger).into_iter().filter(|c| c.0 == "ears") {
         if let Some(p) = line.iter().find(|p| p.level == 0.95) {
             let [low, high] = p.interval.map(|x| 100.0 * x);
-            let says = format!("of the 95 % intervals of {strategy} hold the expected error ({low:.0} to {high:.0} %)");
+            let says =
+                format!("of the 95 % intervals of {strategy} hold the picture's error ({low:.0} to {high:.0} %)");
             found.push(headline(format!("{:.0} %", 100.0 * p.share), says));
         }
     }

@@ -126,13 +126,13 @@ fn kernels(
     Figure::draw(name, title, caption, [420, 380], draw).map(Some)
 }
 
-/// How often intervals of a level hold the expectation.
+/// How often intervals of a level hold the picture's error.
 pub(super) fn reliability(ledger: &Ledger) -> Result<Option<Figure>, Fault> {
     let lines = calibration(ledger);
     if lines.is_empty() {
         return Ok(None);
     }
-    let caption = "Share of renders whose interval of the stated level holds the expected error, over all scenes and \
+    let caption = "Share of renders whose interval of the stated level holds the picture's error, over all scenes and \
                    numbers of samples: on the grey line a level is what it says, below it intervals are too narrow.";
     let draw = |sheet: &Sheet<'_>, _: Layout| -> Result<(), Fault> {
         let mut chart = framed(sheet, Layout::px(56), Layout::px(16)).build_cartesian_2d(0.0..100.0, 0.0..100.0)?;
