@@ -361,7 +361,8 @@ fn factors_in_the_window_are_one() {
     }
 }
 
-/// Killed by: `clamp` before the finiteness test (`NaN.min(20)` is 20), no floor (NUMERICS RRS-3, RRS-5).
+/// Killed by: `clamp` before the finiteness test (`NaN.min(20)` is 20), no floor (NUMERICS RRS-3, RRS-5), a factor that is
+/// not finite and splits.
 #[test]
 fn factors_stay_in_their_bounds() {
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -1.0, 1e30, f32::MIN_POSITIVE] {
@@ -373,6 +374,9 @@ fn factors_stay_in_their_bounds() {
                 assert!((low..=MAX_FACTOR).contains(&s), "{name} gives {s} for {bad}");
             }
         }
+    }
+    for strategy in ["albedo", "classic"] {
+        assert_eq!(factor(strategy, f32::NAN, f32::NAN, 9), 1.0, "{strategy}");
     }
 }
 

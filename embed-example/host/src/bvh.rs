@@ -2,11 +2,14 @@
 //!
 //! `obvhs` builds a binary tree (PLOC with reinsertion, Meister & Bittner 2018); `collapse` turns it into 8-wide nodes
 //! over leaves of up to eight triangles at the lowest expected cost; subtrees that would be too deep are rebuilt by
-//! median splits. Nodes and leaves are numbered depth first, slots ascending: a parent comes before its children, and a
+//! median splits. `coincident` puts triangles with the same box aside before, `parts` divides the work among threads:
+//! the tree is the same for any number of them. Nodes and leaves are numbered depth first, slots ascending: a parent comes before its children, and a
 //! walk mostly goes forward in memory.
 
 mod binary;
+mod coincident;
 mod collapse;
+mod parts;
 
 pub use binary::Effort;
 pub use collapse::Tree;

@@ -160,7 +160,7 @@ impl Tables {
         self.facts.push((
             subject.name.clone(),
             format!(
-                "{} triangles; tree built in {:.1} s, Embree's in {build} s (default, ROBUST; by instruction set, on \
+                "{} triangles; tree built in {:.2} s, Embree's in {build} s (default, ROBUST; by instruction set, on \
                  one thread); memory in pages of 2 MB: {ours}, Embree's {theirs}",
                 subject.triangles.len(),
                 subject.build_seconds,

@@ -3,6 +3,7 @@
 use crate::rays::{self, Camera, Set, Tri};
 use croupier::unstable::accel::{Intersector, WideBvh};
 use croupier::unstable::geometry::{Hit8, Ray8};
+use croupier::unstable::scene::blob::{LEAF_BIT, NONE, Node};
 use croupier::unstable::simd::Mask8;
 use croupier_benches::clock::Clock;
 use croupier_benches::results::Table;
@@ -75,8 +76,10 @@ impl Subject {
     /// The tree in words.
     pub(crate) fn facts(&self) -> String {
         let Tree { nodes, leaves, depth, .. } = &self.tree;
+        let [on_nodes, on_leaves] = visits(nodes);
         format!(
-            "depth {depth}, {} nodes of {:.1} children, {} leaves of {:.1} triangles, {:.0} B/triangle",
+            "depth {depth}, {} nodes of {:.1} children, {} leaves of {:.1} triangles, {:.0} B/triangle, a line through \
+             it meets {on_nodes:.2} nodes and {on_leaves:.2} leaves",
             nodes.len(),
             (nodes.len() + leaves.len() - 1) as f64 / nodes.len() as f64,
             leaves.len(),
@@ -88,6 +91,29 @@ impl Subject {
     pub(crate) fn bytes_per_triangle(&self) -> f64 {
         (self.nodes.len() + self.leaves.len()) as f64 / self.triangles.len() as f64
     }
+}
+
+/// Nodes and leaves that a random line through the root's box meets: their areas over its own.
+fn visits(nodes: &[Node]) -> [f64; 2] {
+    let half_area = |[min, max]: [[f32; 3]; 2]| {
+        let e = [0, 1, 2].map(|k| f64::from(max[k]) - f64::from(min[k]));
+        e[0] * e[1] + e[1] * e[2] + e[2] * e[0]
+    };
+    let bounds = |n: &Node, c: usize| [0, 3].map(|row| [0, 1, 2].map(|k| n.bounds[row + k][c]));
+    let used = |n: &Node| (0..8).filter(|c| n.child[*c] != NONE).collect::<Vec<_>>();
+    let Some(root) = nodes.first() else { return [0.0; 2] };
+    let whole = used(root).into_iter().map(|c| bounds(root, c)).reduce(|a, b| {
+        let pick = |row: usize, f: fn(f32, f32) -> f32| [0, 1, 2].map(|k| f(a[row][k], b[row][k]));
+        [pick(0, f32::min), pick(1, f32::max)]
+    });
+    let whole = whole.map_or(1.0, half_area);
+    let mut visits = [1.0, 0.0];
+    for n in nodes {
+        for c in used(n) {
+            visits[usize::from(n.child[c] & LEAF_BIT != 0)] += half_area(bounds(n, c)) / whole;
+        }
+    }
+    visits
 }
 
 /// Folder and file.

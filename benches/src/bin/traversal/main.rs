@@ -117,7 +117,7 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         (
             "scene",
             format!(
-                "{}, {} triangles; tree built in {:.1} s",
+                "{}, {} triangles; tree built in {:.2} s",
                 subject.name,
                 subject.triangles.len(),
                 subject.build_seconds

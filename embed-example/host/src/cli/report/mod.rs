@@ -102,7 +102,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     say(&format!("wrote {}", written.iter().map(|p| text::path(p)).collect::<Vec<_>>().join(", ")))
 }
 
-/// Nine digits: as many as tell numbers of `f32` apart, in half the bytes.
+/// Nine digits: as many as tell numbers of `f32` apart; others are below what is measured.
 fn shorten(value: &mut Value) {
     match value {
         Value::Number(n) if n.is_f64() => {

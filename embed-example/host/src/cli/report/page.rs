@@ -185,6 +185,7 @@ fn stated_rows(ledger: &Ledger) -> Vec<Value> {
             truth => number(truth),
             ratio => number(stated / truth),
             held => if v.given > 0 { format!("{} of {}", v.held, v.given) } else { "none given".into() },
+            held_mean => if v.given > 0 { format!("{} of {}", v.held_mean, v.given) } else { "-".into() },
             interval => if v.given > 0 { format!("{:.0} to {:.0} %", interval[0], interval[1]) } else { "-".into() },
             unresolved => v.unresolved,
             // 95 is outside of what the renders allow

@@ -145,6 +145,8 @@ pub(super) struct Verdicts {
     /// Renders that give an interval, and those whose interval holds the picture's error.
     pub(super) given: usize,
     pub(super) held: usize,
+    /// Of the intervals given, those that hold the mean error of all seeds.
+    pub(super) held_mean: usize,
     /// Renders that give a lower bound only: unresolved.
     pub(super) unresolved: usize,
     /// Of these, where the picture's error is not below the bound.
@@ -157,11 +159,13 @@ impl Verdicts {
     pub(super) fn of<'a>(stated: impl IntoIterator<Item = &'a super::ledger::Stated>) -> Self {
         let mut v = Self::default();
         for s in stated {
+            let mean = expected(s);
             for r in &s.renders {
                 let holds = (r.low..=r.high).contains(&r.measured);
                 if r.resolved {
                     v.given += 1;
                     v.held += usize::from(holds);
+                    v.held_mean += usize::from((r.low..=r.high).contains(&mean));
                 } else {
                     v.unresolved += 1;
                     v.at_least += usize::from(r.measured >= r.at_least);
@@ -337,7 +341,8 @@ mod tests {
         assert_eq!(reached(&curve(true, 0.02, 0.02, 1.0), 0.01), Reached::Never);
     }
 
-    /// Killed by: a prediction after the third, an interval that is not looked at, a truth of one render.
+    /// Killed by: a prediction after the third, an interval that is not looked at, the mean of all renders in place of a
+    /// picture's error or the reverse.
     #[test]
     fn qualities() {
         let record = |seconds, low, high| ForecastRecord { seconds, interval: [low, high] };
@@ -355,8 +360,9 @@ mod tests {
             at_least: estimate,
         };
         let renders = vec![
-            render(0.95, 1.0, 0.1, true),
-            render(1.05, 1.2, 0.1, true),
+            render(0.5, 0.55, 0.1, true),
+            render(1.4, 1.05, 0.1, true),
+            render(1.1, 1.05, 0.1, true),
             render(1.0, 0.9, 0.05, false),
             render(1.0, 1.1, 0.2, false),
             render(1.0, 0.95, 0.1, false),
@@ -364,8 +370,8 @@ mod tests {
         let stated = Stated { strategy: "ears".into(), spp: 4, renders };
         let verdicts = Verdicts::of([&stated]);
         assert_eq!(expected(&stated), 1.0);
-        assert_eq!(verdicts, Verdicts { given: 2, held: 1, unresolved: 3, at_least: 2, would_miss: 1 });
-        assert_eq!((verdicts.right(), verdicts.renders()), (3, 5));
+        assert_eq!(verdicts, Verdicts { given: 3, held: 2, held_mean: 2, unresolved: 3, at_least: 2, would_miss: 1 });
+        assert_eq!((verdicts.right(), verdicts.renders()), (4, 6));
     }
 
     /// Killed by: digits that are lost, zeros that pretend digits.
