@@ -9,6 +9,7 @@
 mod binary;
 mod coincident;
 mod collapse;
+mod node;
 mod parts;
 
 pub use binary::Effort;

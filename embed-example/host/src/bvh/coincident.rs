@@ -1,6 +1,6 @@
 //! Triangles with the same box.
 
-use super::binary::Bounds;
+use super::node::Bounds;
 use rayon::prelude::*;
 use std::array;
 

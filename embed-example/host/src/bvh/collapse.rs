@@ -4,7 +4,7 @@
 //! `cost[i][j]` is the least cost of the subtree i as at most j siblings: one wide node or leaf (j = 1), or its
 //! children with k and j - k of them.
 
-use super::binary::{Binary, BinaryTree, Bounds};
+use super::node::{Binary, BinaryTree, Bounds};
 use super::parts::split;
 use bytemuck::Zeroable;
 use croupier::unstable::scene::blob::{LEAF_BIT, Leaf, MAX_TREE_DEPTH, NONE, Node};

@@ -1,7 +1,7 @@
 //! Copy of obvhs's tree, by parts that threads write side by side.
 
-use super::binary::{Binary, BinaryTree, Bounds};
 use super::coincident::Groups;
+use super::node::{Binary, BinaryTree, Bounds};
 use bytemuck::Zeroable;
 use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
