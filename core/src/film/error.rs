@@ -24,7 +24,8 @@ pub struct ErrorEstimate {
     pub at_least: f64,
     /// Mean as of `rel_mse`, over all pixels.
     pub rel_mse_all: f64,
-    /// Variance of the pixels over that of independent samples, measured between iterations; 1 while there are too few.
+    /// Variance of the pixels over that of independent samples, measured between iterations, for pixels whose samples are
+    /// alike and for those that live on few of them apart, and weighted as their errors; 1 while there are too few.
     pub independence: f64,
     /// How many pixels would cause the error if each caused as much: (sum q)^2 / sum q^2 over the pixels' contributions q. Few
     /// if the error is that of few fireflies.

@@ -11,7 +11,24 @@ use super::pixel::{PixelStats, PixelSums};
 use super::sqrt::SqrtNewton;
 use bytemuck::{Pod, Zeroable};
 
-/// Sums over the pixels of an iteration that is being merged: squared differences from the picture before, and variances
+/// Number of classes of pixels; see [`class`].
+pub(super) const CLASSES: usize = 3;
+
+/// Least squared coefficients of variation of the samples in the classes after the first.
+const SPREADS: [f64; CLASSES - 1] = [1.0, 8.0];
+
+/// Class of a pixel by the squared coefficient of variation of its samples. How much samples correlate depends on where
+/// their noise comes from: rounding by a comb and points that are spread evenly make half the variance, or less, where
+/// all samples are of one size, and change nothing where few samples have found all there is. One ratio for all pixels
+/// states 0.7 of the error of a picture with both.
+pub(super) fn class(p: &PixelStats) -> usize {
+    let (mean, variance) = (p.mean(), p.variance_of_mean());
+    let square: f64 = mean.iter().map(|m| m * m).sum();
+    let of_samples = variance.iter().sum::<f64>() * (p.weight * p.weight);
+    SPREADS.iter().filter(|s| of_samples >= **s * square * p.weight_sqr).count()
+}
+
+/// Sums over the pixels of a class of an iteration that is being merged: squared differences from the picture before, and variances
 /// as of independent samples. Relative, with the denominator of relMSE.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
@@ -58,7 +75,7 @@ impl Differences {
 /// An iteration is long if its squared weight is so many times that of the picture before.
 const LONG: f64 = 2.0;
 
-/// True variance of the picture over that of independent samples, and the standard error of this ratio.
+/// True variance of the pixels of a class over that of independent samples, and the standard error of this ratio.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Independence {
@@ -146,6 +163,34 @@ mod tests {
                 lengths.iter().map(|k| (f64::from(*k) / f64::from(n)).powi(2) / 12.0 / f64::from(*k).powi(3)).sum();
             assert!((ratio * stated / truth - 1.0).abs() < 0.12, "{lengths:?}: {} of {truth}", ratio * stated);
             assert!(known.noise > 0.0 && known.noise < 0.2 * ratio, "{lengths:?}: {known:?}");
+        }
+    }
+
+    /// Pixels whose samples are spread evenly do not take away from the error of those where one sample in many is bright:
+    /// each class has its ratio. Killed by: one class, classes by the variance of the mean, which falls with the samples.
+    #[test]
+    fn rare_hits_keep_their_variance_beside_strata() {
+        let mut random = random(11);
+        for n in [16, 64] {
+            let mut d = [Differences::default(); CLASSES];
+            for i in 0..4000 {
+                let mut samples = || match i % 2 {
+                    0 => stratified(n, &mut random),
+                    _ => {
+                        let mut sums = PixelSums::default();
+                        (0..n).for_each(|_| sums.add([if random() < 0.02 { 50.0 } else { 0.0 }; 3]));
+                        sums
+                    }
+                };
+                let (mut p, o) = (samples(), samples());
+                let before = p.stats(None, 0);
+                p.merge(&o);
+                let all = p.stats(None, 0);
+                d[class(&all)].add(&before, &o, 1.0, &all);
+            }
+            let [even, .., rare] = d.map(|d| Independence::UNKNOWN.after(&d).ratio);
+            let truth = 1.0 / f64::from(n);
+            assert!(even < 2.5 * truth && (rare - 1.0).abs() < 0.1, "{n} samples: {even}, {rare}");
         }
     }
 }

@@ -15,6 +15,7 @@
 //! | `surroundings` | what relMSE divides by |
 
 mod aov;
+mod contrast;
 mod coverage;
 mod error;
 mod film_sum;
@@ -37,7 +38,7 @@ pub(crate) use sqrt::SqrtNewton;
 use crate::memory::{Carver, Measure, MemoryError};
 use aov::AovPlanes;
 use bytemuck::{Pod, Zeroable};
-use independence::{Differences, Independence};
+use independence::{CLASSES, Differences, Independence, class};
 use pixel::PixelWeights;
 use surroundings::{SIDE, Span, UNSURE_SHARE, relative_errors};
 
@@ -84,8 +85,9 @@ pub struct Film<'m> {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct FilmScalars {
-    differences: Differences,
-    independence: Independence,
+    /// By class of pixels.
+    differences: [Differences; CLASSES],
+    independence: [Independence; CLASSES],
     error: ErrorEstimate,
     /// 0 until an iteration is merged: what memory holds are no pixels then.
     filled: u64,
@@ -95,8 +97,8 @@ impl FilmScalars {
     /// Those of a film without samples.
     pub(crate) fn new() -> Self {
         Self {
-            differences: Differences::default(),
-            independence: Independence::UNKNOWN,
+            differences: [Differences::default(); CLASSES],
+            independence: [Independence::UNKNOWN; CLASSES],
             error: ErrorEstimate { independence: Independence::UNKNOWN.ratio, ..ErrorEstimate::default() },
             filled: 0,
         }
@@ -212,7 +214,9 @@ impl<'m> Film<'m> {
             }
         };
         let w_alike = if self.weights.is_empty() { 1.0 } else { w };
-        self.scalars.differences.add(&before, sums, w_alike, &all);
+        if let Some(of_class) = self.scalars.differences.get_mut(class(&all)) {
+            of_class.add(&before, sums, w_alike, &all);
+        }
         if let Some(r) = self.rays.get_mut(pixel) {
             *r = if fresh { rays } else { r.saturating_add(rays) };
         }
@@ -226,13 +230,15 @@ impl<'m> Film<'m> {
 
     /// Begins the merge of an iteration; of one that was abandoned no sums are left.
     pub(crate) fn begin_merge(&mut self) {
-        self.scalars.differences = Differences::default();
+        self.scalars.differences = Default::default();
     }
 
     /// Ends the merge of an iteration: all its pixels were added.
     pub(crate) fn end_merge(&mut self) {
         let s = &mut self.scalars;
-        s.independence = s.independence.after(&core::mem::take(&mut s.differences));
+        for (known, d) in s.independence.iter_mut().zip(core::mem::take(&mut s.differences)) {
+            *known = known.after(&d);
+        }
         s.filled = 1;
     }
 
@@ -280,7 +286,16 @@ impl<'m> Film<'m> {
         while pixels < limit as u64 && at + blocks < self.blocks() {
             let pixel = |x: u32, y: u32| self.pixel(y as usize * self.size[0] as usize + x as usize);
             relative_errors(self.block(at + blocks), pixel, |e| {
-                s.show_with(e.error, [e.other, e.unsure], counters);
+                let class = e.class % CLASSES;
+                let ratio = self.scalars.independence[class].ratio;
+                let mut of_classes = [0.0; CLASSES];
+                of_classes[class] = e.error;
+                let [a, b, c] = of_classes;
+                s.show_with(
+                    ratio * e.error,
+                    [ratio * e.other, ratio * e.contrast, ratio * e.unsure, a, b, c],
+                    counters,
+                );
                 pixels += 1;
             });
             blocks += 1;
@@ -297,20 +312,21 @@ impl<'m> Film<'m> {
     pub(crate) fn estimate_error(&mut self, t: &Selection) {
         let m = t.count.max(1) as f64;
         let mean = t.sum / m;
-        let Independence { ratio, noise } = self.scalars.independence;
-        let spread = (t.sum_sqr / m - mean * mean).max(0.0) / m;
-        let spread = ratio * ratio * spread + noise * noise * mean * mean;
+        let [other, contrast, unsure, of_classes @ ..] = t.sum_beside.map(|x| x / m);
+        let noise =
+            self.scalars.independence.iter().zip(of_classes).map(|(i, x)| i.noise * i.noise * x * x).sum::<f64>();
+        let spread = (t.sum_sqr / m - mean * mean).max(0.0) / m + noise;
         // how much depends on the estimated expectations
-        let [other, unsure] = t.sum_beside.map(|x| ratio * x / m);
-        let (doubt, unsure) = (other - ratio * mean, UNSURE_SHARE * unsure);
-        let half = (1.96 * 1.96 * spread + doubt * doubt + unsure * unsure).sqrt_newton();
+        let doubts = [other - mean, contrast, UNSURE_SHARE * unsure];
+        let half = (1.96 * 1.96 * spread + doubts.map(|x| x * x).iter().sum::<f64>()).sqrt_newton();
+        let independent: f64 = of_classes.iter().sum();
         self.scalars.error = ErrorEstimate {
-            rel_mse: ratio * mean,
-            low: (ratio * mean - half).max(0.0),
-            high: ratio * mean + half,
-            at_least: ratio * (mean - t.sum_beside[1] / m).max(0.0),
-            rel_mse_all: ratio * (t.sum + t.rest) / self.pixels.len().max(1) as f64,
-            independence: ratio,
+            rel_mse: mean,
+            low: (mean - half).max(0.0),
+            high: mean + half,
+            at_least: (mean - unsure).max(0.0),
+            rel_mse_all: (t.sum + t.rest) / self.pixels.len().max(1) as f64,
+            independence: if independent > 0.0 { mean / independent } else { 1.0 },
             effective_pixels: if t.sum_sqr > 0.0 { t.sum * t.sum / t.sum_sqr } else { m },
         };
     }

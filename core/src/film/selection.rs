@@ -9,6 +9,9 @@ pub(crate) const DIGITS: usize = 1 << 11;
 /// Bits below each digit, and number of digits above: 11, 10 and 10 bits of a non-negative float.
 const SHIFTS: [[u32; 2]; 3] = [[20, 11], [10, 10], [0, 10]];
 
+/// Number of values that are summed beside each.
+pub(super) const BESIDE: usize = 6;
+
 /// Sums of the non-negative values that are shown, without the `k` largest in `f32`. Of equal values at the limit, as
 /// many are left out as make `k`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -21,7 +24,7 @@ pub(crate) struct Selection {
     /// Sum of their squares.
     pub sum_sqr: f64,
     /// Sums of the values that were shown beside them.
-    pub sum_beside: [f64; 2],
+    pub sum_beside: [f64; BESIDE],
     /// Sum of the largest values, which are left out of `sum`: nothing is ever subtracted (NUMERICS STA-4).
     pub rest: f64,
     /// Number of values that were shown in one visit.
@@ -58,12 +61,12 @@ impl Selection {
     /// Takes the next value of the visit that is under way.
     #[inline(always)]
     pub(crate) fn show(&mut self, x: f64, counters: &mut [u32]) {
-        self.show_with(x, [0.0; 2], counters);
+        self.show_with(x, [0.0; BESIDE], counters);
     }
 
     /// Takes the next value of the visit that is under way, with others that are summed where it is.
     #[inline(always)]
-    pub(crate) fn show_with(&mut self, x: f64, beside: [f64; 2], counters: &mut [u32]) {
+    pub(crate) fn show_with(&mut self, x: f64, beside: [f64; BESIDE], counters: &mut [u32]) {
         let short = x as f32;
         let bits = short.to_bits() & 0x7fff_ffff;
         if let Some([shift, width]) = SHIFTS.get(self.visit as usize) {
@@ -85,7 +88,7 @@ impl Selection {
             self.count += 1;
             self.sum += x;
             self.sum_sqr += x * x;
-            self.sum_beside = [self.sum_beside[0] + beside[0], self.sum_beside[1] + beside[1]];
+            self.sum_beside.iter_mut().zip(beside).for_each(|(sum, y)| *sum += y);
         }
     }
 

@@ -22,21 +22,24 @@
 //! block are those of other parity in column or row: the pixel is in none of the sums, and nothing is subtracted
 //! (NUMERICS STA-4). k = 1 is the estimate; k = [`DOUBT`] says how much depends on this choice, which widens the interval.
 //!
-//! So does what a pixel's own noise makes of its denominator: where q = v / D is large, at the edges of lamps, in
+//! At edges 1 / D is less than its mean over what the pixel may be; [`super::contrast`] says how much less it may be. The
+//! estimate is halfway in the logarithm, and the interval holds both ends.
+//!
+//! What a pixel's own noise makes of its denominator widens the interval too: where q = v / D is large, at the edges of lamps, in
 //! caustics, D is hardly known. Each pixel adds q^2 / (q + [`UNSURE`]), all of q where it is large, next to nothing where
 //! it is small, and [`UNSURE_SHARE`] of the sum counts. Both numbers were found with the benchmark `intervals`.
 
+use super::contrast::{LONGEST, Line, REACH};
 use super::error::{REL_MSE_EPSILON, TAKEN_OFF, relative_denominator};
+use super::independence::class;
 use super::pixel::PixelStats;
 
 /// Pixels a side of the smallest block.
-pub(super) const SIDE: u32 = 16;
-/// Columns, or rows, of the window on either side of a pixel.
-pub(super) const REACH: u32 = 2;
+pub(super) const SIDE: u32 = LONGEST.div_ceil(2) as u32;
 /// Rows of the window.
 const ROWS: usize = 2 * REACH as usize + 1;
 /// Most columns of a block with those that its windows reach.
-const COLUMNS: usize = (2 * SIDE - 1 + 2 * REACH) as usize;
+const COLUMNS: usize = LONGEST + 2 * REACH as usize;
 /// Fewer other pixels say nothing.
 const ENOUGH: f64 = 8.0;
 /// The other k.
@@ -46,16 +49,17 @@ const UNSURE: f64 = 0.25;
 /// Part of what is unsure by which an interval is widened to both sides.
 pub(super) const UNSURE_SHARE: f64 = 0.5;
 
-/// Mean of a pixel and its variance, by channel.
+/// Mean of a pixel and its variance, by channel, and its class.
 #[derive(Clone, Copy, Default)]
 struct Seen {
     mean: [f64; 3],
     variance: [f64; 3],
+    class: usize,
 }
 
 impl Seen {
     fn of(p: &PixelStats) -> Self {
-        Self { mean: p.mean(), variance: p.variance_of_mean() }
+        Self { mean: p.mean(), variance: p.variance_of_mean(), class: class(p) }
     }
 }
 
@@ -120,8 +124,61 @@ pub(super) struct PixelError {
     pub error: f64,
     /// The same with the other k.
     pub other: f64,
+    /// How far it is from D to D' of [`super::contrast`].
+    pub contrast: f64,
     /// What of it is unsure because of the pixel's own noise.
     pub unsure: f64,
+    /// Class of the pixel by the spread of its samples.
+    pub class: usize,
+}
+
+/// What is known of a pixel before its contrast is, by channel: variances over D, and over that with the other k.
+#[derive(Clone, Copy, Default)]
+struct Known {
+    errors: [[f64; 2]; 3],
+    class: usize,
+}
+
+/// Row of a block.
+#[derive(Clone, Copy)]
+struct Row {
+    pixels: [Known; LONGEST],
+    line: Line,
+}
+
+impl Row {
+    const EMPTY: Self = Self { pixels: [Known { errors: [[0.0; 2]; 3], class: 0 }; LONGEST], line: Line::EMPTY };
+
+    /// Sets a pixel.
+    fn add(&mut self, column: usize, p: &Seen, window: &Others, block: &Others) {
+        let known = &mut self.pixels[column % LONGEST];
+        let (mut d, mut left) = ([1.0; 3], [0.0; 3]);
+        known.class = p.class;
+        for c in 0..3 {
+            let (m, v) = (p.mean[c], p.variance[c]);
+            [d[c], left[c]] = denominator(c, [m, v], 1.0, window, block);
+            // without an error there is nothing to divide
+            known.errors[c] =
+                if v > 0.0 { [v / d[c], v / denominator(c, [m, v], DOUBT, window, block)[0]] } else { [0.0; 2] };
+        }
+        self.line.set(column, d, left);
+    }
+
+    /// Shows the errors of `columns` pixels.
+    fn show<'a>(&self, columns: usize, window: impl Iterator<Item = &'a Line>, mut show: impl FnMut(PixelError)) {
+        let rise = self.line.root_of_rise(columns, window);
+        for (p, rise) in self.pixels.iter().zip(rise.as_chunks::<3>().0).take(columns) {
+            let mut sum = PixelError { class: p.class, ..PixelError::default() };
+            for ([q, other], rise) in p.errors.into_iter().zip(rise.map(f64::from)) {
+                let error = q * rise;
+                sum.error += error / 3.0;
+                sum.other += other * rise / 3.0;
+                sum.contrast += (error * rise - q).abs() / 3.0;
+                sum.unsure += error * (error / (error + UNSURE)) / 3.0;
+            }
+            show(sum);
+        }
+    }
 }
 
 /// Columns or rows `from..to` of a block, within `0..size` of the picture.
@@ -168,6 +225,8 @@ pub(super) fn relative_errors(
     });
     // the rows of the windows, each where the one before the first was
     let mut seen = [[Seen::default(); COLUMNS]; ROWS];
+    let mut known = [Row::EMPTY; ROWS];
+    let mut next = y.from;
     let left = x.reach().start;
     for row in y.reach().start..y.to.saturating_add(REACH) {
         if row < y.size {
@@ -186,7 +245,8 @@ pub(super) fn relative_errors(
         };
         let mut columns = [Sums::default(); COLUMNS];
         columns.iter_mut().enumerate().take(x.reach().len()).for_each(|(i, s)| *s = column_of(i));
-        for column in x.from..x.to {
+        let into = &mut known[middle as usize % ROWS];
+        for (i, column) in (x.from..x.to).enumerate() {
             let at = (column - left) as usize % COLUMNS;
             let own = seen[middle as usize % ROWS][at];
             let mut window = Sums::default();
@@ -197,32 +257,25 @@ pub(super) fn relative_errors(
                     window.join(&columns[i % COLUMNS]);
                 }
             }
-            show(relative_error(&own, &window.into(), &block[parity(column, middle) & 3]));
+            into.add(i % LONGEST, &own, &window.into(), &block[parity(column, middle) & 3]);
+        }
+        into.line.take_logarithms();
+        // rows of which all others in the window are known
+        let complete = if middle + 1 == y.to { y.to } else { (middle + 1).saturating_sub(REACH) };
+        while next < complete {
+            let window = next.saturating_sub(REACH).max(y.from)..(next + REACH + 1).min(y.to);
+            let lines = window.map(|r| &known[r as usize % ROWS].line);
+            known[next as usize % ROWS].show((x.to - x.from) as usize, lines, &mut show);
+            next += 1;
         }
     }
 }
 
-/// Relative squared error of a pixel, and how well it is known.
-fn relative_error(p: &Seen, window: &Others, block: &Others) -> PixelError {
-    let mut sum = PixelError::default();
-    for c in 0..3 {
-        let (m, v) = (p.mean[c], p.variance[c]);
-        // without an error there is nothing to divide
-        if v > 0.0 {
-            let [q, other] = [1.0, DOUBT].map(|k| v / denominator(c, [m, v], k, window, block));
-            sum.error += q / 3.0;
-            sum.other += other / 3.0;
-            sum.unsure += q * (q / (q + UNSURE)) / 3.0;
-        }
-    }
-    sum
-}
-
-/// D of a pixel of mean m and variance v > 0.
+/// D of a pixel of mean m and variance v, and what part of it the window tells: t of [`super::contrast`].
 #[inline(always)]
-fn denominator(c: usize, [m, v]: [f64; 2], k: f64, window: &Others, block: &Others) -> f64 {
+fn denominator(c: usize, [m, v]: [f64; 2], k: f64, window: &Others, block: &Others) -> [f64; 2] {
     if block.pixels < ENOUGH || window.pixels < ENOUGH {
-        return relative_denominator(m, v);
+        return [relative_denominator(m, v), 0.0];
     }
     let (noise, contrast) = (window.noise[c], window.contrast[c]);
     let [unsure, surer] = [noise.max(block.noise[c]) / window.pixels, block.contrast[c]];
@@ -230,12 +283,13 @@ fn denominator(c: usize, [m, v]: [f64; 2], k: f64, window: &Others, block: &Othe
     let mean = block.mean[c] + u * (window.mean[c] - block.mean[c]);
     let off = (m - mean) * (m - mean);
     let stands_out = if off > k * v { 1.0 - k * v / off } else { 0.0 };
-    let w = (contrast / (contrast + v.max(noise))).max(stands_out);
+    let [surer, unsure] = [contrast, v.max(noise)];
+    let w = if surer > 0.0 { surer / (surer + unsure) } else { 0.0 }.max(stands_out);
     let e = mean + w * (m - mean);
     let of_window = u * u * noise / window.pixels;
     let of_block = (1.0 - u) * (1.0 - u) * block.noise[c] / block.pixels;
     let variance = TAKEN_OFF * w * w * v + (1.0 - w) * (1.0 - w) * (of_window + of_block);
-    (e * e - variance).max(0.0) + REL_MSE_EPSILON
+    [(e * e - variance).max(0.0) + REL_MSE_EPSILON, (1.0 - w) * u * u]
 }
 
 #[cfg(test)]
