@@ -34,7 +34,7 @@ fn densities_are_trilinear() {
 }
 
 /// Random walks through random grids of random shape: bricks follow each other without a gap from the entry to the exit, as
-/// many as planes are crossed; in 1.5e6 look-ups no density exceeds its majorant.
+/// many as planes are crossed; in 1.5e6 look-ups no density exceeds its majorant, and positions are those of the ray.
 /// Killed by: majorants without their margin or their ring of cells; distances that accumulate; an entry by the origin.
 #[test]
 fn majorants_hold_along_every_walk() {
@@ -83,8 +83,21 @@ fn majorants_hold_along_every_walk() {
                     let found = grids.at(&scene, walk.position(here), live);
                     // and at the world's point, where that is accurate to a fraction of a cell
                     let world = path.o + path.d * (walk.begin + here);
+                    // the walk is where its distance says, in f64
+                    let positions = walk.position(here);
+                    let [o, d] = [path.o, path.d].map(|v| [v.x, v.y, v.z]);
+                    let along = |i: usize, a: usize| {
+                        let t = f64::from(walk.begin.lane(i)) + f64::from(here.lane(i));
+                        let [low, high] = [0, 1].map(|k| f64::from(bounds[k][a]));
+                        let at = f64::from(o[a].lane(i)) + t * f64::from(d[a].lane(i));
+                        (at - low) / (high - low) * f64::from(cells[a])
+                    };
                     let world = density(&scene, U32x8::splat(0), world, live);
                     for i in live.lanes() {
+                        for (a, x) in [positions.x, positions.y, positions.z].into_iter().enumerate() {
+                            let off = (f64::from(x.lane(i)) - along(i, a)).abs();
+                            assert!(far > 3.0 || off < 2e-3, "{off} cells beside");
+                        }
                         assert!(found.lane(i) <= majorant.lane(i), "{} above {}", found.lane(i), majorant.lane(i));
                         assert!(far > 3.0 || world.lane(i) <= majorant.lane(i));
                         looked += 1;

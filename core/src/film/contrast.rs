@@ -23,8 +23,10 @@ pub(super) const LONGEST: usize = 31;
 const MOST: f32 = 1.6;
 /// Values of a row of a block, by column and channel, in whole packets.
 const VALUES: usize = (3 * LONGEST).next_multiple_of(8);
-/// Largest denominator: beyond it squares of radiances in f32 end.
-const LARGEST: f64 = 1e30;
+/// Values of the columns that a window reaches on a side.
+const BESIDE: usize = 3 * REACH as usize;
+/// Largest denominator, and largest error: beyond it f32 ends soon.
+pub(super) const LARGEST: f64 = 1e30;
 
 /// Of a row of a block, by column and channel.
 #[derive(Clone, Copy)]
@@ -35,9 +37,9 @@ pub(super) struct Line {
     left: [f32; VALUES],
 }
 
-fn map(values: &mut [f32; VALUES], f: impl Fn(F32x8) -> F32x8) {
-    let (packets, _) = values.as_chunks_mut::<8>();
-    packets.iter_mut().for_each(|p| *p = f(F32x8::new(*p)).to_array());
+/// Packets that hold the values of `columns` columns.
+fn packets(values: &mut [f32; VALUES], columns: usize) -> impl Iterator<Item = &mut [f32; 8]> {
+    values.as_chunks_mut::<8>().0.iter_mut().take((3 * columns).div_ceil(8))
 }
 
 impl Line {
@@ -52,31 +54,34 @@ impl Line {
         }
     }
 
-    /// Ends the row: all columns are set.
-    pub(super) fn take_logarithms(&mut self) {
-        map(&mut self.denominator, F32x8::ln);
+    /// Ends the row: all of its columns are set.
+    pub(super) fn take_logarithms(&mut self, columns: usize) {
+        packets(&mut self.denominator, columns).for_each(|p| *p = F32x8::new(*p).ln().to_array());
     }
 
     /// Roots of D / D' of the row, of `columns` columns, by column and channel; `window` are the rows that it is seen with, it
     /// among them.
     pub(super) fn root_of_rise<'a>(&self, columns: usize, window: impl Iterator<Item = &'a Self>) -> [f32; VALUES] {
-        let (mut sums, mut rows) = ([0.0; VALUES], 0);
+        // columns beside the block are 0
+        let (mut sums, mut rows) = ([0.0; VALUES + 2 * BESIDE], 0.0);
         for line in window {
-            sums.iter_mut().zip(line.denominator).for_each(|(s, x)| *s += x);
-            rows += 1;
+            let columns = sums.iter_mut().skip(BESIDE).zip(line.denominator).take(3 * columns);
+            columns.for_each(|(s, x)| *s += x);
+            rows += 1.0;
         }
         let mut half = [0.0; VALUES];
-        for column in 0..columns {
-            let reach = column.saturating_sub(REACH as usize)..(column + REACH as usize + 1).min(columns);
-            let others = (rows * reach.len()).saturating_sub(1).max(1) as f32;
-            for c in 0..3 {
-                let at = (3 * column + c) % VALUES;
-                let own = self.denominator[at];
-                let all: f32 = reach.clone().map(|i| sums[(3 * i + c) % VALUES]).sum();
-                half[at] = 0.5 * (self.left[at] * (own - (all - own) / others)).clamp(-MOST, MOST);
-            }
+        let windows = sums.windows(2 * BESIDE + 1);
+        for (i, ((half, s), (own, left))) in
+            half.iter_mut().zip(windows).zip(self.denominator.iter().zip(self.left)).take(3 * columns).enumerate()
+        {
+            let all: f32 = s.iter().step_by(3).sum();
+            let column = i / 3;
+            let from = column.saturating_sub(REACH as usize);
+            let to = (column + REACH as usize + 1).min(columns);
+            let others = (rows * (to - from) as f32 - 1.0).max(1.0);
+            *half = 0.5 * (left * (own - (all - own) / others)).clamp(-MOST, MOST);
         }
-        map(&mut half, F32x8::exp);
+        packets(&mut half, columns).for_each(|p| *p = F32x8::new(*p).exp().to_array());
         half
     }
 }
@@ -97,7 +102,7 @@ mod tests {
         let mut lines = [Line::EMPTY; 3];
         for (row, line) in lines.iter_mut().enumerate() {
             (0..COLUMNS).for_each(|x| line.set(x, [value(row, x), 1e40, 1.0], [left(x), 1.0, 0.0]));
-            line.take_logarithms();
+            line.take_logarithms(COLUMNS);
         }
         let found = lines[1].root_of_rise(COLUMNS, lines.iter());
         for column in 0..COLUMNS {
