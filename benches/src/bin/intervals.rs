@@ -5,7 +5,7 @@
 //! renders from their mean; the stated relMSE over the true one and how many of the stated 95 % intervals hold it, of the
 //! renders whose error is resolved; how many of them hold the error of their own picture, against the mean of all other
 //! renders (a strategy that learns is worth more with one seed than with another, and pictures with a firefly have a
-//! larger error than those without, so that the expectation is the error of none of them); of the others, how many true
+//! larger error than those without, so that the expectation may be far from the error of each); of the others, how many true
 //! errors are as large as stated at least, and how many intervals would have missed, had they been given; and the squared
 //! standard errors of single pixels over the true ones, both relative as relMSE is. Fails if fewer than nine in ten of all
 //! resolved intervals hold the error of their picture.
@@ -153,7 +153,7 @@ impl Row {
         let one = |picture: &Vec<f64>| {
             let pixels = picture.iter().zip(&all.sums).zip(&all.denominators);
             let sum: f64 = pixels.map(|((x, sum), d)| (x - (sum - own * x) / rest).powi(2) / d).sum();
-            // the reference has an error too, of samples as independent as these
+            // the reference has an error too; right on average, little of outliers if the others have many more samples
             sum / picture.len() as f64 * rest / all.samples
         };
         self.pictures.iter().map(one).collect()

@@ -14,7 +14,8 @@ use bytemuck::{Pod, Zeroable};
 #[repr(C)]
 pub struct ErrorEstimate {
     /// Mean over pixels and channels of variance / (expectation^2 + 0.01), without the worst 0.01 % of pixels, times
-    /// `independence`. The expectation is estimated from the pixel and those around it.
+    /// `independence`. The expectation is estimated from the pixel and those around it; at edges, where it may be that of
+    /// either side, the estimate is in the middle of what that makes of the error.
     pub rel_mse: f64,
     /// Lower end of the 95 % confidence interval of `rel_mse`; see [`Self::interval`].
     pub low: f64,

@@ -72,6 +72,9 @@ impl Differences {
     }
 }
 
+/// Least effective number of pixels that tell a ratio.
+const FEWEST: f64 = 8.0;
+
 /// An iteration is long if its squared weight is so many times that of the picture before.
 const LONG: f64 = 2.0;
 
@@ -95,6 +98,10 @@ impl Independence {
         }
         let r = d.found / (s + t);
         let [a, b, ab] = d.squares;
+        if (s + t) * (s + t) < FEWEST * b {
+            // the ratio of a few pixels says nothing of others
+            return self;
+        }
         // variance of what was found, beyond what was expected
         let noise = (a - 2.0 * r * ab + r * r * b).max(0.0);
         let [old, new] = d.weight.map(|w| w / (d.weight[0] + d.weight[1]));
@@ -188,9 +195,11 @@ mod tests {
                 let all = p.stats(None, 0);
                 d[class(&all)].add(&before, &o, 1.0, &all);
             }
-            let [even, .., rare] = d.map(|d| Independence::UNKNOWN.after(&d).ratio);
-            let truth = 1.0 / f64::from(n);
-            assert!(even < 2.5 * truth && (rare - 1.0).abs() < 0.1, "{n} samples: {even}, {rare}");
+            let [even, .., rare] = d.map(|d| Independence::UNKNOWN.after(&d));
+            // strata: 1 / n^3 of the variance of a sample in a mean, over the 1 / n that the spread of both halves states
+            let square = f64::from(n).powi(2);
+            assert!((even.ratio * square - 1.0).abs() < 0.15, "{n} samples: {even:?}");
+            assert!((rare.ratio - 1.0).abs() < 0.1 && rare.noise > 0.0, "{n} samples: {rare:?}");
         }
     }
 }

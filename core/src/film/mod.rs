@@ -13,6 +13,7 @@
 //! | `selection` | sums without the largest values |
 //! | `sqrt` | square root in f64 |
 //! | `surroundings` | what relMSE divides by |
+//! | `contrast` | how much more an error may be at an edge |
 
 mod aov;
 mod contrast;
@@ -276,7 +277,8 @@ impl<'m> Film<'m> {
     pub(crate) fn begin_errors(&self, s: &mut Selection, counters: &mut [u32]) {
         match Self::outliers(self.pixels.len() as u64) {
             0 => s.begin_with_all(counters),
-            _ => s.begin(counters),
+            // which of two that are alike is left out does not matter, and each visit costs as much as the first
+            _ => s.begin_coarse(counters),
         }
     }
 
@@ -320,13 +322,14 @@ impl<'m> Film<'m> {
         let doubts = [other - mean, contrast, UNSURE_SHARE * unsure];
         let half = (1.96 * 1.96 * spread + doubts.map(|x| x * x).iter().sum::<f64>()).sqrt_newton();
         let independent: f64 = of_classes.iter().sum();
+        let known = self.scalars.independence.iter().any(|i| i.ratio != Independence::UNKNOWN.ratio);
         self.scalars.error = ErrorEstimate {
             rel_mse: mean,
             low: (mean - half).max(0.0),
             high: mean + half,
-            at_least: (mean - unsure).max(0.0),
+            at_least: (mean - unsure - contrast).max(0.0),
             rel_mse_all: (t.sum + t.rest) / self.pixels.len().max(1) as f64,
-            independence: if independent > 0.0 { mean / independent } else { 1.0 },
+            independence: if known && independent > 0.0 { mean / independent } else { Independence::UNKNOWN.ratio },
             effective_pixels: if t.sum_sqr > 0.0 { t.sum * t.sum / t.sum_sqr } else { m },
         };
     }

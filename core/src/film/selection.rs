@@ -9,6 +9,9 @@ pub(crate) const DIGITS: usize = 1 << 11;
 /// Bits below each digit, and number of digits above: 11, 10 and 10 bits of a non-negative float.
 const SHIFTS: [[u32; 2]; 3] = [[20, 11], [10, 10], [0, 10]];
 
+/// Bits that the last digit tells.
+const COARSE: u32 = SHIFTS[2][1];
+
 /// Number of values that are summed beside each.
 pub(super) const BESIDE: usize = 6;
 
@@ -37,7 +40,8 @@ pub(crate) struct Selection {
     visit: u32,
     /// Bits of the limit that are known.
     prefix: u32,
-    reserved: u32,
+    /// Bits in which values do not differ.
+    ignored: u32,
 }
 
 impl Selection {
@@ -50,6 +54,12 @@ impl Selection {
     pub(crate) fn begin(&mut self, counters: &mut [u32]) {
         *self = Self::default();
         counters.fill(0);
+    }
+
+    /// Begins, with a visit less: values that differ by less than 2^-13 are taken for equal.
+    pub(crate) fn begin_coarse(&mut self, counters: &mut [u32]) {
+        self.begin(counters);
+        self.ignored = (1 << COARSE) - 1;
     }
 
     /// Begins with the last visit, which leaves nothing out: for those who know that before.
@@ -67,8 +77,8 @@ impl Selection {
     /// Takes the next value of the visit that is under way, with others that are summed where it is.
     #[inline(always)]
     pub(crate) fn show_with(&mut self, x: f64, beside: [f64; BESIDE], counters: &mut [u32]) {
-        let short = x as f32;
-        let bits = short.to_bits() & 0x7fff_ffff;
+        let bits = (x as f32).to_bits() & 0x7fff_ffff & !self.ignored;
+        let short = f32::from_bits(bits);
         if let Some([shift, width]) = SHIFTS.get(self.visit as usize) {
             self.shown += u64::from(self.visit == 0);
             let above = shift + width;
@@ -109,7 +119,8 @@ impl Selection {
                 self.left -= u64::from(*n);
             }
             self.limit = f32::from_bits(self.prefix);
-            self.visit += 1;
+            let all_known = self.ignored.count_ones() >= *shift;
+            self.visit = if all_known { SHIFTS.len() as u32 } else { self.visit + 1 };
         }
         counters.fill(0);
         false
@@ -144,6 +155,34 @@ mod tests {
         assert_eq!(of(3, &[9.0, 3.0, 3.0, 3.0, 1.0]), (2, 4.0, 15.0));
         assert_eq!(of(1, &[0.0; 4]), (3, 0.0, 0.0));
         assert_eq!(of(9, &[2.0, 1.0]), (0, 0.0, 3.0));
+    }
+
+    /// Killed by: a visit too few or too many, bits that count where they should not.
+    #[test]
+    fn two_visits_leave_out_as_many() {
+        let values: [f64; 64] = core::array::from_fn(|i| 1.0 + ((i * 29) % 64) as f64);
+        for k in [1, 7, 63] {
+            let (mut s, mut counters, mut visits) = (Selection::default(), [7; DIGITS], 0);
+            s.begin_coarse(&mut counters);
+            loop {
+                values.iter().for_each(|x| s.show(*x, &mut counters));
+                visits += 1;
+                if s.end_visit(|_| k, &mut counters) {
+                    break;
+                }
+            }
+            let kept = 64 - k;
+            assert_eq!((visits, s.count, s.sum), (3, kept, (kept * (kept + 1) / 2) as f64), "{k}");
+        }
+        // equal but for the last digit: the later ones stay
+        let (mut s, mut counters) = (Selection::default(), [7; DIGITS]);
+        s.begin_coarse(&mut counters);
+        let alike = [1.0, 1.0 + 1e-6, 1.0 + 2e-6];
+        while {
+            alike.iter().for_each(|x| s.show(*x, &mut counters));
+            !s.end_visit(|_| 1, &mut counters)
+        } {}
+        assert_eq!((s.count, s.rest), (2, 1.0));
     }
 
     /// One visit sums what several that leave nothing out do. Killed by: a limit of 0.

@@ -25,9 +25,10 @@
 //! At edges 1 / D is less than its mean over what the pixel may be; [`super::contrast`] says how much less it may be. The
 //! estimate is halfway in the logarithm, and the interval holds both ends.
 //!
-//! What a pixel's own noise makes of its denominator widens the interval too: where q = v / D is large, at the edges of lamps, in
-//! caustics, D is hardly known. Each pixel adds q^2 / (q + [`UNSURE`]), all of q where it is large, next to nothing where
-//! it is small, and [`UNSURE_SHARE`] of the sum counts. Both numbers were found with the benchmark `intervals`.
+//! What a pixel's own noise makes of its denominator widens the interval too: where q = v / D is large, at the edges of
+//! lamps, in caustics, D is hardly known. Each pixel adds q^2 / (q + [`UNSURE`]), all of q where it is large, next to
+//! nothing where it is small, and [`UNSURE_SHARE`] of the sum counts. Both numbers were found with the benchmark
+//! `intervals`.
 
 use super::contrast::{LARGEST, LONGEST, Line, REACH};
 use super::error::{REL_MSE_EPSILON, TAKEN_OFF, relative_denominator};
@@ -287,8 +288,10 @@ fn denominator(c: usize, [m, v]: [f64; 2], k: f64, window: &Others, block: &Othe
     let u = if surer > 0.0 { surer / (surer + unsure) } else { 0.0 };
     let mean = block.mean[c] + u * (window.mean[c] - block.mean[c]);
     let off = (m - mean) * (m - mean);
-    let stands_out = if off > k * v { 1.0 - k * v / off } else { 0.0 };
-    let [surer, unsure] = [contrast, v.max(noise)];
+    // a pixel that has found nothing knows nothing: it is as noisy as the others
+    let own = if v > 0.0 { v } else { noise };
+    let stands_out = if off > k * own { 1.0 - k * own / off } else { 0.0 };
+    let [surer, unsure] = [contrast, own.max(noise)];
     let w = if surer > 0.0 { surer / (surer + unsure) } else { 0.0 }.max(stands_out);
     let e = mean + w * (m - mean);
     let of_window = u * u * noise / window.pixels;
