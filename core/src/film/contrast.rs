@@ -1,10 +1,10 @@
 //! How far 1 / D may be from that of the mean that is estimated of a pixel, where it knows little of itself: mostly how
 //! much more.
 //!
-//! Around an edge a pixel is dark or bright, and its mean is estimated between the two: 1 / D of that is less than the mean of
-//! 1 / D (Jensen's inequality), so that the error of fireflies in shadows was stated as half of what it is. The mean of 1 / D
-//! over the window would be too much where the window's own noise makes its denominators differ; the geometric mean hardly
-//! depends on it:
+//! Around an edge a pixel is dark or bright, and its mean is estimated between the two: 1 / D of that is less than the
+//! mean of 1 / D (Jensen's inequality), which would state too small an error of fireflies in shadows. The mean of 1 / D over
+//! the window would be too much where the window's own noise makes its denominators differ; the geometric mean depends on
+//! it less:
 //!
 //! ```text
 //! ln D' = ln D + t (mean of ln D of the others in the window - ln D)        t = (1 - w) u^2
@@ -12,8 +12,8 @@
 //!
 //! with at most a factor 5 between D and D': next to lamps a window holds anything. `t` is what the pixel leaves
 //! to others, and of that what the window knows better than the block; squared, as the window's contrast is not known
-//! better than its mean. Windows end at the block. In the scenes of the benchmark `intervals` the true error lies
-//! between that of D and that of D' in nearly all pictures.
+//! better than its mean. Windows end at the block. Neither D nor D' is right in all scenes, which is why the estimate takes
+//! the middle; the benchmark `intervals` shows what that is worth.
 
 use croupier_simd::F32x8;
 
@@ -61,8 +61,8 @@ impl Line {
         packets(&mut self.denominator, columns).for_each(|p| *p = F32x8::new(*p).ln().to_array());
     }
 
-    /// Roots of D / D' of the row, of `columns` columns, by column and channel; `window` are the rows that it is seen with, it
-    /// among them.
+    /// Roots of D / D' of the row, of `columns` columns, by column and channel; `window` are the rows that it is seen with,
+    /// it among them.
     pub(super) fn root_of_rise<'a>(&self, columns: usize, window: impl Iterator<Item = &'a Self>) -> [f32; VALUES] {
         // columns beside the block are 0
         let (mut sums, mut rows) = ([0.0; VALUES + 2 * BESIDE], 0.0);

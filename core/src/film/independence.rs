@@ -19,8 +19,8 @@ const SPREADS: [f64; CLASSES - 1] = [1.0, 8.0];
 
 /// Class of a pixel by the squared coefficient of variation of its samples. How much samples correlate depends on where
 /// their noise comes from: rounding by a comb and points that are spread evenly make half the variance, or less, where
-/// all samples are of one size, and change nothing where few samples have found all there is. One ratio for all pixels
-/// states 0.7 of the error of a picture with both.
+/// all samples are of one size, and change nothing where few samples have found all there is. One ratio for all pixels is
+/// mostly that of the former, and states too little of the error of the latter.
 pub(super) fn class(p: &PixelStats) -> usize {
     let (mean, variance) = (p.mean(), p.variance_of_mean());
     let square: f64 = mean.iter().map(|m| m * m).sum();
@@ -28,8 +28,8 @@ pub(super) fn class(p: &PixelStats) -> usize {
     SPREADS.iter().filter(|s| of_samples >= **s * square * p.weight_sqr).count()
 }
 
-/// Sums over the pixels of a class of an iteration that is being merged: squared differences from the picture before, and variances
-/// as of independent samples. Relative, with the denominator of relMSE.
+/// Sums over the pixels of a class of an iteration that is being merged: squared differences from the picture before, and
+/// variances as of independent samples. Relative, with the denominator of relMSE.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Differences {
@@ -200,6 +200,31 @@ mod tests {
             let square = f64::from(n).powi(2);
             assert!((even.ratio * square - 1.0).abs() < 0.15, "{n} samples: {even:?}");
             assert!((rare.ratio - 1.0).abs() < 0.1 && rare.noise > 0.0, "{n} samples: {rare:?}");
+        }
+    }
+
+    /// A few pixels tell no ratio, however many there are without an error. Killed by: a ratio of one pixel, whose noise
+    /// would be 0.
+    #[test]
+    fn few_pixels_tell_nothing() {
+        for (pixels, tells) in [(1, false), (4, false), (40, true)] {
+            let (mut random, mut d) = (random(3), Differences::default());
+            for i in 0..1000 {
+                let mut samples = || match i < pixels {
+                    true => stratified(8, &mut random),
+                    false => {
+                        let mut sums = PixelSums::default();
+                        (0..8).for_each(|_| sums.add([10.0; 3]));
+                        sums
+                    }
+                };
+                let (mut p, o) = (samples(), samples());
+                let before = p.stats(None, 0);
+                p.merge(&o);
+                d.add(&before, &o, 1.0, &p.stats(None, 0));
+            }
+            let known = Independence::UNKNOWN.after(&d);
+            assert_eq!((known.ratio < 0.5, known.noise > 0.0), (tells, tells), "{pixels} pixels: {known:?}");
         }
     }
 }
