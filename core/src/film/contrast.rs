@@ -45,7 +45,7 @@ fn packets(values: &mut [f32; VALUES], columns: usize) -> impl Iterator<Item = &
 }
 
 impl Line {
-    pub(super) const EMPTY: Self = Self { denominator: [1.0; VALUES], left: [0.0; VALUES] };
+    pub(super) const EMPTY: Self = Self { denominator: [0.0; VALUES], left: [0.0; VALUES] };
 
     /// Sets D and t of a column.
     pub(super) fn set(&mut self, column: usize, denominator: [f64; 3], left: [f64; 3]) {

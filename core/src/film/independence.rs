@@ -91,6 +91,8 @@ impl Independence {
     pub(super) const UNKNOWN: Self = Self { ratio: 1.0, noise: 0.0 };
 
     /// Ratio after an iteration: the picture before had variance r S, and the iteration has the rest of what was found.
+    // once, not unrolled over the classes
+    #[inline(never)]
     pub(super) fn after(self, d: &Differences) -> Self {
         let [s, t, both] = d.stated;
         if s + t <= 0.0 || both <= 0.0 {

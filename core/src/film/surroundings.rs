@@ -51,7 +51,7 @@ const UNSURE: f64 = 0.25;
 pub(super) const UNSURE_SHARE: f64 = 0.5;
 
 /// Mean of a pixel and its variance, by channel, and its class.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct Seen {
     mean: [f64; 3],
     variance: [f64; 3],
@@ -59,6 +59,8 @@ struct Seen {
 }
 
 impl Seen {
+    const NOTHING: Self = Self { mean: [0.0; 3], variance: [0.0; 3], class: 0 };
+
     fn of(p: &PixelStats) -> Self {
         Self { mean: p.mean(), variance: p.variance_of_mean(), class: class(p) }
     }
@@ -133,33 +135,29 @@ pub(super) struct PixelError {
     pub class: usize,
 }
 
-/// What is known of a pixel before its contrast is, by channel: variances over D, and over that with the other k.
-#[derive(Clone, Copy, Default)]
-struct Known {
-    errors: [[f32; 2]; 3],
-    class: u8,
-}
-
-/// Row of a block.
+/// Row of a block: what is known of its pixels before their contrast is.
 #[derive(Clone, Copy)]
 struct Row {
-    pixels: [Known; LONGEST],
+    /// Variances over D, and over that with the other k, by pixel and channel.
+    errors: [[[f32; 2]; 3]; LONGEST],
+    classes: [u8; LONGEST],
     line: Line,
 }
 
 impl Row {
-    const EMPTY: Self = Self { pixels: [Known { errors: [[0.0; 2]; 3], class: 0 }; LONGEST], line: Line::EMPTY };
+    /// All zeros, which are not stored one by one.
+    const EMPTY: Self = Self { errors: [[[0.0; 2]; 3]; LONGEST], classes: [0; LONGEST], line: Line::EMPTY };
 
     /// Sets a pixel.
     fn add(&mut self, column: usize, p: &Seen, window: &Others, block: &Others) {
-        let known = &mut self.pixels[column % LONGEST];
         let (mut d, mut left) = ([1.0; 3], [0.0; 3]);
-        known.class = p.class as u8;
+        self.classes[column % LONGEST] = p.class as u8;
+        let errors = &mut self.errors[column % LONGEST];
         for c in 0..3 {
             let (m, v) = (p.mean[c], p.variance[c]);
             [d[c], left[c]] = denominator(c, [m, v], 1.0, window, block);
             // without an error there is nothing to divide
-            known.errors[c] = if v > 0.0 {
+            errors[c] = if v > 0.0 {
                 let other = denominator(c, [m, v], DOUBT, window, block)[0];
                 [d[c], other].map(|d| (v / d).min(LARGEST) as f32)
             } else {
@@ -172,9 +170,10 @@ impl Row {
     /// Shows the errors of `columns` pixels.
     fn show<'a>(&self, columns: usize, window: impl Iterator<Item = &'a Line>, mut show: impl FnMut(PixelError)) {
         let rise = self.line.root_of_rise(columns, window);
-        for (p, rise) in self.pixels.iter().zip(rise.as_chunks::<3>().0).take(columns) {
-            let mut sum = PixelError { class: p.class.into(), ..PixelError::default() };
-            for (errors, rise) in p.errors.into_iter().zip(rise.map(f64::from)) {
+        let pixels = self.errors.iter().zip(self.classes).zip(rise.as_chunks::<3>().0);
+        for ((errors, class), rise) in pixels.take(columns) {
+            let mut sum = PixelError { class: class.into(), ..PixelError::default() };
+            for (errors, rise) in errors.iter().zip(rise.map(f64::from)) {
                 let [q, other] = errors.map(f64::from);
                 let error = q * rise;
                 sum.error += error / 3.0;
@@ -230,8 +229,8 @@ pub(super) fn relative_errors(
         all.into()
     });
     // the rows of the windows, each where the one before the first was
-    let mut seen = [[Seen::default(); COLUMNS]; ROWS];
-    let mut known = [Row::EMPTY; ROWS];
+    let mut seen = const { [[Seen::NOTHING; COLUMNS]; ROWS] };
+    let mut known = const { [Row::EMPTY; ROWS] };
     let mut next = y.from;
     let left = x.reach().start;
     for row in y.reach().start..y.to.saturating_add(REACH) {
