@@ -135,15 +135,16 @@ fn guides_that_pay_are_enabled() {
     let scene = blob(&mirror_and_glass());
     let size = [32, 32];
     let reference = run_to(CAUSTICS, &scene, &Settings { size, ..plain(&guided(&scene, "none", 6)) }, &mut |_, _| ());
-    let mut s = Settings { size, ..guided(&scene, "ears", 6) };
+    // a seed with which some thousand samples suffice: with others it takes up to 16,000
+    let mut s = Settings { size, seed: 4, ..guided(&scene, "ears", 6) };
     (s.shadow_roulette, s.learning.guiding) = (true, Guiding::Auto);
     let (mut enabled, mut last) = (0, None);
-    let image = run_to(CAUSTICS, &scene, &s, &mut |_, l| {
+    let image = learning(&scene, &s, &doubling(4088), IN_ORDER, &mut |_, l| {
         last = l.guide_use();
         enabled += u32::from(last.is_some_and(|u| u.enabled));
     });
     println!("enabled after {enabled} iterations, {last:?}");
-    assert!(enabled > 0, "{last:?}");
+    assert!(enabled >= 5, "{last:?}");
     assert_within(CAUSTICS, "ears, guided where it pays", &image, &reference);
 }
 

@@ -193,6 +193,23 @@ fn moment_and_variance_decide_together() {
     }
 }
 
+/// `ears` splits into the number of samples that minimises V / k + price x k, by search: k + 1 from s^2 = k (k + 1) on.
+/// Killed by: factors that are rounded to the nearest or down, whole numbers for roulette or for the paper's rule.
+#[test]
+fn splits_are_whole_numbers_of_samples() {
+    let squares = (1..=19).flat_map(|k| [0.99, 1.01].map(|x| x * (k * (k + 1)) as f32));
+    for square in squares.chain([1.0, 1.5, 3.0, 4.0, 5.0, 100.0]) {
+        let v = learned(0.5, square, square, 1.0);
+        let costs = |k: &u8| f64::from(square) / f64::from(*k) + f64::from(*k);
+        let best = (1..=20u8).min_by(|a, b| costs(a).total_cmp(&costs(b))).unwrap();
+        assert_eq!(with("ears", &v), f32::from(best), "a factor whose square is {square}");
+        let papers = with("ears:plain", &v) / square.sqrt().min(MAX_FACTOR);
+        assert!((papers - 1.0).abs() < 1e-6, "the paper's, of {square}: {papers} times its root");
+    }
+    let s = with("ears", &learned(0.25, 0.25, 0.25, 1.0));
+    assert!((s - 0.5).abs() < 1e-3, "roulette stays what it is: {s}");
+}
+
 /// Eq. 32: s = sqrt(norm(beta^2 x error weight x moment) x C / V / c). Killed by: a weight unsquared, the cost upside
 /// down, an error weight per colour that is averaged first.
 #[test]

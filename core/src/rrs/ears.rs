@@ -5,6 +5,8 @@
 //! So the factor is a geometric blend of rules by the number of samples: `classic` without any, `adrrs` (which needs a
 //! mean) with some, EARS (which needs a second moment) with more.
 //!
+//! Factors above 1 are whole numbers of samples ([`whole`]), but for the paper's own rule.
+//!
 //! | parameter | unit | value |
 //! |---|---|---|
 //! | [`TRUST_MEAN`] | samples of a bin | 32 |
@@ -94,6 +96,15 @@ pub(super) fn grown(v: &Vertices8, s: F32x8, plain: bool) -> F32x8 {
     broken.select(F32x8::splat(f32::NAN), s)
 }
 
+/// Number of samples in place of a factor above 1. Only k samples leave 1 / k of the variance V: a factor between k and
+/// k + 1 leaves a mean of what both do, and what rounding adds. At the prices of eq. 32 k + 1 samples are worth more than k
+/// where V / k - V / (k + 1) is worth the cost of one, which is where s^2 > k (k + 1).
+#[inline(always)]
+fn whole(s: F32x8) -> F32x8 {
+    let k = (F32x8::splat(0.5) + (s * s + F32x8::splat(0.25)).sqrt()).floor();
+    s.gt(F32x8::ONE).select(k, s)
+}
+
 impl RrsStrategy for Ears {
     const NEEDS_ALBEDO: bool = true;
     const EFFICIENCY_AWARE: bool = true;
@@ -109,6 +120,7 @@ impl RrsStrategy for Ears {
 
     #[inline(always)]
     fn factor(&self, v: &Vertices8) -> F32x8 {
-        grown(v, efficient_factor(&v.learned, v.beta), self.plain)
+        let s = grown(v, efficient_factor(&v.learned, v.beta), self.plain);
+        if self.plain { s } else { whole(s) }
     }
 }
