@@ -26,8 +26,8 @@ impl Record {
         if x >= lo && x <= hi { Ok(()) } else { Err(self.bad(field, x)) }
     }
 
-    // its loop would be unrolled in dozens of places
-    #[inline(never)]
+    // its loop would be unrolled in dozens of places, and pages load modules
+    #[cfg_attr(target_family = "wasm", inline(never))]
     pub(super) fn all_within(self, field: Field, x: &[f32], lo: f32, hi: f32) -> Result<(), SceneError> {
         x.iter().try_for_each(|x| self.within(field, *x, lo, hi))
     }
@@ -54,7 +54,7 @@ impl Record {
         if reserved { Ok(()) } else { Err(SceneError::Reserved { of: self.of, index: self.index() }) }
     }
 
-    #[inline(never)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
     pub(super) fn wrong_reference(self, to: SectionKind, found: u32, count: usize) -> SceneError {
         let count = u32::try_from(count).unwrap_or(u32::MAX);
         SceneError::Reference { of: self.of, index: self.index(), to, found, count }
