@@ -135,11 +135,11 @@ fn guides_that_pay_are_enabled() {
     let scene = blob(&mirror_and_glass());
     let size = [32, 32];
     let reference = run_to(CAUSTICS, &scene, &Settings { size, ..plain(&guided(&scene, "none", 6)) }, &mut |_, _| ());
-    // a seed with which some thousand samples suffice: with others it takes up to 16,000
-    let mut s = Settings { size, seed: 4, ..guided(&scene, "ears", 6) };
+    let mut s = Settings { size, ..guided(&scene, "ears", 6) };
     (s.shadow_roulette, s.learning.guiding) = (true, Guiding::Auto);
     let (mut enabled, mut last) = (0, None);
-    let image = learning(&scene, &s, &doubling(4088), IN_ORDER, &mut |_, l| {
+    // what the mean needs is too few to find out: with some seeds it takes more than 4,000 samples per pixel
+    let image = learning(&scene, &s, &doubling(16_000), IN_ORDER, &mut |_, l| {
         last = l.guide_use();
         enabled += u32::from(last.is_some_and(|u| u.enabled));
     });

@@ -59,6 +59,7 @@ struct Seen {
 }
 
 impl Seen {
+    /// Arrays of a constant are filled; of a value each field would be copied.
     const NOTHING: Self = Self { mean: [0.0; 3], variance: [0.0; 3], class: 0 };
 
     fn of(p: &PixelStats) -> Self {
@@ -145,7 +146,6 @@ struct Row {
 }
 
 impl Row {
-    /// All zeros, which are not stored one by one.
     const EMPTY: Self = Self { errors: [[[0.0; 2]; 3]; LONGEST], classes: [0; LONGEST], line: Line::EMPTY };
 
     /// Sets a pixel.

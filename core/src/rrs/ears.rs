@@ -29,7 +29,7 @@ const MOST_THROUGHPUT: f32 = 10.0;
 /// Efficiency-aware roulette and splitting: the most efficient factor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ears {
-    /// Full trust in statistics from the first sample on, as in the paper.
+    /// Full trust in statistics from the first sample on, and factors that are no whole numbers, as in the paper.
     pub plain: bool,
 }
 
@@ -96,9 +96,10 @@ pub(super) fn grown(v: &Vertices8, s: F32x8, plain: bool) -> F32x8 {
     broken.select(F32x8::splat(f32::NAN), s)
 }
 
-/// Number of samples in place of a factor above 1. Only k samples leave 1 / k of the variance V: a factor between k and
-/// k + 1 leaves a mean of what both do, and what rounding adds. At the prices of eq. 32 k + 1 samples are worth more than k
-/// where V / k - V / (k + 1) is worth the cost of one, which is where s^2 > k (k + 1).
+/// Number of samples in place of a factor above 1. With f = s - k between 0 and 1, k or k + 1 samples over s leave the
+/// variance V / s of the samples, and rounding adds f (1 - f) / s^2 of their squared mean, which eq. 32 leaves out and
+/// which is most of the error where samples hardly differ. At the prices of eq. 32 k + 1 samples are worth more than k where
+/// V / k - V / (k + 1) is worth the cost of one, which is where s^2 > k (k + 1).
 #[inline(always)]
 fn whole(s: F32x8) -> F32x8 {
     let k = (F32x8::splat(0.5) + (s * s + F32x8::splat(0.25)).sqrt()).floor();

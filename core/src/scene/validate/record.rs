@@ -26,7 +26,7 @@ impl Record {
         if x >= lo && x <= hi { Ok(()) } else { Err(self.bad(field, x)) }
     }
 
-    // its loop would be unrolled in dozens of places, and pages load modules
+    // pages load modules: there neither its loop is repeated in dozens of places, nor `wrong_reference`
     #[cfg_attr(target_family = "wasm", inline(never))]
     pub(super) fn all_within(self, field: Field, x: &[f32], lo: f32, hi: f32) -> Result<(), SceneError> {
         x.iter().try_for_each(|x| self.within(field, *x, lo, hi))
