@@ -1,7 +1,7 @@
 //! One render, watched: its error against the reference and its cost after every iteration.
 
 use crate::clock::cpu_seconds;
-use crate::stats::time_to;
+use crate::stats::{error_at, time_to};
 use crate::subject::Subject;
 use crate::variant::Variant;
 use croupier::unstable::film::PixelStats;
@@ -69,7 +69,17 @@ impl Run {
 
     /// Core-seconds until the robust relMSE came down to `level`; `None` if it did not.
     pub fn seconds_to(&self, level: f64) -> Option<f64> {
-        time_to(&self.snapshots.iter().map(|s| (s.core_seconds, s.robust)).collect::<Vec<_>>(), level)
+        time_to(&self.curve(), level)
+    }
+
+    /// The robust relMSE after so many core-seconds; `None` before the first iteration, and after the last.
+    pub fn error_after(&self, seconds: f64) -> Option<f64> {
+        error_at(&self.curve(), seconds)
+    }
+
+    /// Core-seconds and robust relMSE after each iteration.
+    fn curve(&self) -> Vec<(f64, f64)> {
+        self.snapshots.iter().map(|s| (s.core_seconds, s.robust)).collect()
     }
 }
 

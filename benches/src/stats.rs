@@ -92,6 +92,24 @@ pub fn time_to(curve: &[(f64, f64)], level: f64) -> Option<f64> {
     Some(t0 * (t / t0).powf((e0 / level).ln() / (e0 / e).ln()))
 }
 
+/// Part of a time by which a curve may end before it.
+const SHORT: f64 = 0.05;
+
+/// The error at a time, from points (time, error) in the order of time: a line in logarithms between the two points around
+/// it. `None` before the first, and more than 5 % after the last; until then the error falls as 1 / time.
+pub fn error_at(curve: &[(f64, f64)], time: f64) -> Option<f64> {
+    let Some(i) = curve.iter().position(|&(t, _)| t >= time) else {
+        let &(t, e) = curve.last()?;
+        return (t >= (1.0 - SHORT) * time).then(|| e * t / time);
+    };
+    let (t, e) = curve[i];
+    if t == time {
+        return Some(e);
+    }
+    let (t0, e0) = curve[i.checked_sub(1)?];
+    Some(e0 * (e / e0).powf((time / t0).ln() / (t / t0).ln()))
+}
+
 /// Three significant digits.
 pub fn digits(x: f64) -> String {
     if x == 0.0 || !x.is_finite() {

@@ -37,7 +37,8 @@ fn the_jackknife_of_a_mean_is_its_standard_error() {
     assert_eq!(jackknife(&[1.0, 2.0, f64::NAN]), None);
 }
 
-/// Error 2 / t. Killed by: interpolation without logarithms, the last crossing for the first.
+/// Error 2 / t. Killed by: interpolation without logarithms, the last crossing for the first, the error of the last point
+/// for all times after it.
 #[test]
 fn times_are_interpolated_in_logarithms() {
     let curve: Vec<(f64, f64)> = [1.0, 2.0, 8.0, 9.0, 20.0].map(|t| (t, 2.0 / t)).to_vec();
@@ -48,6 +49,11 @@ fn times_are_interpolated_in_logarithms() {
         assert_eq!(time_to(curve, 3.0), Some(1.0));
         assert_eq!(time_to(curve, 0.09), None);
     }
+    for (time, error) in [(1.0, Some(2.0)), (4.0, Some(0.5)), (20.0, Some(0.1)), (20.5, Some(2.0 / 20.5))] {
+        let found = error_at(&curve, time);
+        assert!(found.zip(error).is_some_and(|(a, b)| (a / b - 1.0f64).abs() < 1e-12), "{time}: {found:?}");
+    }
+    assert_eq!([0.9, 30.0].map(|t| error_at(&curve, t)), [None; 2]);
     assert_eq!(time_to(&[], 1.0), None);
     assert_eq!(time_to(&[(1.0, f64::INFINITY), (2.0, 0.1)], 0.5), Some(2.0));
 }

@@ -17,7 +17,12 @@
 //! does hits all strategies. A time to an error is read from the errors with a star after the iterations ([`time_to`]).
 //!
 //! `--write` puts a run of all scenes into `benches/results`: with the usual strategies into `efficiency.md`, with
-//! `--all` into `efficiency-all.md`, with `--overhead` into `efficiency-overhead.md`.
+//! `--all` into `efficiency-all.md`, with `--overhead` into `efficiency-overhead.md`, with `--over-time` into
+//! `efficiency-time.md`.
+//!
+//! `--over-time` compares pictures of the same age: at each time the strategies that are efficiency-aware with the best
+//! of the others, the one with the smallest median error at that time. A picture of 1 second is that of a longer render
+//! after 1 second, between two iterations by interpolation.
 //!
 //! `--equal-samples N` renders N samples per pixel and takes rays as the cost: its tables are the same on every
 //! machine.
@@ -70,6 +75,10 @@ const ALL: [&str; 24] = [
 ];
 /// With `--overhead`: the same paths without learning, and with it.
 const OVERHEAD: [&str; 2] = ["classic:200", "ears+idle"];
+/// With `--over-time`: simple rules, and what is compared with the best of them.
+const OVER_TIME: [&str; 6] = ["none", "classic", "throughput", "adrrs", "ears+shadow", "ears+shadow+auto"];
+/// Core-seconds at which pictures are compared.
+const TIMES: [f64; 7] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
 const BASELINES: [&str; 2] = ["classic", "adrrs"];
 /// Errors to which times are stated.
 const LEVELS: [f64; 3] = [0.1, 0.03, 0.01];
@@ -97,13 +106,16 @@ struct Args {
     /// What learning costs: rays per second of `ears+idle` over those of `classic:200`, which traces the same paths.
     #[arg(long, conflicts_with_all = ["strategies", "all"])]
     overhead: bool,
+    /// Error after 0.1 to 100 core-seconds, against the best simple rule of that time.
+    #[arg(long, conflicts_with_all = ["strategies", "all", "overhead", "equal_samples"])]
+    over_time: bool,
     /// Independent seeds [default: 8, quick: 3, all and overhead: 2].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     seeds: Option<u32>,
     /// The first of them.
     #[arg(long, default_value_t = 0)]
     first_seed: u64,
-    /// Core-seconds of each render [default: 30, quick: 5, all: 4].
+    /// Core-seconds of each render [default: 30, quick: 5, all: 4, over time: 100].
     #[arg(long)]
     seconds: Option<f64>,
     /// Per cent of the pixels that the figures with a star leave out, the worst ones.
@@ -129,9 +141,10 @@ struct Args {
 impl Args {
     /// Name of the results.
     fn name(&self) -> &'static str {
-        match (self.all, self.overhead) {
-            (true, _) => "efficiency-all",
-            (_, true) => "efficiency-overhead",
+        match (self.all, self.overhead, self.over_time) {
+            (true, ..) => "efficiency-all",
+            (_, true, _) => "efficiency-overhead",
+            (.., true) => "efficiency-time",
             _ => "efficiency",
         }
     }
@@ -146,9 +159,10 @@ impl Args {
     }
 
     fn seconds(&self) -> f64 {
-        let usual = match (self.quick, self.all) {
-            (true, _) => 5.0,
-            (_, true) => 4.0,
+        let usual = match (self.quick, self.all, self.over_time) {
+            (true, ..) => 5.0,
+            (_, true, _) => 4.0,
+            (.., true) => 100.0,
             _ => 30.0,
         };
         self.seconds.unwrap_or(usual)
@@ -162,6 +176,7 @@ impl Args {
         let names: Vec<&str> = match (self.all, self.overhead, self.strategies.is_empty()) {
             (true, ..) => ALL.to_vec(),
             (_, true, _) => OVERHEAD.to_vec(),
+            _ if self.over_time => OVER_TIME.to_vec(),
             (.., false) => self.strategies.iter().map(|s| &**s).collect(),
             _ => STRATEGIES.to_vec(),
         };
@@ -372,6 +387,37 @@ impl Report<'_> {
         table
     }
 
+    /// Rows of a scene in the table over time: how much more error the best simple rule of each time has.
+    fn over_time(&self, g: &Group, table: &mut Table) {
+        let (aware, simple): (Vec<usize>, Vec<usize>) =
+            (0..self.strategies.len()).partition(|s| self.strategies[*s].strategy.is_efficiency_aware());
+        // nothing is to be compared before all seeds have a picture, and where noise is all that is left of an error
+        let errors = |s: usize, t: f64| -> Option<Vec<f64>> {
+            g.runs[s].iter().map(|r| r.error_after(t).filter(|e| *e > 0.0)).collect()
+        };
+        let median = |s: usize, t: f64| errors(s, t).and_then(|e| Median::of(&e));
+        for t in TIMES {
+            let known = simple.iter().filter_map(|&s| Some((s, median(s, t)?)));
+            let Some((best, error)) = known.min_by(|a, b| a.1.median.total_cmp(&b.1.median)) else { continue };
+            let ratio = |s: &usize| {
+                let (of, own) = (errors(best, t)?, errors(*s, t)?);
+                Median::of(&of.iter().zip(&own).map(|(a, b)| a / b).collect::<Vec<_>>())
+            };
+            let cells = [g.scene.clone(), t.to_string(), marked(&self.strategies[best]), error.to_string()];
+            table.add(cells.into_iter().chain(aware.iter().map(|s| speed_up(ratio(s)))));
+        }
+    }
+
+    /// `None` unless it was asked for.
+    fn all_over_time(&self) -> Option<Table> {
+        let aware = self.strategies.iter().filter(|s| s.strategy.is_efficiency_aware()).map(|s| &*s.name);
+        let columns = ["scene", "core-seconds", "best simple rule", "its relMSE*"].into_iter().chain(aware);
+        let mut table =
+            Table::new("Error of the best simple rule over that of others", &columns.collect::<Vec<_>>().join(", "));
+        self.groups.iter().for_each(|g| self.over_time(g, &mut table));
+        self.args.over_time.then_some(table)
+    }
+
     fn summary(&self) -> Table {
         let columns = "strategy, over classic, over adrrs, over classic*, over adrrs*";
         let mut table = Table::new("Geometric mean over the scenes", columns);
@@ -443,7 +489,8 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
             std::fs::write(path, report.json().to_string()).map_err(|e| format!("{}: {e}", path.display()))?;
         }
     }
-    let first: Vec<Table> = [report.overview(), report.overhead()].into_iter().flatten().collect();
+    let mut first: Vec<Table> = [report.overview(), report.overhead()].into_iter().flatten().collect();
+    first.extend(report.all_over_time());
     first.iter().chain([&report.summary()]).for_each(|t| print!("\n{t}"));
     if args.write {
         results.tables = first;
