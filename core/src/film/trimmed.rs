@@ -78,9 +78,7 @@ impl TrimmedSums {
         let value = f64::from(f32::from_bits(key(&entry)));
         self.count += 1;
         self.sum_sqr += value * value;
-        for i in 0..W.min(WIDTH) {
-            self.sums[i] += f64::from(f32::from_bits(entry[i]));
-        }
+        self.sums.iter_mut().zip(entry).for_each(|(sum, x)| *sum += f64::from(f32::from_bits(x)));
     }
 
     /// Puts an entry into the heap, which has room.
