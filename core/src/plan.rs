@@ -1,6 +1,6 @@
 //! How much memory a render needs: sizes first, so that nothing is ever asked for again.
 
-use crate::film::{AovLayout, DIGITS, Film, FilmSum};
+use crate::film::{AovLayout, Film, FilmSum};
 use crate::learn::{LearnedState, PixelEstimator};
 use crate::memory::{BLOCK_ALIGN, Carver, Layout, Measure, MemoryError};
 use crate::record::{SessionRecord, fingerprint};
@@ -29,7 +29,7 @@ impl Plan {
         let s = *settings;
         let cache = s.check()?;
         let session = Measure::new().add::<SessionRecord>(1);
-        let session = Film::measure(session.add::<u32>(DIGITS), &s.film_layout());
+        let session = Film::measure(session.add::<u32>(s.largest_len()), &s.film_layout());
         let session = LearnedState::measure(session, &s.needs(cache));
         let (tiles, guide) = (Tiles::new(s.size, s.shards), s.guide_size());
         let job = Job { settings: s, tiles, cache, guide, fingerprint: fingerprint(settings) };

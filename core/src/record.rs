@@ -1,7 +1,7 @@
 //! What is left of a session in its block while it is suspended: all its scalars as one record at the head of the block.
 
 use crate::counters::Counters;
-use crate::film::{FilmScalars, Selection};
+use crate::film::{FilmScalars, TrimmedSums};
 use crate::learn::{LearnedScalars, Needs};
 use crate::scene::Scene;
 use crate::scene::blob::content_hash;
@@ -23,8 +23,8 @@ const SUSPENDED: u64 = 2;
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Finishing {
-    /// Values of pixels without the largest.
-    pub selection: Selection,
+    /// Sums over pixels without the largest.
+    pub sums: TrimmedSums,
     /// Counts of all shards.
     pub counters: Counters,
     /// Next pixel of the film, or next bin.

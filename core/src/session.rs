@@ -9,7 +9,7 @@ pub use error::SessionError;
 use crate::accel::{Intersector, WideBvh};
 use crate::counters::Counters;
 use crate::extension::Extension;
-use crate::film::{DIGITS, Film};
+use crate::film::Film;
 use crate::instructions::missing_instructions;
 use crate::learn::cache::Cache;
 use crate::learn::guiding::{Guide, GuideUse};
@@ -65,7 +65,7 @@ pub struct SessionState<'m> {
     plan: Plan,
     record: &'m mut SessionRecord,
     /// Counters of a selection among the pixels.
-    digits: &'m mut [u32],
+    largest: &'m mut [u32],
     film: Film<'m>,
     finishing: Finishing,
     counters: Counters,
@@ -195,7 +195,7 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector, X: Extension> SessionBuil
         let state = SessionState {
             plan: *plan,
             record,
-            digits: c.take_unset(DIGITS).map_err(SessionError::Memory)?,
+            largest: c.take_unset(s.largest_len()).map_err(SessionError::Memory)?,
             film: Film::carve(&mut c, &s.film_layout(), scalars.film).map_err(SessionError::Memory)?,
             finishing: scalars.finishing,
             counters: scalars.counters,

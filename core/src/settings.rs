@@ -1,9 +1,9 @@
 //! Settings of a render.
 
-use crate::film::{Aov, AovSet, FilmLayout};
+use crate::film::{Aov, AovSet, Film, FilmLayout};
 use crate::learn::cache::CacheSize;
 use crate::learn::guiding::{COMPILED, GuideSize};
-use crate::learn::{ControlVariate, Guiding, Learning, Needs};
+use crate::learn::{ControlVariate, Guiding, LearnedState, Learning, Needs};
 use crate::rrs::{Space, Strategy};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
@@ -135,6 +135,12 @@ impl Settings {
     /// What the film holds.
     pub(crate) fn film_layout(&self) -> FilmLayout {
         FilmLayout { size: self.size, weights: self.adaptive, rays: self.counts_rays(), aovs: self.aovs }
+    }
+
+    /// Words of memory for the pixels with most error, at the end of an iteration.
+    pub(crate) fn largest_len(&self) -> usize {
+        let pixels = self.film_layout().pixels();
+        Film::largest_len(pixels).max(LearnedState::largest_len(pixels))
     }
 
     /// Does anything learn between iterations, so that the cost of a camera sample changes?

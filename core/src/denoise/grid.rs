@@ -17,6 +17,17 @@ pub(super) const NOWHERE: f32 = 1e9;
 /// Squared radiance below all that matters: avoids 0 / 0.
 pub(super) const TINY: f32 = 1e-20;
 
+/// A row that a pass reads: planes of equal length, with margins.
+#[derive(Clone, Copy)]
+pub(super) struct Row<'a> {
+    /// e (rgb) and its variance.
+    pub(super) signal: [&'a [f32]; SIGNAL],
+    /// Normal and albedo.
+    pub(super) features: [&'a [f32]; 6],
+    /// Largest change of the pixel by `despeckle`.
+    pub(super) reach: &'a [f32],
+}
+
 /// Layout of the rows that a pass reads: planes with a margin on both sides.
 #[derive(Clone, Copy)]
 pub(super) struct Grid {
@@ -60,10 +71,14 @@ impl Grid {
         if y < self.rows { at..at + len } else { 0..0 }
     }
 
-    /// Signal and features of row `y`; empty if the picture has no such row.
-    pub(super) fn row(self, window: &[f32], y: usize) -> (&[f32], &[f32]) {
-        let row = window.get(self.window_row(y)).unwrap_or(&[]);
-        row.split_at_checked(SIGNAL * self.stride).unwrap_or((&[], &[]))
+    /// Row `y`; `None` if the picture has no such row.
+    #[inline(always)]
+    pub(super) fn row(self, window: &[f32], y: usize) -> Option<Row<'_>> {
+        let row = window.get(self.window_row(y))?;
+        let mut planes = row.chunks_exact(self.stride.max(1));
+        let mut next = || planes.next();
+        let signal = [next()?, next()?, next()?, next()?];
+        Some(Row { signal, features: [next()?, next()?, next()?, next()?, next()?, next()?], reach: next()? })
     }
 
     pub(super) fn row_mut(self, window: &mut [f32], y: usize) -> (&mut [f32], &mut [f32]) {
@@ -99,10 +114,11 @@ pub(super) fn store_pixels(plane: &mut [f32], (at, lanes): (usize, usize), x: F3
     }
 }
 
-/// Eight values from `at` of a row, 0 behind its end.
+/// Eight values from `at` of a plane, 0 where it has not as many.
 #[inline(always)]
-pub(super) fn load(row: &[f32], at: usize) -> F32x8 {
-    match row.get(at..).and_then(|r| r.first_chunk()) {
+pub(super) fn load(plane: &[f32], at: usize) -> F32x8 {
+    // of planes of equal length, one comparison for all
+    match plane.get(at..at.saturating_add(8)).and_then(|p| p.first_chunk()) {
         Some(a) => F32x8::new(*a),
         None => F32x8::ZERO,
     }
@@ -118,7 +134,8 @@ pub(super) fn store(row: &mut [f32], at: usize, x: F32x8) {
 
 /// Squared distance of the features (normal and albedo, scaled) of the pixels from `at` of a row to `own`; 1 separates.
 #[inline(always)]
-pub(super) fn feature_distance(row: &[f32], stride: usize, at: usize, own: &[F32x8; 6]) -> F32x8 {
-    let g: [F32x8; 6] = core::array::from_fn(|c| (load(row, c * stride + at) - own[c]).sqr());
-    ((g[0] + g[1]) + (g[2] + g[3])) + (g[4] + g[5])
+pub(super) fn feature_distance(row: &Row<'_>, at: usize, own: &[F32x8; 6]) -> F32x8 {
+    let f = &row.features;
+    let g = |c: usize| (load(f[c], at) - own[c]).sqr();
+    ((g(0) + g(1)) + (g(2) + g(3))) + (g(4) + g(5))
 }

@@ -2,7 +2,7 @@
 //! to the window of rows.
 
 use super::grid::{
-    FEATURES, Grid, MARGIN, NOWHERE, REACH, SIGNAL, feature_distance, load, load_pixels, store, store_pixels,
+    FEATURES, Grid, MARGIN, NOWHERE, REACH, Row, SIGNAL, feature_distance, load, load_pixels, store, store_pixels,
 };
 use super::noisy::NoisySource;
 use super::pixels::NoisyPixels8;
@@ -114,22 +114,19 @@ pub(super) fn load_row<S: NoisySource>(noisy: &S, grid: Grid, y: usize, work: &m
 /// Computes the larger of a pixel's variance and the mean variance around it, among pixels with similar features. With
 /// few samples, many pixels have missed the light and have no variance of their own; their neighbours have some.
 pub(super) fn smooth_variance_row(grid: Grid, y: usize, work: &mut Work<'_>) {
-    let s = grid.stride;
-    let (v_row, f_row) = grid.row(work.window, y);
+    let rows: [Option<Row<'_>>; 3] = [0, 1, 2].map(|d| grid.row(work.window, (y + d).wrapping_sub(1)));
+    let Some(own_row) = rows[1] else { return };
     for x in grid.packets() {
-        let f: [F32x8; 6] = core::array::from_fn(|c| load(f_row, c * s + x));
+        let f = own_row.features.map(|p| load(p, x));
         // Where a whole picture is absent the variance is still negative.
-        let own = F32x8::ZERO.max(load(v_row, 3 * s + x));
+        let own = F32x8::ZERO.max(load(own_row.signal[3], x));
         let (mut sum, mut total) = (own * 4.0, F32x8::splat(4.0));
-        for d in 0..3 {
-            let (v_row, f_row) = grid.row(work.window, (y + d).wrapping_sub(1));
-            if v_row.is_empty() {
-                continue;
-            }
+        for (d, row) in rows.iter().enumerate() {
+            let Some(row) = row else { continue };
             for q in (x - 1..x + 2).filter(|&q| d != 1 || q != x) {
-                let unlike = feature_distance(f_row, s, q, &f);
+                let unlike = feature_distance(row, q, &f);
                 let w = F32x8::ZERO.max(1.0 - unlike) * if d == 1 || q == x { 2.0 } else { 1.0 };
-                sum += w * F32x8::ZERO.max(load(v_row, 3 * s + q));
+                sum += w * F32x8::ZERO.max(load(row.signal[3], q));
                 total += w;
             }
         }

@@ -23,69 +23,73 @@ pub(super) const REACH: u32 = 2;
 pub(super) const LONGEST: usize = 31;
 /// Most that the logarithms of the two denominators differ: a factor 5.
 const MOST: f32 = 1.6;
-/// Values of a row of a block, by column and channel, in whole packets.
-const VALUES: usize = (3 * LONGEST).next_multiple_of(8);
-/// Values of the columns that a window reaches on a side.
-const BESIDE: usize = 3 * REACH as usize;
+/// Columns of a block, in whole packets.
+pub(super) const PADDED: usize = LONGEST.next_multiple_of(8);
 /// Largest denominator, and largest error: beyond it f32 ends soon.
 pub(super) const LARGEST: f64 = 1e30;
 
-/// Of a row of a block, by column and channel.
+/// Of a row of a block, by channel and column.
 #[derive(Clone, Copy)]
 pub(super) struct Line {
     /// D, and its logarithm from [`Self::take_logarithms`] on.
-    denominator: [f32; VALUES],
+    denominator: [[f32; PADDED]; 3],
     /// t.
-    left: [f32; VALUES],
-}
-
-/// Packets that hold the values of `columns` columns.
-fn packets(values: &mut [f32; VALUES], columns: usize) -> impl Iterator<Item = &mut [f32; 8]> {
-    values.as_chunks_mut::<8>().0.iter_mut().take((3 * columns).div_ceil(8))
+    left: [[f32; PADDED]; 3],
 }
 
 impl Line {
-    pub(super) const EMPTY: Self = Self { denominator: [0.0; VALUES], left: [0.0; VALUES] };
+    pub(super) const EMPTY: Self = Self { denominator: [[0.0; PADDED]; 3], left: [[0.0; PADDED]; 3] };
 
-    /// Sets D and t of a column.
-    pub(super) fn set(&mut self, column: usize, denominator: [f64; 3], left: [f64; 3]) {
-        let at = 3 * column..3 * column + 3;
-        if let (Some(d), Some(t)) = (self.denominator.get_mut(at.clone()), self.left.get_mut(at)) {
-            d.iter_mut().zip(denominator).for_each(|(d, x)| *d = x.min(LARGEST) as f32);
-            t.iter_mut().zip(left).for_each(|(t, x)| *t = x as f32);
+    /// D and t of channel `c`, at most [`LARGEST`], to be set.
+    pub(super) fn channel_mut(&mut self, c: usize) -> (&mut [f32; PADDED], &mut [f32; PADDED]) {
+        (&mut self.denominator[c % 3], &mut self.left[c % 3])
+    }
+
+    /// Ends the row, of `columns` columns, all of which are set: the values behind them are 0 from now on.
+    pub(super) fn take_logarithms(&mut self, columns: usize) {
+        for channel in &mut self.denominator {
+            channel.iter_mut().skip(columns).for_each(|d| *d = 1.0);
+            let packets = channel.as_chunks_mut::<8>().0.iter_mut().take(columns.div_ceil(8));
+            packets.for_each(|p| *p = F32x8::new(*p).ln().to_array());
+            channel.iter_mut().skip(columns).for_each(|d| *d = 0.0);
         }
     }
 
-    /// Ends the row: all of its columns are set.
-    pub(super) fn take_logarithms(&mut self, columns: usize) {
-        packets(&mut self.denominator, columns).for_each(|p| *p = F32x8::new(*p).ln().to_array());
-    }
-
-    /// Roots of D / D' of the row, of `columns` columns, by column and channel; `window` are the rows that it is seen with,
-    /// it among them.
-    pub(super) fn root_of_rise<'a>(&self, columns: usize, window: impl Iterator<Item = &'a Self>) -> [f32; VALUES] {
+    /// Roots of D / D' of channel `c` of the row, of `columns` columns; `window` are the rows that it is seen with, it
+    /// among them.
+    pub(super) fn root_of_rise<'a>(
+        &self,
+        c: usize,
+        columns: usize,
+        window: impl Iterator<Item = &'a Self>,
+    ) -> [f32; PADDED] {
+        const BESIDE: usize = REACH as usize;
         // columns beside the block are 0
-        let (mut sums, mut rows) = ([0.0; VALUES + 2 * BESIDE], 0.0);
+        let (mut sums, mut rows) = ([0.0; PADDED + 2 * BESIDE], 0.0);
         for line in window {
-            let columns = sums.iter_mut().skip(BESIDE).zip(line.denominator).take(3 * columns);
-            columns.for_each(|(s, x)| *s += x);
+            let own = sums.iter_mut().skip(BESIDE).zip(&line.denominator[c % 3]);
+            own.for_each(|(s, x)| *s += x);
             rows += 1.0;
         }
-        let mut half = [0.0; VALUES];
-        let windows = sums.windows(2 * BESIDE + 1);
-        for (i, ((half, s), (own, left))) in
-            half.iter_mut().zip(windows).zip(self.denominator.iter().zip(self.left)).take(3 * columns).enumerate()
-        {
+        let mut root = [1.0; PADDED];
+        let at =
+            |a: &[f32], at: usize| a.get(at..).and_then(|a| a.first_chunk()).map_or(F32x8::ZERO, |a| F32x8::new(*a));
+        for (i, root) in root.as_chunks_mut::<8>().0.iter_mut().enumerate().take(columns.div_ceil(8)) {
+            let from = 8 * i;
+            let others = F32x8::from_fn(|lane| {
+                let column = from + lane;
+                let width = (column + BESIDE + 1).min(columns).saturating_sub(column.saturating_sub(BESIDE));
+                (rows * width as f32 - 1.0).max(1.0)
+            });
             // logarithms are within 70: taking the own one off loses nothing that matters
-            let all: f32 = s.iter().step_by(3).sum();
-            let column = i / 3;
-            let from = column.saturating_sub(REACH as usize);
-            let to = (column + REACH as usize + 1).min(columns);
-            let others = (rows * (to - from) as f32 - 1.0).max(1.0);
-            *half = 0.5 * (left * (own - (all - own) / others)).clamp(-MOST, MOST);
+            let all = (at(&sums, from) + at(&sums, from + 1))
+                + (at(&sums, from + 2) + at(&sums, from + 3))
+                + at(&sums, from + 4);
+            let own = at(&self.denominator[c % 3], from);
+            let rise = at(&self.left[c % 3], from) * (own - (all - own) / others);
+            *root = (rise.clamp(-MOST, MOST) * 0.5).exp().to_array();
         }
-        packets(&mut half, columns).for_each(|p| *p = F32x8::new(*p).exp().to_array());
-        half
+        root
     }
 }
 
@@ -104,17 +108,23 @@ mod tests {
         let left = |column: usize| column as f64 / 8.0;
         let mut lines = [Line::EMPTY; 3];
         for (row, line) in lines.iter_mut().enumerate() {
-            (0..COLUMNS).for_each(|x| line.set(x, [value(row, x), 1e40, 1.0], [left(x), 1.0, 0.0]));
+            for c in 0..3 {
+                let (d, t) = line.channel_mut(c);
+                for x in 0..COLUMNS {
+                    d[x] = [value(row, x) as f32, 1e30, 1.0][c];
+                    t[x] = [left(x) as f32, 1.0, 0.0][c];
+                }
+            }
             line.take_logarithms(COLUMNS);
         }
-        let found = lines[1].root_of_rise(COLUMNS, lines.iter());
+        let found = [0, 1, 2].map(|c| lines[1].root_of_rise(c, COLUMNS, lines.iter()));
         for column in 0..COLUMNS {
             let window = column.saturating_sub(2)..(column + 3).min(COLUMNS);
             let others = (0..3).flat_map(|r| window.clone().map(move |x| (r, x))).filter(|p| *p != (1, column));
             let logs: std::vec::Vec<_> = others.map(|(r, x)| value(r, x).ln()).collect();
             let mean = logs.iter().sum::<f64>() / logs.len() as f64;
             let truth = (left(column) * (value(1, column).ln() - mean)).clamp(-1.6, 1.6);
-            let [rise, huge, settled] = [0, 1, 2].map(|c| f64::from(found[3 * column + c]));
+            let [rise, huge, settled] = found.map(|f| f64::from(f[column]));
             assert!((rise.ln() - 0.5 * truth).abs() < 1e-5, "{column}: {rise} of {truth}");
             assert!((huge - 1.0).abs() < 1e-5 && settled == 1.0);
         }

@@ -2,7 +2,6 @@
 //! rendered in parts, apart from each other.
 
 use super::pixel::{PixelStats, PixelSums};
-use super::selection::{DIGITS, Selection};
 use super::short::short;
 use super::{Film, FilmLayout, FilmScalars};
 use crate::memory::{Carver, Measure, MemoryError};
@@ -13,18 +12,18 @@ use crate::memory::{Carver, Measure, MemoryError};
 #[derive(Debug)]
 pub struct FilmSum<'m> {
     film: Film<'m>,
-    /// Counters of a selection among the pixels.
-    digits: &'m mut [u32],
+    /// The pixels with most error.
+    largest: &'m mut [u32],
 }
 
 impl<'m> FilmSum<'m> {
     /// Bytes; [`Self::carve`] carves in the same order.
     pub(crate) fn measure(l: &FilmLayout) -> Measure {
-        Film::measure(Measure::new().add::<u32>(DIGITS), l)
+        Film::measure(Measure::new().add::<u32>(Film::largest_len(l.pixels())), l)
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, l: &FilmLayout) -> Result<Self, MemoryError> {
-        Ok(Self { digits: c.take_unset(DIGITS)?, film: Film::carve(c, l, FilmScalars::new())? })
+        Ok(Self { largest: c.take_unset(Film::largest_len(l.pixels()))?, film: Film::carve(c, l, FilmScalars::new())? })
     }
 
     /// Adds a film: `pixel` gives the statistics of each pixel of it ([`Film::pixel`]), `plane` the value of a plane at a
@@ -52,16 +51,10 @@ impl<'m> FilmSum<'m> {
     /// The film, with the estimated error of the picture. Its correction for samples that are not independent is
     /// measured between the films that were added, if they have two samples in each pixel at least.
     pub fn finish(&mut self) -> &Film<'m> {
-        let (film, digits) = (&mut self.film, &mut *self.digits);
-        let mut selection = Selection::default();
-        film.begin_errors(&mut selection, digits);
-        loop {
-            film.show_errors(0, usize::MAX, &mut selection, digits);
-            if selection.end_visit(Film::outliers, digits) {
-                break;
-            }
-        }
-        film.estimate_error(&selection);
+        let Self { film, largest } = self;
+        let mut errors = film.begin_errors();
+        film.show_errors(0, usize::MAX, &mut errors, largest);
+        film.estimate_error(&mut errors, largest);
         film
     }
 }

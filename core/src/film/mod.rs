@@ -22,10 +22,10 @@ mod error;
 mod film_sum;
 mod independence;
 mod pixel;
-mod selection;
 mod short;
 mod sqrt;
 mod surroundings;
+mod trimmed;
 
 pub use aov::{Aov, AovSet, PixelAov};
 pub(crate) use aov::{AovLayout, AovSums};
@@ -33,8 +33,8 @@ pub use error::{ErrorEstimate, REL_MSE_EPSILON};
 pub use film_sum::FilmSum;
 pub use pixel::PixelStats;
 pub(crate) use pixel::PixelSums;
-pub(crate) use selection::{DIGITS, Selection};
 pub(crate) use sqrt::SqrtNewton;
+pub(crate) use trimmed::TrimmedSums;
 
 use crate::memory::{Carver, Measure, MemoryError};
 use aov::AovPlanes;
@@ -42,6 +42,9 @@ use bytemuck::{Pod, Zeroable};
 use independence::{CLASSES, Differences, Independence, class};
 use pixel::PixelWeights;
 use surroundings::{SIDE, Span, UNSURE_SHARE, relative_errors};
+
+/// Numbers that [`Film::show_errors`] shows of a pixel.
+const SHOWN: usize = 4 + CLASSES;
 
 /// What a film holds of each pixel besides its mean and error.
 #[derive(Clone, Copy, Debug)]
@@ -273,31 +276,28 @@ impl<'m> Film<'m> {
         })
     }
 
-    /// Begins a selection among the errors of the pixels.
-    pub(crate) fn begin_errors(&self, s: &mut Selection, counters: &mut [u32]) {
-        match Self::outliers(self.pixels.len() as u64) {
-            0 => s.begin_with_all(counters),
-            // which of two that are alike is left out does not matter, and each visit costs as much as the first
-            _ => s.begin_coarse(counters),
-        }
+    /// Sums of the errors of the pixels, before any is shown.
+    pub(crate) fn begin_errors(&self) -> TrimmedSums {
+        TrimmedSums::new(Self::outliers(self.pixels.len() as u64))
     }
 
-    /// Shows the errors of pixels from block `at` on to the selection, some `limit` pixels. Blocks and pixels shown.
-    pub(crate) fn show_errors(&self, at: u64, limit: usize, s: &mut Selection, counters: &mut [u32]) -> [u64; 2] {
+    /// Words that the sums of [`Self::begin_errors`] need for a film of so many pixels.
+    pub(crate) fn largest_len(pixels: usize) -> usize {
+        TrimmedSums::heap_len::<SHOWN>(Self::outliers(pixels as u64))
+    }
+
+    /// Shows the errors of pixels from block `at` on, some `limit` pixels. Blocks and pixels shown.
+    pub(crate) fn show_errors(&self, at: u64, limit: usize, s: &mut TrimmedSums, largest: &mut [u32]) -> [u64; 2] {
         let (mut blocks, mut pixels) = (0, 0);
         while pixels < limit as u64 && at + blocks < self.blocks() {
             let pixel = |x: u32, y: u32| self.pixel(y as usize * self.size[0] as usize + x as usize);
             relative_errors(self.block(at + blocks), pixel, |e| {
                 let class = e.class % CLASSES;
-                let ratio = self.scalars.independence[class].ratio;
+                let ratio = self.scalars.independence[class].ratio as f32;
                 let mut of_classes = [0.0; CLASSES];
                 of_classes[class] = e.error;
                 let [a, b, c] = of_classes;
-                s.show_with(
-                    ratio * e.error,
-                    [ratio * e.other, ratio * e.contrast, ratio * e.unsure, a, b, c],
-                    counters,
-                );
+                s.show([ratio * e.error, ratio * e.other, ratio * e.contrast, ratio * e.unsure, a, b, c], largest);
                 pixels += 1;
             });
             blocks += 1;
@@ -310,11 +310,11 @@ impl<'m> Film<'m> {
         pixels / 10_000
     }
 
-    /// Estimates the error from the selection that has seen all pixels, without the outliers.
-    pub(crate) fn estimate_error(&mut self, t: &Selection) {
+    /// Estimates the error from the sums that have seen all pixels, without the outliers.
+    pub(crate) fn estimate_error(&mut self, t: &mut TrimmedSums, largest: &mut [u32]) {
+        t.end::<SHOWN>(Self::outliers(self.pixels.len() as u64), largest);
         let m = t.count.max(1) as f64;
-        let mean = t.sum / m;
-        let [other, contrast, unsure, of_classes @ ..] = t.sum_beside.map(|x| x / m);
+        let [mean, other, contrast, unsure, of_classes @ ..] = t.sums.map(|x| x / m);
         let noise =
             self.scalars.independence.iter().zip(of_classes).map(|(i, x)| i.noise * i.noise * x * x).sum::<f64>();
         let spread = (t.sum_sqr / m - mean * mean).max(0.0) / m + noise;
@@ -328,9 +328,9 @@ impl<'m> Film<'m> {
             low: (mean - half).max(0.0),
             high: mean + half,
             at_least: (mean - unsure - contrast).max(0.0),
-            rel_mse_all: (t.sum + t.rest) / self.pixels.len().max(1) as f64,
+            rel_mse_all: (t.sums[0] + t.rest) / self.pixels.len().max(1) as f64,
             independence: if known && independent > 0.0 { mean / independent } else { Independence::UNKNOWN.ratio },
-            effective_pixels: if t.sum_sqr > 0.0 { t.sum * t.sum / t.sum_sqr } else { m },
+            effective_pixels: if t.sum_sqr > 0.0 { t.sums[0] * t.sums[0] / t.sum_sqr } else { m },
         };
     }
 }

@@ -30,94 +30,147 @@
 //! nothing where it is small, and [`UNSURE_SHARE`] of the sum counts. Both numbers were found with the benchmark
 //! `intervals`.
 
-use super::contrast::{LARGEST, LONGEST, Line, REACH};
+use super::contrast::{LARGEST, LONGEST, Line, PADDED, REACH};
 use super::error::{REL_MSE_EPSILON, TAKEN_OFF, relative_denominator};
 use super::independence::class;
 use super::pixel::PixelStats;
+use croupier_simd::{F32x8, F64x4};
 
 /// Pixels a side of the smallest block.
 pub(super) const SIDE: u32 = LONGEST.div_ceil(2) as u32;
 /// Rows of the window.
 const ROWS: usize = 2 * REACH as usize + 1;
-/// Most columns of a block with those that its windows reach.
-const COLUMNS: usize = LONGEST + 2 * REACH as usize;
+/// Columns of a block with those that its windows reach, in whole packets of four: the block's own from `REACH` on.
+const COLUMNS: usize = PADDED + 2 * REACH as usize;
 /// Fewer other pixels say nothing.
 const ENOUGH: f64 = 8.0;
 /// The other k.
 const DOUBT: f64 = 4.0;
 /// Relative squared error of a pixel of which half is unsure.
-const UNSURE: f64 = 0.25;
+const UNSURE: f32 = 0.25;
 /// Part of what is unsure by which an interval is widened to both sides.
 pub(super) const UNSURE_SHARE: f64 = 0.5;
 
-/// Mean of a pixel and its variance, by channel, and its class.
+/// Values by column, those of [`Seen`].
+type Columns = [f64; COLUMNS];
+
+/// Four values from `at`.
+#[inline(always)]
+fn four(a: &Columns, at: usize) -> F64x4 {
+    a.get(at..).and_then(|a| a.first_chunk()).map_or(F64x4::ZERO, |a| F64x4::new(*a))
+}
+
+/// Row of pixels: mean of each and its variance, by channel, and its class. Columns outside the picture are 0.
 #[derive(Clone, Copy)]
 struct Seen {
-    mean: [f64; 3],
-    variance: [f64; 3],
-    class: usize,
+    mean: [Columns; 3],
+    variance: [Columns; 3],
+    classes: [u8; COLUMNS],
 }
 
 impl Seen {
-    /// Arrays of a constant are filled; of a value each field would be copied.
-    const NOTHING: Self = Self { mean: [0.0; 3], variance: [0.0; 3], class: 0 };
+    const NOTHING: Self = Self { mean: [[0.0; COLUMNS]; 3], variance: [[0.0; COLUMNS]; 3], classes: [0; COLUMNS] };
 
-    fn of(p: &PixelStats) -> Self {
-        Self { mean: p.mean(), variance: p.variance_of_mean(), class: class(p) }
+    /// Sets the columns from `at` on.
+    fn set(&mut self, at: usize, pixels: impl Iterator<Item = PixelStats>) {
+        for (at, p) in (at..COLUMNS).zip(pixels) {
+            let (mean, variance) = (p.mean(), p.variance_of_mean());
+            for c in 0..3 {
+                self.mean[c][at] = mean[c];
+                self.variance[c][at] = variance[c];
+            }
+            self.classes[at] = class(&p) as u8;
+        }
     }
 }
 
-/// Sums over some pixels, by channel.
-#[derive(Clone, Copy, Default)]
+/// Sums over the pixels of some rows, by column and channel.
+#[derive(Clone, Copy)]
 struct Sums {
-    pixels: f64,
-    mean: [f64; 3],
+    mean: [Columns; 3],
     /// Of squared means.
-    square: [f64; 3],
+    square: [Columns; 3],
     /// Of variances of means.
-    variance: [f64; 3],
+    variance: [Columns; 3],
 }
 
 impl Sums {
+    const NOTHING: Self =
+        Self { mean: [[0.0; COLUMNS]; 3], square: [[0.0; COLUMNS]; 3], variance: [[0.0; COLUMNS]; 3] };
+
+    /// Sets `columns` columns of the sums over `rows`, and of those with one more row.
     #[inline(always)]
-    fn add(&mut self, p: &Seen) {
-        self.pixels += 1.0;
+    fn set_both<'a>(
+        others: &mut Self,
+        all: &mut Self,
+        rows: impl Iterator<Item = &'a Seen> + Clone,
+        own: &Seen,
+        columns: usize,
+    ) {
         for c in 0..3 {
-            self.mean[c] += p.mean[c];
-            self.square[c] += p.mean[c] * p.mean[c];
-            self.variance[c] += p.variance[c];
+            for at in (0..columns).step_by(4) {
+                let of = |row: &Seen| {
+                    let m = four(&row.mean[c], at);
+                    [m, m * m, four(&row.variance[c], at)]
+                };
+                let mut sums = [F64x4::ZERO; 3];
+                let mut add = |x: [F64x4; 3]| sums.iter_mut().zip(x).for_each(|(s, x)| *s += x);
+                rows.clone().for_each(|row| add(of(row)));
+                others.put(c, at, sums);
+                let mut add = |x: [F64x4; 3]| sums.iter_mut().zip(x).for_each(|(s, x)| *s += x);
+                add(of(own));
+                all.put(c, at, sums);
+            }
         }
     }
 
+    /// Sets four columns.
     #[inline(always)]
-    fn join(&mut self, o: &Self) {
-        self.pixels += o.pixels;
-        for c in 0..3 {
-            self.mean[c] += o.mean[c];
-            self.square[c] += o.square[c];
-            self.variance[c] += o.variance[c];
+    fn put(&mut self, c: usize, at: usize, sums: [F64x4; 3]) {
+        for (to, x) in [&mut self.mean[c], &mut self.square[c], &mut self.variance[c]].into_iter().zip(sums) {
+            if let Some(to) = to.get_mut(at..).and_then(|a| a.first_chunk_mut()) {
+                *to = x.to_array();
+            }
         }
     }
 }
 
-/// What other pixels say of one.
-#[derive(Clone, Copy, Default)]
+/// What other pixels say of one, in a channel, for four pixels.
+#[derive(Clone, Copy)]
 struct Others {
-    pixels: f64,
-    mean: [f64; 3],
+    pixels: F64x4,
+    mean: F64x4,
     /// Variance among them beyond their noise.
-    contrast: [f64; 3],
+    contrast: F64x4,
     /// Mean of their variances.
-    noise: [f64; 3],
+    noise: F64x4,
 }
 
-impl From<Sums> for Others {
+impl Others {
+    /// From sums over so many pixels.
     #[inline(always)]
-    fn from(s: Sums) -> Self {
-        let n = 1.0 / s.pixels.max(1.0);
-        let (mean, noise) = (s.mean.map(|x| x * n), s.variance.map(|x| x * n));
-        let contrast = core::array::from_fn(|c| (s.square[c] * n - mean[c] * mean[c] - noise[c]).max(0.0));
-        Self { pixels: s.pixels, mean, contrast, noise }
+    fn of(pixels: F64x4, [mean, square, variance]: [F64x4; 3]) -> Self {
+        let n = F64x4::splat(1.0) / pixels.max(F64x4::splat(1.0));
+        let (mean, noise) = (mean * n, variance * n);
+        Self { pixels, mean, contrast: (square * n - mean * mean - noise).max(F64x4::ZERO), noise }
+    }
+
+    /// What the window around each of four pixels says, from column `at` of the block on: sums over the rows but the
+    /// pixels' own, and over all.
+    #[inline(always)]
+    fn window(pixels: F64x4, at: usize, c: usize, others: &Sums, all: &Sums) -> Self {
+        let sum = |others: &Columns, all: &Columns| {
+            let (left, right) = (four(all, at) + four(all, at + 1), four(all, at + 3) + four(all, at + 4));
+            four(others, at + 2) + (left + right)
+        };
+        Self::of(
+            pixels,
+            [
+                sum(&others.mean[c], &all.mean[c]),
+                sum(&others.square[c], &all.square[c]),
+                sum(&others.variance[c], &all.variance[c]),
+            ],
+        )
     }
 }
 
@@ -125,13 +178,13 @@ impl From<Sums> for Others {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct PixelError {
     /// Variance over the denominator.
-    pub error: f64,
+    pub error: f32,
     /// The same with the other k.
-    pub other: f64,
+    pub other: f32,
     /// How far it is from D to D' of [`super::contrast`].
-    pub contrast: f64,
+    pub contrast: f32,
     /// What of it is unsure because of the pixel's own noise.
-    pub unsure: f64,
+    pub unsure: f32,
     /// Class of the pixel by the spread of its samples.
     pub class: usize,
 }
@@ -139,50 +192,67 @@ pub(super) struct PixelError {
 /// Row of a block: what is known of its pixels before their contrast is.
 #[derive(Clone, Copy)]
 struct Row {
-    /// Variances over D, and over that with the other k, by pixel and channel.
-    errors: [[[f32; 2]; 3]; LONGEST],
-    classes: [u8; LONGEST],
+    /// Variances over D, and over that with the other k, by channel and pixel.
+    errors: [[[f32; PADDED]; 2]; 3],
+    classes: [u8; PADDED],
     line: Line,
 }
 
 impl Row {
-    const EMPTY: Self = Self { errors: [[[0.0; 2]; 3]; LONGEST], classes: [0; LONGEST], line: Line::EMPTY };
+    const EMPTY: Self = Self { errors: [[[0.0; PADDED]; 2]; 3], classes: [0; PADDED], line: Line::EMPTY };
 
-    /// Sets a pixel.
-    fn add(&mut self, column: usize, p: &Seen, window: &Others, block: &Others) {
-        let (mut d, mut left) = ([1.0; 3], [0.0; 3]);
-        self.classes[column % LONGEST] = p.class as u8;
-        let errors = &mut self.errors[column % LONGEST];
-        for c in 0..3 {
-            let (m, v) = (p.mean[c], p.variance[c]);
-            [d[c], left[c]] = denominator(c, [m, v], 1.0, window, block);
-            // without an error there is nothing to divide
-            errors[c] = if v > 0.0 {
-                let other = denominator(c, [m, v], DOUBT, window, block)[0];
-                [d[c], other].map(|d| (v / d).min(LARGEST) as f32)
-            } else {
-                [0.0; 2]
-            };
-        }
-        self.line.set(column, d, left);
+    /// Sets channel `c` of four pixels from column `at` on.
+    #[inline(always)]
+    fn set(&mut self, at: usize, c: usize, [m, v]: [F64x4; 2], window: &Others, block: &Others) {
+        let (d, other, left) = denominators([m, v], window, block);
+        let largest = F64x4::splat(LARGEST);
+        // without an error there is nothing to divide
+        let [error, of_other] = [d, other].map(|d| v.if_above(F64x4::ZERO, (v / d).min(largest), F64x4::ZERO));
+        let [to, to_other] = &mut self.errors[c];
+        put(to, at, error);
+        put(to_other, at, of_other);
+        let (line, line_left) = self.line.channel_mut(c);
+        put(line, at, d.min(largest));
+        put(line_left, at, left);
     }
 
     /// Shows the errors of `columns` pixels.
-    fn show<'a>(&self, columns: usize, window: impl Iterator<Item = &'a Line>, mut show: impl FnMut(PixelError)) {
-        let rise = self.line.root_of_rise(columns, window);
-        let pixels = self.errors.iter().zip(self.classes).zip(rise.as_chunks::<3>().0);
-        for ((errors, class), rise) in pixels.take(columns) {
-            let mut sum = PixelError { class: class.into(), ..PixelError::default() };
-            for (errors, rise) in errors.iter().zip(rise.map(f64::from)) {
-                let [q, other] = errors.map(f64::from);
+    fn show<'a>(
+        &self,
+        columns: usize,
+        window: impl Iterator<Item = &'a Line> + Clone,
+        mut show: impl FnMut(PixelError),
+    ) {
+        let at = |a: &[f32; PADDED], at: usize| {
+            a.get(at..).and_then(|a| a.first_chunk()).map_or(F32x8::ZERO, |a| F32x8::new(*a))
+        };
+        let rises: [[f32; PADDED]; 3] = core::array::from_fn(|c| self.line.root_of_rise(c, columns, window.clone()));
+        let third = F32x8::splat(1.0 / 3.0);
+        for from in (0..columns).step_by(8) {
+            let mut sums = [F32x8::ZERO; 4];
+            for ([errors, others], rise) in self.errors.iter().zip(&rises) {
+                let (q, other, rise) = (at(errors, from), at(others, from), at(rise, from));
                 let error = q * rise;
-                sum.error += error / 3.0;
-                sum.other += other * rise / 3.0;
-                sum.contrast += (error * rise - q).abs() / 3.0;
-                sum.unsure += error * (error / (error + UNSURE)) / 3.0;
+                let unsure = error * (error / (error + UNSURE));
+                for (sum, x) in sums.iter_mut().zip([error, other * rise, (error * rise - q).abs(), unsure]) {
+                    *sum += x * third;
+                }
             }
-            show(sum);
+            let [error, other, contrast, unsure] = sums.map(F32x8::to_array);
+            let classes: [u8; 8] = self.classes.get(from..).and_then(|c| c.first_chunk()).copied().unwrap_or_default();
+            for i in 0..(columns - from).min(8) {
+                let [error, other, contrast, unsure] = [error[i], other[i], contrast[i], unsure[i]];
+                show(PixelError { error, other, contrast, unsure, class: classes[i].into() });
+            }
         }
+    }
+}
+
+/// Puts four values from `at` on.
+#[inline(always)]
+fn put(to: &mut [f32; PADDED], at: usize, x: F64x4) {
+    if let Some(to) = to.get_mut(at..).and_then(|a| a.first_chunk_mut()) {
+        *to = x.to_array().map(|x| x as f32);
     }
 }
 
@@ -205,9 +275,43 @@ impl Span {
     }
 }
 
-/// Parity of column and row, 0 to 3.
-fn parity(column: u32, row: u32) -> usize {
-    (row & 1) as usize * 2 + (column & 1) as usize
+/// What the others of a block say, by channel and parity of the row, for four columns from the block's first on.
+type OfBlock = [[Others; 3]; 2];
+
+/// Sums over the pixels of the block of the other parity in column or row.
+fn of_block([x, y]: [Span; 2], pixel: &impl Fn(u32, u32) -> PixelStats) -> OfBlock {
+    // by parity of the row; lanes are columns, two of each parity
+    let mut sums = [[[F64x4::ZERO; 3]; 3]; 2];
+    let packets = (x.to - x.from).div_ceil(4) as usize;
+    let mut seen = const { Seen::NOTHING };
+    for row in y.from..y.to {
+        seen.set(0, (x.from..x.to).map(|column| pixel(column, row)));
+        for (c, [mean, square, variance]) in sums[(row & 1) as usize].iter_mut().enumerate() {
+            let means = seen.mean[c].as_chunks::<4>().0;
+            for (m, v) in means.iter().zip(seen.variance[c].as_chunks::<4>().0).take(packets) {
+                let m = F64x4::new(*m);
+                *mean += m;
+                *square += m * m;
+                *variance += F64x4::new(*v);
+            }
+        }
+    }
+    // all of the other rows, and of the same the other columns
+    core::array::from_fn(|row| {
+        core::array::from_fn(|c| {
+            let others = |own: F64x4, other: F64x4| {
+                let (own, all) = (own.to_array(), other.to_array().iter().sum::<f64>());
+                F64x4::new(core::array::from_fn(|i| all + own[i & 1 ^ 1] + own[(i & 1 ^ 1) + 2]))
+            };
+            let [own, other] = [sums[row][c], sums[row ^ 1][c]];
+            let count = |span: Span, odd: u32| f64::from((span.from..span.to).filter(|i| i & 1 == odd).count() as u32);
+            let rows = [0, 1].map(|odd| count(y, odd));
+            let columns = [0, 1].map(|odd| count(x, (x.from + odd) & 1));
+            let all = [0, 1].map(|i| rows[row ^ 1] * (columns[0] + columns[1]) + rows[row] * columns[i ^ 1]);
+            let pixels = F64x4::new([all[0], all[1], all[0], all[1]]);
+            Others::of(pixels, core::array::from_fn(|k| others(own[k], other[k])))
+        })
+    })
 }
 
 /// Shows the relative squared errors of the pixels of a block, row by row. `pixel` gives those at a column and row of the
@@ -217,86 +321,90 @@ pub(super) fn relative_errors(
     pixel: impl Fn(u32, u32) -> PixelStats,
     mut show: impl FnMut(PixelError),
 ) {
-    let mut sums = [Sums::default(); 4];
-    for row in y.from..y.to {
-        for column in x.from..x.to {
-            sums[parity(column, row) & 3].add(&Seen::of(&pixel(column, row)));
-        }
-    }
-    let block: [Others; 4] = core::array::from_fn(|own| {
-        let mut all = Sums::default();
-        sums.iter().enumerate().filter(|(class, _)| *class != own).for_each(|(_, s)| all.join(s));
-        all.into()
+    let block = of_block([x, y], &pixel);
+    let columns = (x.to - x.from) as usize;
+    let reached = columns + 2 * REACH as usize;
+    // the first column that windows reach is at 0 if the picture has it
+    let first = (x.reach().start + REACH - x.from) as usize;
+    // columns of the window around each
+    let widths: Columns = core::array::from_fn(|i| {
+        let column = x.from + i as u32;
+        f64::from(Span { from: column, to: column + 1, size: x.size }.reach().len() as u32)
     });
     // the rows of the windows, each where the one before the first was
-    let mut seen = const { [[Seen::NOTHING; COLUMNS]; ROWS] };
+    let mut seen = const { [Seen::NOTHING; ROWS] };
     let mut known = const { [Row::EMPTY; ROWS] };
+    let (mut others, mut all) = const { (Sums::NOTHING, Sums::NOTHING) };
     let mut next = y.from;
-    let left = x.reach().start;
     for row in y.reach().start..y.to.saturating_add(REACH) {
         if row < y.size {
-            let line = &mut seen[row as usize % ROWS];
-            line.iter_mut().zip(x.reach()).for_each(|(s, column)| *s = Seen::of(&pixel(column, row)));
+            seen[row as usize % ROWS].set(first, x.reach().map(|column| pixel(column, row)));
         }
         let middle = row.wrapping_sub(REACH);
         if !y.is_inside(middle) {
             continue;
         }
         let rows = Span { from: middle, to: middle + 1, size: y.size }.reach();
-        let column_of = |i: usize| {
-            let mut s = Sums::default();
-            rows.clone().filter_map(|r| seen[r as usize % ROWS].get(i)).for_each(|p| s.add(p));
-            s
-        };
-        let mut columns = [Sums::default(); COLUMNS];
-        columns.iter_mut().enumerate().take(x.reach().len()).for_each(|(i, s)| *s = column_of(i));
+        let own = &seen[middle as usize % ROWS];
+        let beside = rows.clone().filter(|r| *r != middle).map(|r| &seen[r as usize % ROWS]);
+        Sums::set_both(&mut others, &mut all, beside, own, reached);
         let into = &mut known[middle as usize % ROWS];
-        for (i, column) in (x.from..x.to).enumerate() {
-            let at = (column - left) as usize % COLUMNS;
-            let own = seen[middle as usize % ROWS][at];
-            let mut window = Sums::default();
-            rows.clone().filter(|r| *r != middle).for_each(|r| window.add(&seen[r as usize % ROWS][at]));
-            let reach = Span { from: column, to: column + 1, size: x.size }.reach();
-            for i in (reach.start - left) as usize..(reach.end - left) as usize {
-                if i != at {
-                    window.join(&columns[i % COLUMNS]);
-                }
-            }
-            into.add(i % LONGEST, &own, &window.into(), &block[parity(column, middle) & 3]);
+        let height = F64x4::splat(f64::from(rows.len() as u32));
+        for (at, classes) in into.classes.iter_mut().zip(own.classes.iter().skip(REACH as usize)) {
+            *at = *classes;
         }
-        into.line.take_logarithms((x.to - x.from) as usize);
+        for at in (0..columns).step_by(4) {
+            let pixels = height * four(&widths, at) - F64x4::splat(1.0);
+            for (c, block) in block[(middle & 1) as usize].iter().enumerate() {
+                let window = Others::window(pixels, at, c, &others, &all);
+                let center = at + REACH as usize;
+                into.set(at, c, [four(&own.mean[c], center), four(&own.variance[c], center)], &window, block);
+            }
+        }
+        into.line.take_logarithms(columns);
         // rows of which all others in the window are known
         let complete = if middle + 1 == y.to { y.to } else { (middle + 1).saturating_sub(REACH) };
         while next < complete {
             let window = next.saturating_sub(REACH).max(y.from)..(next + REACH + 1).min(y.to);
             let lines = window.map(|r| &known[r as usize % ROWS].line);
-            known[next as usize % ROWS].show((x.to - x.from) as usize, lines, &mut show);
+            known[next as usize % ROWS].show(columns, lines, &mut show);
             next += 1;
         }
     }
 }
 
-/// D of a pixel of mean m and variance v, and what part of it the window tells: t of [`super::contrast`].
+/// D of pixels of mean m and variance v, D with the other k, and what part of it the window tells: t of
+/// [`super::contrast`].
 #[inline(always)]
-fn denominator(c: usize, [m, v]: [f64; 2], k: f64, window: &Others, block: &Others) -> [f64; 2] {
-    if block.pixels < ENOUGH || window.pixels < ENOUGH {
-        return [relative_denominator(m, v), 0.0];
-    }
-    let (noise, contrast) = (window.noise[c], window.contrast[c]);
-    let [unsure, surer] = [noise.max(block.noise[c]) / window.pixels, block.contrast[c]];
-    let u = if surer > 0.0 { surer / (surer + unsure) } else { 0.0 };
-    let mean = block.mean[c] + u * (window.mean[c] - block.mean[c]);
+fn denominators([m, v]: [F64x4; 2], window: &Others, block: &Others) -> (F64x4, F64x4, F64x4) {
+    let (zero, one) = (F64x4::ZERO, F64x4::splat(1.0));
+    let (noise, contrast) = (window.noise, window.contrast);
+    // a of a + b, 0 where there is none of it
+    let share = |a: F64x4, b: F64x4| a.if_above(zero, a / (a + b), zero);
+    let u = share(block.contrast, noise.max(block.noise) / window.pixels);
+    let mean = block.mean + u * (window.mean - block.mean);
     let off = (m - mean) * (m - mean);
     // a pixel that has found nothing knows nothing: it is as noisy as the others
-    let own = if v > 0.0 { v } else { noise };
-    let stands_out = if off > k * own { 1.0 - k * own / off } else { 0.0 };
-    let [surer, unsure] = [contrast, own.max(noise)];
-    let w = if surer > 0.0 { surer / (surer + unsure) } else { 0.0 }.max(stands_out);
-    let e = mean + w * (m - mean);
+    let own = v.if_above(zero, v, noise);
+    let surer = share(contrast, own.max(noise));
     let of_window = u * u * noise / window.pixels;
-    let of_block = (1.0 - u) * (1.0 - u) * block.noise[c] / block.pixels;
-    let variance = TAKEN_OFF * w * w * v + (1.0 - w) * (1.0 - w) * (of_window + of_block);
-    [(e * e - variance).max(0.0) + REL_MSE_EPSILON, (1.0 - w) * u * u]
+    let of_block = (one - u) * (one - u) * block.noise / block.pixels;
+    let [least, epsilon, taken_off] = [ENOUGH - 0.5, REL_MSE_EPSILON, TAKEN_OFF].map(F64x4::splat);
+    let with = |k: f64| {
+        let doubt = F64x4::splat(k) * own;
+        let stands_out = off.if_above(doubt, one - doubt / off, zero);
+        let w = surer.max(stands_out);
+        let e = mean + w * (m - mean);
+        let rest = one - w;
+        let variance = taken_off * w * w * v + rest * rest * (of_window + of_block);
+        ((e * e - variance).max(zero) + epsilon, rest * u * u)
+    };
+    let ((d, left), (other, _)) = (with(1.0), with(DOUBT));
+    // too few others say nothing
+    let (m, v) = (m.to_array(), v.to_array());
+    let alone = F64x4::new(core::array::from_fn(|i| relative_denominator(m[i], v[i])));
+    let enough = |x: F64x4, y: F64x4| window.pixels.min(block.pixels).if_above(least, x, y);
+    (enough(d, alone), enough(other, alone), enough(left, zero))
 }
 
 #[cfg(test)]
@@ -318,7 +426,11 @@ mod tests {
         let spans = [n.min(16), n.div_ceil(16)].map(|size| Span { from: 0, to: size, size });
         let mut sum = [0.0; 3];
         let one = |x: u32, y: u32| pixels.get((y * 16 + x) as usize).copied().unwrap_or_default();
-        relative_errors(spans, one, |e| sum = [sum[0] + e.error, sum[1] + e.other, sum[2] + e.unsure]);
+        relative_errors(spans, one, |e| {
+            for (sum, x) in sum.iter_mut().zip([e.error, e.other, e.unsure]) {
+                *sum += f64::from(x)
+            }
+        });
         sum.map(|x| x / pixels.len() as f64)
     }
 
@@ -404,7 +516,7 @@ mod tests {
             let [error, _, unsure] = errors(&[pixel(64, 10.0, scale)].repeat(256));
             let q = scale / 100.01;
             // noise that is larger than the mean leaves less than its square to divide by
-            let least = q / (q + UNSURE) - 1e-3;
+            let least = q / (q + f64::from(UNSURE)) - 1e-3;
             assert!(unsure / error > least && (q > 1.0 || unsure / error < least + 2e-3), "{unsure} of {error}");
         }
     }

@@ -117,23 +117,6 @@ impl<'m> PixelEstimates<'m> {
         self.value(film).map(|x| 1.0 / (x * x + REL_MSE_EPSILON as f32))
     }
 
-    /// Keeps a number of a pixel until the estimates are made anew, if there is room for one per pixel.
-    pub(super) fn keep(&mut self, film: usize, x: f32) {
-        if let Values::Denoised(Work { reach, .. }) = &mut self.values
-            && let Some(kept) = reach.get_mut(film)
-        {
-            *kept = x;
-        }
-    }
-
-    /// The number that [`Self::keep`] has kept.
-    pub(super) fn kept(&self, film: usize) -> Option<f32> {
-        match &self.values {
-            Values::Denoised(work) => work.reach.get(film).copied(),
-            Values::None | Values::Blocks(_) => None,
-        }
-    }
-
     /// Estimates as rgb planes, if there is one per pixel.
     pub(super) fn planes(&self) -> Option<[&[f32]; 3]> {
         match &self.values {
@@ -179,7 +162,7 @@ impl<'m> PixelEstimates<'m> {
         }
         let done = match &mut self.values {
             Values::None => return true,
-            Values::Denoised(work) => self.state.progress.row(self.size, &NoisyFilm(film), work),
+            Values::Denoised(work) => self.state.progress.row(self.size, &NoisyFilm::new(film), work),
             Values::Blocks(planes) => {
                 let (y, [columns, rows]) = (self.state.row, self.size);
                 if y == 0 {
@@ -206,13 +189,24 @@ impl<'m> PixelEstimates<'m> {
 }
 
 /// A film as the denoiser reads it: pixels without samples count as absent.
-struct NoisyFilm<'a, 'm>(&'a Film<'m>);
+struct NoisyFilm<'a, 'm> {
+    film: &'a Film<'m>,
+    /// Planes of albedo and normal, if the film has them.
+    features: [[Option<&'a [f32]>; 3]; 2],
+}
+
+impl<'a, 'm> NoisyFilm<'a, 'm> {
+    fn new(film: &'a Film<'m>) -> Self {
+        let planes = |aov| [0, 1, 2].map(|c| film.plane(aov, c));
+        Self { film, features: [planes(Aov::Albedo), planes(Aov::Normal)] }
+    }
+}
 
 impl NoisySource for NoisyFilm<'_, '_> {
     fn color(&self, at: usize) -> ([F32x8; 3], [F32x8; 3]) {
         let (mut color, mut variance) = ([[0.0; 8]; 3], [[0.0; 8]; 3]);
         for i in 0..8 {
-            let p = self.0.pixel(at + i);
+            let p = self.film.pixel(at + i);
             let (m, v) = (p.mean(), p.variance_of_mean());
             for c in 0..3 {
                 color[c][i] = if p.samples > 0 { m[c] as f32 } else { f32::NAN };
@@ -222,16 +216,17 @@ impl NoisySource for NoisyFilm<'_, '_> {
         (color.map(F32x8::new), variance.map(F32x8::new))
     }
 
+    #[inline(always)]
     fn features(&self, at: usize) -> ([F32x8; 3], [F32x8; 3]) {
-        let load = |aov, unknown: f32| {
-            core::array::from_fn(|c| match self.0.plane(aov, c) {
-                Some(plane) => match plane.get(at..).and_then(|p| p.first_chunk()) {
-                    Some(a) => F32x8::new(*a),
-                    None => F32x8::from_fn(|i| plane.get(at + i).copied().unwrap_or(unknown)),
-                },
-                None => F32x8::splat(unknown),
-            })
+        let load = |plane: Option<&[f32]>, unknown: f32| match plane {
+            Some(plane) => match plane.get(at..).and_then(|p| p.first_chunk()) {
+                Some(a) => F32x8::new(*a),
+                None => F32x8::from_fn(|i| plane.get(at + i).copied().unwrap_or(unknown)),
+            },
+            None => F32x8::splat(unknown),
         };
-        (load(Aov::Albedo, 1.0), load(Aov::Normal, 0.0))
+        let [albedo, normal] = &self.features;
+        let three = |planes: &[Option<&[f32]>; 3], unknown| [0, 1, 2].map(|c: usize| load(planes[c], unknown));
+        (three(albedo, 1.0), three(normal, 0.0))
     }
 }

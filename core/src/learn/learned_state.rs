@@ -9,7 +9,7 @@ use super::picture::{Picture, PictureStatistics, error_of, outliers};
 use super::settings::{Guiding, Learning, Objective};
 use crate::cost::COST_BOUNCE;
 use crate::counters::Counters;
-use crate::film::{Film, PixelSums, Selection};
+use crate::film::{Film, PixelSums, TrimmedSums};
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::rrs::{Learned8, Local8, Space};
 use crate::tiles::BlockGrid;
@@ -356,37 +356,27 @@ impl<'m> LearnedState<'m> {
         self.needed && if first { !self.picture.known() } else { self.pixels.known() }
     }
 
-    /// Shows the error of an iteration's pixel to the selection. In the first visit errors are kept where there is room.
-    pub(crate) fn show_error(
-        &mut self,
-        film: usize,
-        sums: &PixelSums,
-        s: &mut Selection,
-        digits: &mut [u32],
-        first_visit: bool,
-    ) {
-        if sums.samples == 0 {
-            return;
+    /// Sums of the errors of a picture of so many pixels, before any is shown.
+    pub(crate) fn begin_errors(pixels: usize) -> TrimmedSums {
+        TrimmedSums::new(outliers(pixels as u64))
+    }
+
+    /// Words that the sums of [`Self::begin_errors`] need.
+    pub(crate) fn largest_len(pixels: usize) -> usize {
+        TrimmedSums::heap_len::<1>(outliers(pixels as u64))
+    }
+
+    /// Shows the error of an iteration's pixel.
+    pub(crate) fn show_error(&self, film: usize, sums: &PixelSums, s: &mut TrimmedSums, largest: &mut [u32]) {
+        if sums.samples > 0 {
+            let error = error_of(film as u32, sums, self.learning.norm, &self.pixels, &self.allocation);
+            s.show([error], largest);
         }
-        let norm = self.learning.norm;
-        let error = match self.pixels.kept(film).filter(|_| !first_visit) {
-            Some(kept) => kept,
-            None => {
-                let e = error_of(film as u32, sums, norm, &self.pixels, &self.allocation);
-                self.pixels.keep(film, e);
-                e
-            }
-        };
-        s.show(f64::from(error), digits);
     }
 
-    /// Number of pixels whose errors are left out.
-    pub(crate) fn outliers(pixels: u64) -> u64 {
-        outliers(pixels)
-    }
-
-    /// Takes variance and cost of the iteration from the selection that has seen all of its pixels.
-    pub(crate) fn picture_measured(&mut self, s: &Selection, counters: &Counters) {
+    /// Takes variance and cost of the iteration from the sums that have seen all of its pixels.
+    pub(crate) fn picture_measured(&mut self, s: &mut TrimmedSums, largest: &mut [u32], counters: &Counters) {
+        s.end::<1>(outliers(s.shown()), largest);
         self.picture.measured(&self.learning, s, counters);
     }
 

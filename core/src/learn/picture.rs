@@ -4,7 +4,7 @@ use super::adaptive::SampleAllocation;
 use super::estimate::PixelEstimates;
 use super::settings::Learning;
 use crate::counters::Counters;
-use crate::film::{PixelSums, Selection};
+use crate::film::{PixelSums, TrimmedSums};
 use crate::rrs::Norm;
 use bytemuck::{Pod, Zeroable};
 
@@ -54,11 +54,11 @@ impl Picture {
     }
 
     /// Takes the errors of an iteration's pixels ([`error_of`]), of which the outliers were left out.
-    pub(super) fn measured(&mut self, learning: &Learning, t: &Selection, counters: &Counters) {
-        let n = t.shown.max(1) as f64;
+    pub(super) fn measured(&mut self, learning: &Learning, t: &TrimmedSums, counters: &Counters) {
+        let n = t.shown().max(1) as f64;
         let work = counters.cost();
         let s = PictureStatistics {
-            variance: t.sum / t.count.max(1) as f64,
+            variance: t.sums[0] / t.count.max(1) as f64,
             outliers: t.rest / n,
             cost: work / counters.camera_samples.max(1) as f64,
             limit: f64::from(t.limit) * counters.camera_samples as f64 / n,

@@ -2,19 +2,18 @@
 //!
 //! | stage | reads | changes |
 //! |---|---|---|
-//! | measure | pixels of all shards, four times | variance and cost of the picture, against the estimate before |
+//! | measure | pixels of all shards | variance and cost of the picture, against the estimate before |
 //! | merge | pixels of all shards | film |
 //! | refresh | film | estimate of the pixels: denoised row by row, or means of blocks |
-//! | measure first | pixels of all shards, four times | as `measure`, of the first iteration, against its own estimate |
+//! | measure first | pixels of all shards | as `measure`, of the first iteration, against its own estimate |
 //! | discount, absorb, freeze | training of all shards | statistics of the scene, their tree, what look-ups read |
 //! | guide | logs of all shards | distributions of path guiding |
 //! | densities | film, estimate | where adaptive sampling wants samples |
-//! | error | film, four times | estimated error of the picture |
+//! | error | film | estimated error of the picture |
 //!
 //! Work is counted in units of a ray of the tracer, some 300 instructions ([`Budget::rays`]).
 
 use super::{Phase, SessionError, SessionState};
-use crate::film::Film;
 use crate::learn::LearnedState;
 use crate::record::Finishing;
 use crate::tracer::{Budget, Shard, ShardCursor, StepResult};
@@ -217,7 +216,7 @@ impl SessionState<'_> {
                     }
                     None => {
                         self.film.begin_merge();
-                        self.finishing.selection.begin(self.digits);
+                        self.finishing.sums = LearnedState::begin_errors(self.film.len());
                         self.next_stage();
                     }
                 }
@@ -228,7 +227,7 @@ impl SessionState<'_> {
             REFRESH => {
                 let work = self.rays_of_row();
                 if self.learned.refresh_row(&self.film) {
-                    self.finishing.selection.begin(self.digits);
+                    self.finishing.sums = LearnedState::begin_errors(self.film.len());
                     self.next_stage();
                 }
                 work
@@ -257,7 +256,7 @@ impl SessionState<'_> {
             GUIDE => self.learn_guide(shards, rays),
             DENSITIES => {
                 if self.learned.density_of_next(&self.film) {
-                    self.film.begin_errors(&mut self.finishing.selection, self.digits);
+                    self.finishing.sums = self.film.begin_errors();
                     self.next_stage();
                 }
                 RAYS_PER_DENSITY
@@ -282,13 +281,12 @@ impl SessionState<'_> {
             self.next_stage();
             return 1;
         }
-        let Finishing { selection, cursor, shard, counters, .. } = &mut self.finishing;
-        let (learned, digits) = (&mut self.learned, &mut *self.digits);
+        let Finishing { sums: errors, cursor, shard, counters, .. } = &mut self.finishing;
+        let (learned, largest) = (&mut self.learned, &mut *self.largest);
         if let Some(s) = shards.shard(*shard) {
-            let first_visit = selection.is_first_visit();
             let limit = rays.saturating_mul(MEASURED_PER_RAY);
             let (n, done) = s.visit(cursor, limit, |film, sums, _, _| {
-                learned.show_error(film, sums, selection, digits, first_visit);
+                learned.show_error(film, sums, errors, largest);
             });
             if done {
                 (*shard, *cursor) = (*shard + 1, ShardCursor::default());
@@ -296,10 +294,8 @@ impl SessionState<'_> {
             return 1 + n / MEASURED_PER_RAY;
         }
         (*shard, *cursor) = (0, ShardCursor::default());
-        if selection.end_visit(LearnedState::outliers, digits) {
-            learned.picture_measured(selection, counters);
-            self.next_stage();
-        }
+        learned.picture_measured(errors, largest, counters);
+        self.next_stage();
         8
     }
 
@@ -363,18 +359,15 @@ impl SessionState<'_> {
 
     /// Estimates the error of the film.
     fn estimate_error(&mut self, rays: u64) -> u64 {
-        let Finishing { selection, at, .. } = &mut self.finishing;
+        let Finishing { sums, at, .. } = &mut self.finishing;
         let limit = (rays / RAYS_PER_ESTIMATED).clamp(1, 1 << 30) as usize;
-        let [blocks, n] = self.film.show_errors(*at, limit, selection, self.digits);
+        let [blocks, n] = self.film.show_errors(*at, limit, sums, self.largest);
         *at += blocks;
         if *at < self.film.blocks() {
             return 1 + n * RAYS_PER_ESTIMATED;
         }
-        *at = 0;
-        if selection.end_visit(Film::outliers, self.digits) {
-            self.film.estimate_error(selection);
-            self.next_stage();
-        }
+        self.film.estimate_error(sums, self.largest);
+        self.next_stage();
         8 + n * RAYS_PER_ESTIMATED
     }
 }
