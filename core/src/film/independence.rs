@@ -28,6 +28,24 @@ pub(super) fn class(p: &PixelStats) -> usize {
     SPREADS.iter().filter(|s| of_samples >= **s * square * p.weight_sqr).count()
 }
 
+/// What squared standard errors of pixels ([`PixelStats::variance_of_mean`]) are to be multiplied by so that they are right
+/// on average, with Sobol' points, roulette and splitting too: by the spread of a pixel's samples. 1 while the samples do
+/// not tell it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VarianceFactors {
+    pub(super) of_classes: [f64; CLASSES],
+}
+
+impl VarianceFactors {
+    /// Those of independent samples.
+    pub const INDEPENDENT: Self = Self { of_classes: [1.0; CLASSES] };
+
+    /// The factor of a pixel.
+    pub fn of(&self, p: &PixelStats) -> f64 {
+        self.of_classes[class(p) % CLASSES]
+    }
+}
+
 /// Sums over the pixels of a class of an iteration that is being merged: squared differences from the picture before, and
 /// variances as of independent samples. Relative, with the denominator of relMSE.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
