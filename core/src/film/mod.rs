@@ -199,8 +199,7 @@ impl<'m> Film<'m> {
 
     /// What the variances of pixels that independent samples would have are to be multiplied by.
     pub fn variance_factors(&self) -> VarianceFactors {
-        let told = self.scalars.error.is_resolved();
-        VarianceFactors { of_classes: self.scalars.independence.map(|i| if told { i.ratio } else { 1.0 }) }
+        VarianceFactors::told(&self.scalars.independence)
     }
 
     /// Adds the sums of an iteration to a pixel, each sample with weight `w` if samples have weights.
