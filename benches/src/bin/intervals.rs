@@ -140,10 +140,12 @@ impl Row {
 
     fn add(&mut self, r: &Rendered) {
         self.pictures.push(r.pixels.iter().flat_map(|p| p.mean()).collect());
-        let factor = r.error.pixel_variance_factor();
-        let variances = r.pixels.iter().flat_map(|p| p.variance_of_mean());
+        let variances = r.pixels.iter().flat_map(|p| {
+            let factor = r.variance_factors.of(p);
+            p.variance_of_mean().map(|v| factor * v)
+        });
         self.variances.resize(3 * r.pixels.len(), 0.0);
-        self.variances.iter_mut().zip(variances).for_each(|(sum, v)| *sum += factor * v);
+        self.variances.iter_mut().zip(variances).for_each(|(sum, v)| *sum += v);
         self.stated.push(r.error);
     }
 

@@ -49,13 +49,6 @@ impl ErrorEstimate {
         self.is_resolved().then_some([self.low, self.high])
     }
 
-    /// What squared standard errors of pixels ([`PixelStats::variance_of_mean`](crate::unstable::film::PixelStats)) are to
-    /// be multiplied by so that they are right on average over the picture, with Sobol' points, roulette and splitting
-    /// too: `independence`, or 1 while the samples do not tell it.
-    pub fn pixel_variance_factor(&self) -> f64 {
-        if self.is_resolved() && self.independence > 0.0 { self.independence } else { 1.0 }
-    }
-
     /// Figure of merit of a render that took `work`, in any unit: 1 / (relMSE x work). It is about the same however long
     /// a render goes on, so that it tells which of two renders of a scene is the more efficient; infinite without error or
     /// work.
@@ -87,15 +80,14 @@ pub(super) fn relative_denominator(mean: f64, variance: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Killed by: an interval of what is not resolved, a factor of a picture that does not tell it.
+    /// Killed by: an interval of what is not resolved.
     #[test]
     fn what_is_not_resolved_has_no_interval() {
         let e =
             ErrorEstimate { low: 1.0, high: 3.0, independence: 0.5, effective_pixels: RESOLVED, ..Default::default() };
-        assert_eq!((e.interval(), e.pixel_variance_factor()), (Some([1.0, 3.0]), 0.5));
+        assert_eq!(e.interval(), Some([1.0, 3.0]));
         let few = ErrorEstimate { effective_pixels: RESOLVED - 1.0, ..e };
-        assert_eq!((few.interval(), few.pixel_variance_factor()), (None, 1.0));
-        assert_eq!(ErrorEstimate::default().pixel_variance_factor(), 1.0);
+        assert_eq!(few.interval(), None);
     }
 
     /// Killed by: all of the variance taken off where a pixel has found its light once.

@@ -28,6 +28,32 @@ pub(super) fn class(p: &PixelStats) -> usize {
     SPREADS.iter().filter(|s| of_samples >= **s * square * p.weight_sqr).count()
 }
 
+/// What squared standard errors of pixels ([`PixelStats::variance_of_mean`]) are to be multiplied by so that they are right
+/// on average, with Sobol' points, roulette and splitting too: by the spread of a pixel's samples. 1 while the samples do
+/// not tell it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VarianceFactors {
+    pub(super) of_classes: [f64; CLASSES],
+}
+
+/// Relative standard error of a ratio below which it counts.
+const SURE: f64 = 0.2;
+
+impl VarianceFactors {
+    /// Those of independent samples.
+    pub const INDEPENDENT: Self = Self { of_classes: [1.0; CLASSES] };
+
+    /// Ratios of classes, as far as their standard errors are small.
+    pub(super) fn told(classes: &[Independence; CLASSES]) -> Self {
+        Self { of_classes: classes.map(|i| if i.noise < SURE * i.ratio { i.ratio } else { 1.0 }) }
+    }
+
+    /// The factor of a pixel.
+    pub fn of(&self, p: &PixelStats) -> f64 {
+        self.of_classes[class(p) % CLASSES]
+    }
+}
+
 /// Sums over the pixels of a class of an iteration that is being merged: squared differences from the picture before, and
 /// variances as of independent samples. Relative, with the denominator of relMSE.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -228,5 +254,18 @@ mod tests {
             let known = Independence::UNKNOWN.after(&d);
             assert_eq!((known.ratio < 0.5, known.noise > 0.0), (tells, tells), "{pixels} pixels: {known:?}");
         }
+    }
+
+    /// Killed by: a ratio that counts though it is not sure, pixels of another class.
+    #[test]
+    fn factors_are_those_of_sure_classes() {
+        let of = |ratio: f64, noise: f64| Independence { ratio, noise };
+        let factors = VarianceFactors::told(&[of(0.5, 0.05), of(0.7, 0.3), of(0.9, 0.1)]);
+        let pixel = |variance: f64| {
+            let spread = variance * (64.0 * 64.0 - 64.0);
+            PixelStats { sum: [64.0; 3], spread: [spread; 3], weight: 64.0, weight_sqr: 64.0, samples: 64, rays: 0 }
+        };
+        // squared coefficients of variation of 0.1, 3 and 20
+        assert_eq!([0.1, 3.0, 20.0].map(|x| factors.of(&pixel(x / 64.0))), [0.5, 1.0, 0.9]);
     }
 }

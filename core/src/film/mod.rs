@@ -39,6 +39,7 @@ pub(crate) use trimmed::TrimmedSums;
 use crate::memory::{Carver, Measure, MemoryError};
 use aov::AovPlanes;
 use bytemuck::{Pod, Zeroable};
+pub use independence::VarianceFactors;
 use independence::{CLASSES, Differences, Independence, class};
 use pixel::PixelWeights;
 use surroundings::{SIDE, Span, UNSURE_SHARE, relative_errors};
@@ -189,10 +190,16 @@ impl<'m> Film<'m> {
     }
 
     /// Standard error of a pixel's mean per channel, right on average over the picture: that of independent samples, times
-    /// the root of [`ErrorEstimate::pixel_variance_factor`]. See [`Self::pixel`] for pixels without samples.
+    /// the root of its factor of [`Self::variance_factors`]. See [`Self::pixel`] for pixels without samples.
     pub fn standard_error(&self, index: usize) -> [f64; 3] {
-        let factor = self.scalars.error.pixel_variance_factor();
-        self.pixel(index).variance_of_mean().map(|v| (factor * v).sqrt_newton())
+        let p = self.pixel(index);
+        let factor = self.variance_factors().of(&p);
+        p.variance_of_mean().map(|v| (factor * v).sqrt_newton())
+    }
+
+    /// What the variances of pixels that independent samples would have are to be multiplied by.
+    pub fn variance_factors(&self) -> VarianceFactors {
+        VarianceFactors::told(&self.scalars.independence)
     }
 
     /// Adds the sums of an iteration to a pixel, each sample with weight `w` if samples have weights.

@@ -228,6 +228,7 @@ pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
         planes: planes(film),
         counters: *session.counters(),
         error: film.error_estimate(),
+        variance_factors: film.variance_factors(),
         first_sample: share.first,
         spp: all.samples,
         seconds,

@@ -522,6 +522,7 @@ fn add(parts: &[Checked], common: Common) -> Result<Merged, MergeError> {
         planes: planes(film),
         counters,
         error: film.error_estimate(),
+        variance_factors: film.variance_factors(),
         first_sample: 0,
         spp,
         seconds,

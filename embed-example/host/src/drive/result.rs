@@ -1,7 +1,7 @@
 //! Results of a render: sums of the pixels, and a record of every iteration.
 
 use super::calibrate::Calibration;
-use croupier::unstable::film::{Aov, PixelAov, PixelStats};
+use croupier::unstable::film::{Aov, PixelAov, PixelStats, VarianceFactors};
 use croupier::unstable::learn::PictureStatistics;
 use croupier::unstable::learn::guiding::GuideUse;
 use croupier::unstable::schedule::Work;
@@ -68,6 +68,8 @@ pub struct Rendered {
     pub counters: Counters,
     /// Error estimate of the picture.
     pub error: ErrorEstimate,
+    /// What the pixels' variances of independent samples are to be multiplied by.
+    pub variance_factors: VarianceFactors,
     /// Number of the first camera sample of each pixel: not 0 in parts of a picture ([`Part`](super::Part)).
     pub first_sample: u32,
     /// Camera samples per pixel of the finished iterations.
@@ -101,10 +103,13 @@ impl Rendered {
     }
 
     /// Standard error of the mean radiance, row by row, rgb; right on average over the picture
-    /// ([`ErrorEstimate::pixel_variance_factor`]).
+    /// ([`VarianceFactors`]).
     pub fn stderr(&self) -> Vec<[f32; 3]> {
-        let factor = self.error.pixel_variance_factor();
-        self.pixels.iter().map(|p| p.variance_of_mean().map(|v| (factor * v).sqrt() as f32)).collect()
+        let of_pixel = |p: &PixelStats| {
+            let factor = self.variance_factors.of(p);
+            p.variance_of_mean().map(|v| (factor * v).sqrt() as f32)
+        };
+        self.pixels.iter().map(of_pixel).collect()
     }
 
     /// Channels of an auxiliary value, if it was asked for.
