@@ -19,19 +19,17 @@ compile_error!(
 );
 
 mod f32x8;
-mod f64x4;
 mod int;
 mod mask;
 mod math;
 mod vec3;
 
 pub use f32x8::F32x8;
-pub use f64x4::F64x4;
 pub use int::{I32x8, U32x8};
 pub use mask::Mask8;
 pub use vec3::{Frame8, LUMINANCE, Vec3x8};
 
-/// Lanes of every vector type here but [`F64x4`].
+/// Lanes of every vector type here.
 pub const LANES: usize = 8;
 
 /// Is this the arithmetic whose results have the same bits on every target? `false` with the feature `fast`.

@@ -72,7 +72,7 @@ impl Grid {
     }
 
     /// Row `y`; `None` if the picture has no such row.
-    #[inline(always)]
+    #[inline(never)]
     pub(super) fn row(self, window: &[f32], y: usize) -> Option<Row<'_>> {
         let row = window.get(self.window_row(y))?;
         let mut planes = row.chunks_exact(self.stride.max(1));

@@ -57,6 +57,8 @@ impl Line {
 
     /// Roots of D / D' of channel `c` of the row, of `columns` columns; `window` are the rows that it is seen with, it
     /// among them.
+    // once, not unrolled over the channels
+    #[inline(never)]
     pub(super) fn root_of_rise<'a>(
         &self,
         c: usize,

@@ -44,9 +44,6 @@ use independence::{CLASSES, Differences, Independence, class};
 use pixel::PixelWeights;
 use surroundings::{SIDE, Span, UNSURE_SHARE, relative_errors};
 
-/// Numbers that [`Film::show_errors`] shows of a pixel.
-const SHOWN: usize = 4 + CLASSES;
-
 /// What a film holds of each pixel besides its mean and error.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FilmLayout {
@@ -290,7 +287,7 @@ impl<'m> Film<'m> {
 
     /// Words that the sums of [`Self::begin_errors`] need for a film of so many pixels.
     pub(crate) fn largest_len(pixels: usize) -> usize {
-        TrimmedSums::heap_len::<SHOWN>(Self::outliers(pixels as u64))
+        TrimmedSums::heap_len(Self::outliers(pixels as u64))
     }
 
     /// Shows the errors of pixels from block `at` on, some `limit` pixels. Blocks and pixels shown.
@@ -319,7 +316,7 @@ impl<'m> Film<'m> {
 
     /// Estimates the error from the sums that have seen all pixels, without the outliers.
     pub(crate) fn estimate_error(&mut self, t: &mut TrimmedSums, largest: &mut [u32]) {
-        t.end::<SHOWN>(Self::outliers(self.pixels.len() as u64), largest);
+        t.end(Self::outliers(self.pixels.len() as u64), largest);
         let m = t.count.max(1) as f64;
         let [mean, other, contrast, unsure, of_classes @ ..] = t.sums.map(|x| x / m);
         let noise =

@@ -31,16 +31,17 @@
 //! `intervals`.
 
 use super::contrast::{LARGEST, LONGEST, Line, PADDED, REACH};
-use super::error::{REL_MSE_EPSILON, TAKEN_OFF, relative_denominator};
+use super::error::{REL_MSE_EPSILON, TAKEN_OFF};
 use super::independence::class;
 use super::pixel::PixelStats;
-use croupier_simd::{F32x8, F64x4};
+use core::ops::Range;
+use croupier_simd::F32x8;
 
 /// Pixels a side of the smallest block.
 pub(super) const SIDE: u32 = LONGEST.div_ceil(2) as u32;
 /// Rows of the window.
 const ROWS: usize = 2 * REACH as usize + 1;
-/// Columns of a block with those that its windows reach, in whole packets of four: the block's own from `REACH` on.
+/// Columns of a block with those that its windows reach: the block's own from `REACH` on.
 const COLUMNS: usize = PADDED + 2 * REACH as usize;
 /// Fewer other pixels say nothing.
 const ENOUGH: f64 = 8.0;
@@ -54,12 +55,6 @@ pub(super) const UNSURE_SHARE: f64 = 0.5;
 /// Values by column, those of [`Seen`].
 type Columns = [f64; COLUMNS];
 
-/// Four values from `at`.
-#[inline(always)]
-fn four(a: &Columns, at: usize) -> F64x4 {
-    a.get(at..).and_then(|a| a.first_chunk()).map_or(F64x4::ZERO, |a| F64x4::new(*a))
-}
-
 /// Row of pixels: mean of each and its variance, by channel, and its class. Columns outside the picture are 0.
 #[derive(Clone, Copy)]
 struct Seen {
@@ -71,9 +66,11 @@ struct Seen {
 impl Seen {
     const NOTHING: Self = Self { mean: [[0.0; COLUMNS]; 3], variance: [[0.0; COLUMNS]; 3], classes: [0; COLUMNS] };
 
-    /// Sets the columns from `at` on.
-    fn set(&mut self, at: usize, pixels: impl Iterator<Item = PixelStats>) {
-        for (at, p) in (at..COLUMNS).zip(pixels) {
+    /// Sets `columns` of row `row` of the picture, from place `at` on.
+    #[inline(never)]
+    fn set(&mut self, at: usize, columns: Range<u32>, row: u32, pixel: &impl Fn(u32, u32) -> PixelStats) {
+        for (at, column) in (at..COLUMNS).zip(columns) {
+            let p = pixel(column, row);
             let (mean, variance) = (p.mean(), p.variance_of_mean());
             for c in 0..3 {
                 self.mean[c][at] = mean[c];
@@ -84,93 +81,68 @@ impl Seen {
     }
 }
 
-/// Sums over the pixels of some rows, by column and channel.
+/// Columns in fours: loops over as many become vectors.
+fn fours(columns: &Columns) -> &[[f64; 4]] {
+    columns.as_chunks().0
+}
+
+fn fours_mut(columns: &mut Columns) -> &mut [[f64; 4]] {
+    columns.as_chunks_mut().0
+}
+
+/// Sums over the pixels of some rows in a channel, by column.
 #[derive(Clone, Copy)]
 struct Sums {
-    mean: [Columns; 3],
+    mean: Columns,
     /// Of squared means.
-    square: [Columns; 3],
+    square: Columns,
     /// Of variances of means.
-    variance: [Columns; 3],
+    variance: Columns,
 }
 
 impl Sums {
-    const NOTHING: Self =
-        Self { mean: [[0.0; COLUMNS]; 3], square: [[0.0; COLUMNS]; 3], variance: [[0.0; COLUMNS]; 3] };
+    const NOTHING: Self = Self { mean: [0.0; COLUMNS], square: [0.0; COLUMNS], variance: [0.0; COLUMNS] };
 
-    /// Sets `columns` columns of the sums over `rows`, and of those with one more row.
+    /// Adds `columns` columns of channel `c` of a row.
     #[inline(always)]
-    fn set_both<'a>(
-        others: &mut Self,
-        all: &mut Self,
-        rows: impl Iterator<Item = &'a Seen> + Clone,
-        own: &Seen,
-        columns: usize,
-    ) {
-        for c in 0..3 {
-            for at in (0..columns).step_by(4) {
-                let of = |row: &Seen| {
-                    let m = four(&row.mean[c], at);
-                    [m, m * m, four(&row.variance[c], at)]
-                };
-                let mut sums = [F64x4::ZERO; 3];
-                let mut add = |x: [F64x4; 3]| sums.iter_mut().zip(x).for_each(|(s, x)| *s += x);
-                rows.clone().for_each(|row| add(of(row)));
-                others.put(c, at, sums);
-                let mut add = |x: [F64x4; 3]| sums.iter_mut().zip(x).for_each(|(s, x)| *s += x);
-                add(of(own));
-                all.put(c, at, sums);
-            }
-        }
-    }
-
-    /// Sets four columns.
-    #[inline(always)]
-    fn put(&mut self, c: usize, at: usize, sums: [F64x4; 3]) {
-        for (to, x) in [&mut self.mean[c], &mut self.square[c], &mut self.variance[c]].into_iter().zip(sums) {
-            if let Some(to) = to.get_mut(at..).and_then(|a| a.first_chunk_mut()) {
-                *to = x.to_array();
+    fn add(&mut self, row: &Seen, c: usize, columns: usize) {
+        let row = fours(&row.mean[c]).iter().zip(fours(&row.variance[c]));
+        let Self { mean, square, variance } = self;
+        let sums = fours_mut(mean).iter_mut().zip(fours_mut(square)).zip(fours_mut(variance));
+        for ((m, v), ((mean, square), variance)) in row.zip(sums).take(columns.div_ceil(4)) {
+            for i in 0..4 {
+                mean[i] += m[i];
+                square[i] += m[i] * m[i];
+                variance[i] += v[i];
             }
         }
     }
 }
 
-/// What other pixels say of one, in a channel, for four pixels.
-#[derive(Clone, Copy)]
+/// What other pixels say of one, in a channel.
+#[derive(Clone, Copy, Default)]
 struct Others {
-    pixels: F64x4,
-    mean: F64x4,
+    pixels: f64,
+    mean: f64,
     /// Variance among them beyond their noise.
-    contrast: F64x4,
+    contrast: f64,
     /// Mean of their variances.
-    noise: F64x4,
+    noise: f64,
+}
+
+/// The larger number; unlike that of `f64` a single comparison.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 impl Others {
     /// From sums over so many pixels.
     #[inline(always)]
-    fn of(pixels: F64x4, [mean, square, variance]: [F64x4; 3]) -> Self {
-        let n = F64x4::splat(1.0) / pixels.max(F64x4::splat(1.0));
+    fn of(pixels: f64, [mean, square, variance]: [f64; 3]) -> Self {
+        let n = 1.0 / larger(pixels, 1.0);
         let (mean, noise) = (mean * n, variance * n);
-        Self { pixels, mean, contrast: (square * n - mean * mean - noise).max(F64x4::ZERO), noise }
-    }
-
-    /// What the window around each of four pixels says, from column `at` of the block on: sums over the rows but the
-    /// pixels' own, and over all.
-    #[inline(always)]
-    fn window(pixels: F64x4, at: usize, c: usize, others: &Sums, all: &Sums) -> Self {
-        let sum = |others: &Columns, all: &Columns| {
-            let (left, right) = (four(all, at) + four(all, at + 1), four(all, at + 3) + four(all, at + 4));
-            four(others, at + 2) + (left + right)
-        };
-        Self::of(
-            pixels,
-            [
-                sum(&others.mean[c], &all.mean[c]),
-                sum(&others.square[c], &all.square[c]),
-                sum(&others.variance[c], &all.variance[c]),
-            ],
-        )
+        Self { pixels, mean, contrast: larger(square * n - mean * mean - noise, 0.0), noise }
     }
 }
 
@@ -201,19 +173,40 @@ struct Row {
 impl Row {
     const EMPTY: Self = Self { errors: [[[0.0; PADDED]; 2]; 3], classes: [0; PADDED], line: Line::EMPTY };
 
-    /// Sets channel `c` of four pixels from column `at` on.
+    /// Sets channel `c` of `columns` pixels: of the row itself, of sums over the other rows of their windows and over all,
+    /// of how many pixels are in the others, and of what the block says of columns of both parities.
     #[inline(always)]
-    fn set(&mut self, at: usize, c: usize, [m, v]: [F64x4; 2], window: &Others, block: &Others) {
-        let (d, other, left) = denominators([m, v], window, block);
-        let largest = F64x4::splat(LARGEST);
-        // without an error there is nothing to divide
-        let [error, of_other] = [d, other].map(|d| v.if_above(F64x4::ZERO, (v / d).min(largest), F64x4::ZERO));
+    fn set(
+        &mut self,
+        (c, columns): (usize, usize),
+        own: &Seen,
+        [others, all]: [&Sums; 2],
+        pixels: &Columns,
+        block: &[Others; 2],
+    ) {
+        const CENTER: usize = REACH as usize;
         let [to, to_other] = &mut self.errors[c];
-        put(to, at, error);
-        put(to_other, at, of_other);
         let (line, line_left) = self.line.channel_mut(c);
-        put(line, at, d.min(largest));
-        put(line_left, at, left);
+        let (means, variances) = (&own.mean[c], &own.variance[c]);
+        for i in 0..columns.min(PADDED) {
+            // the pixel's own column without it, and those beside
+            let sum = |o: &Columns, a: &Columns| o[i + CENTER] + ((a[i] + a[i + 1]) + (a[i + 3] + a[i + 4]));
+            let window = Others::of(
+                pixels[i],
+                [sum(&others.mean, &all.mean), sum(&others.square, &all.square), sum(&others.variance, &all.variance)],
+            );
+            let block = if i & 1 == 0 { &block[0] } else { &block[1] };
+            let (m, v) = (means[i + CENTER], variances[i + CENTER]);
+            let (d, other, left) = denominators([m, v], &window, block);
+            // without an error there is nothing to divide
+            let error = |d: f64| {
+                let q = v / d;
+                let q = if q < LARGEST { q } else { LARGEST };
+                if v > 0.0 { q as f32 } else { 0.0 }
+            };
+            (to[i], to_other[i]) = (error(d), error(other));
+            (line[i], line_left[i]) = (if d < LARGEST { d } else { LARGEST } as f32, left as f32);
+        }
     }
 
     /// Shows the errors of `columns` pixels.
@@ -248,14 +241,6 @@ impl Row {
     }
 }
 
-/// Puts four values from `at` on.
-#[inline(always)]
-fn put(to: &mut [f32; PADDED], at: usize, x: F64x4) {
-    if let Some(to) = to.get_mut(at..).and_then(|a| a.first_chunk_mut()) {
-        *to = x.to_array().map(|x| x as f32);
-    }
-}
-
 /// Columns or rows `from..to` of a block, within `0..size` of the picture.
 #[derive(Clone, Copy)]
 pub(super) struct Span {
@@ -270,48 +255,51 @@ impl Span {
     }
 
     /// The same with those that windows reach.
-    fn reach(self) -> core::ops::Range<u32> {
+    fn reach(self) -> Range<u32> {
         self.from.saturating_sub(REACH)..self.to.saturating_add(REACH).min(self.size)
     }
 }
 
-/// What the others of a block say, by channel and parity of the row, for four columns from the block's first on.
-type OfBlock = [[Others; 3]; 2];
+/// What the others of a block say: by parity of the row, channel, and parity of the column from the block's first on.
+type OfBlock = [[[Others; 2]; 3]; 2];
 
 /// Sums over the pixels of the block of the other parity in column or row.
 fn of_block([x, y]: [Span; 2], pixel: &impl Fn(u32, u32) -> PixelStats) -> OfBlock {
-    // by parity of the row; lanes are columns, two of each parity
-    let mut sums = [[[F64x4::ZERO; 3]; 3]; 2];
-    let packets = (x.to - x.from).div_ceil(4) as usize;
+    // by parity of the row and channel, of every fourth column: two each of both parities
+    let mut sums = [[[[0.0f64; 4]; 3]; 3]; 2];
+    let mut counts = [[0.0; 2]; 2];
     let mut seen = const { Seen::NOTHING };
+    let columns = (x.to - x.from) as usize;
     for row in y.from..y.to {
-        seen.set(0, (x.from..x.to).map(|column| pixel(column, row)));
-        for (c, [mean, square, variance]) in sums[(row & 1) as usize].iter_mut().enumerate() {
-            let means = seen.mean[c].as_chunks::<4>().0;
-            for (m, v) in means.iter().zip(seen.variance[c].as_chunks::<4>().0).take(packets) {
-                let m = F64x4::new(*m);
-                *mean += m;
-                *square += m * m;
-                *variance += F64x4::new(*v);
+        seen.set(0, x.from..x.to, row, pixel);
+        let parity = (row & 1) as usize;
+        counts[parity][0] += columns.div_ceil(2) as f64;
+        counts[parity][1] += (columns / 2) as f64;
+        let channels = seen.mean.iter().zip(&seen.variance).zip(&mut sums[parity]);
+        for ((means, variances), [mean, square, variance]) in channels {
+            // columns behind the block's are 0
+            for (m, v) in fours(means).iter().zip(fours(variances)).take(columns.div_ceil(4)) {
+                for i in 0..4 {
+                    mean[i] += m[i];
+                    square[i] += m[i] * m[i];
+                    variance[i] += v[i];
+                }
             }
         }
     }
-    // all of the other rows, and of the same the other columns
-    core::array::from_fn(|row| {
-        core::array::from_fn(|c| {
-            let others = |own: F64x4, other: F64x4| {
-                let (own, all) = (own.to_array(), other.to_array().iter().sum::<f64>());
-                F64x4::new(core::array::from_fn(|i| all + own[i & 1 ^ 1] + own[(i & 1 ^ 1) + 2]))
-            };
-            let [own, other] = [sums[row][c], sums[row ^ 1][c]];
-            let count = |span: Span, odd: u32| f64::from((span.from..span.to).filter(|i| i & 1 == odd).count() as u32);
-            let rows = [0, 1].map(|odd| count(y, odd));
-            let columns = [0, 1].map(|odd| count(x, (x.from + odd) & 1));
-            let all = [0, 1].map(|i| rows[row ^ 1] * (columns[0] + columns[1]) + rows[row] * columns[i ^ 1]);
-            let pixels = F64x4::new([all[0], all[1], all[0], all[1]]);
-            Others::of(pixels, core::array::from_fn(|k| others(own[k], other[k])))
-        })
-    })
+    let mut out = OfBlock::default();
+    for (row, out) in out.iter_mut().enumerate() {
+        for (c, out) in out.iter_mut().enumerate() {
+            for (column, out) in out.iter_mut().enumerate() {
+                // all of the other rows, and of the same the other columns
+                let parts = [[row ^ 1, 0], [row ^ 1, 1], [row, column ^ 1]];
+                let total = |of: &dyn Fn([usize; 2]) -> f64| parts.iter().map(|p| of(*p)).sum::<f64>();
+                let sums = [0, 1, 2].map(|k| total(&|[r, i]| sums[r & 1][c][k][i & 1] + sums[r & 1][c][k][i & 1 | 2]));
+                *out = Others::of(total(&|[r, i]| counts[r & 1][i & 1]), sums);
+            }
+        }
+    }
+    out
 }
 
 /// Shows the relative squared errors of the pixels of a block, row by row. `pixel` gives those at a column and row of the
@@ -334,11 +322,10 @@ pub(super) fn relative_errors(
     // the rows of the windows, each where the one before the first was
     let mut seen = const { [Seen::NOTHING; ROWS] };
     let mut known = const { [Row::EMPTY; ROWS] };
-    let (mut others, mut all) = const { (Sums::NOTHING, Sums::NOTHING) };
     let mut next = y.from;
     for row in y.reach().start..y.to.saturating_add(REACH) {
         if row < y.size {
-            seen[row as usize % ROWS].set(first, x.reach().map(|column| pixel(column, row)));
+            seen[row as usize % ROWS].set(first, x.reach(), row, &pixel);
         }
         let middle = row.wrapping_sub(REACH);
         if !y.is_inside(middle) {
@@ -346,20 +333,18 @@ pub(super) fn relative_errors(
         }
         let rows = Span { from: middle, to: middle + 1, size: y.size }.reach();
         let own = &seen[middle as usize % ROWS];
-        let beside = rows.clone().filter(|r| *r != middle).map(|r| &seen[r as usize % ROWS]);
-        Sums::set_both(&mut others, &mut all, beside, own, reached);
         let into = &mut known[middle as usize % ROWS];
-        let height = F64x4::splat(f64::from(rows.len() as u32));
         for (at, classes) in into.classes.iter_mut().zip(own.classes.iter().skip(REACH as usize)) {
             *at = *classes;
         }
-        for at in (0..columns).step_by(4) {
-            let pixels = height * four(&widths, at) - F64x4::splat(1.0);
-            for (c, block) in block[(middle & 1) as usize].iter().enumerate() {
-                let window = Others::window(pixels, at, c, &others, &all);
-                let center = at + REACH as usize;
-                into.set(at, c, [four(&own.mean[c], center), four(&own.variance[c], center)], &window, block);
-            }
+        let pixels = widths.map(|width| width * f64::from(rows.len() as u32) - 1.0);
+        for (c, block) in block[(middle & 1) as usize].iter().enumerate() {
+            let mut others = Sums::NOTHING;
+            let beside = rows.clone().filter(|r| *r != middle);
+            beside.for_each(|r| others.add(&seen[r as usize % ROWS], c, reached));
+            let mut all = others;
+            all.add(own, c, reached);
+            into.set((c, columns), own, [&others, &all], &pixels, block);
         }
         into.line.take_logarithms(columns);
         // rows of which all others in the window are known
@@ -373,38 +358,36 @@ pub(super) fn relative_errors(
     }
 }
 
-/// D of pixels of mean m and variance v, D with the other k, and what part of it the window tells: t of
-/// [`super::contrast`].
+/// D of a pixel of mean m and variance v, D with the other k, and what part of it the window tells: t of
+/// [`super::contrast`]. Without branches: the loop over pixels becomes one over vectors.
 #[inline(always)]
-fn denominators([m, v]: [F64x4; 2], window: &Others, block: &Others) -> (F64x4, F64x4, F64x4) {
-    let (zero, one) = (F64x4::ZERO, F64x4::splat(1.0));
+fn denominators([m, v]: [f64; 2], window: &Others, block: &Others) -> (f64, f64, f64) {
     let (noise, contrast) = (window.noise, window.contrast);
     // a of a + b, 0 where there is none of it
-    let share = |a: F64x4, b: F64x4| a.if_above(zero, a / (a + b), zero);
-    let u = share(block.contrast, noise.max(block.noise) / window.pixels);
+    let share = |a: f64, b: f64| {
+        let share = a / (a + b);
+        if a > 0.0 { share } else { 0.0 }
+    };
+    let u = share(block.contrast, larger(noise, block.noise) / window.pixels);
     let mean = block.mean + u * (window.mean - block.mean);
     let off = (m - mean) * (m - mean);
     // a pixel that has found nothing knows nothing: it is as noisy as the others
-    let own = v.if_above(zero, v, noise);
-    let surer = share(contrast, own.max(noise));
+    let own = if v > 0.0 { v } else { noise };
+    let surer = share(contrast, larger(own, noise));
     let of_window = u * u * noise / window.pixels;
-    let of_block = (one - u) * (one - u) * block.noise / block.pixels;
-    let [least, epsilon, taken_off] = [ENOUGH - 0.5, REL_MSE_EPSILON, TAKEN_OFF].map(F64x4::splat);
+    let of_block = (1.0 - u) * (1.0 - u) * block.noise / block.pixels;
     let with = |k: f64| {
-        let doubt = F64x4::splat(k) * own;
-        let stands_out = off.if_above(doubt, one - doubt / off, zero);
-        let w = surer.max(stands_out);
+        let stands_out = 1.0 - k * own / off;
+        let stands_out = if off > k * own { stands_out } else { 0.0 };
+        let w = larger(surer, stands_out);
         let e = mean + w * (m - mean);
-        let rest = one - w;
-        let variance = taken_off * w * w * v + rest * rest * (of_window + of_block);
-        ((e * e - variance).max(zero) + epsilon, rest * u * u)
+        let variance = TAKEN_OFF * w * w * v + (1.0 - w) * (1.0 - w) * (of_window + of_block);
+        (larger(e * e - variance, 0.0) + REL_MSE_EPSILON, (1.0 - w) * u * u)
     };
     let ((d, left), (other, _)) = (with(1.0), with(DOUBT));
-    // too few others say nothing
-    let (m, v) = (m.to_array(), v.to_array());
-    let alone = F64x4::new(core::array::from_fn(|i| relative_denominator(m[i], v[i])));
-    let enough = |x: F64x4, y: F64x4| window.pixels.min(block.pixels).if_above(least, x, y);
-    (enough(d, alone), enough(other, alone), enough(left, zero))
+    let alone = larger(m * m - TAKEN_OFF * v, 0.0) + REL_MSE_EPSILON;
+    let enough = window.pixels >= ENOUGH && block.pixels >= ENOUGH;
+    (if enough { d } else { alone }, if enough { other } else { alone }, if enough { left } else { 0.0 })
 }
 
 #[cfg(test)]

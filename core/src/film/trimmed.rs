@@ -1,12 +1,15 @@
 //! Sums of values without the k largest, in one visit of all: the largest so far wait in a binary heap with the smallest of
 //! them on top, and what a larger one displaces is summed like the rest.
 //!
-//! A value may bring others with it, which are summed where it is: an entry is `W` numbers, the first of which decides.
+//! A value may bring others with it, which are summed where it is: an entry is [`WIDTH`] numbers, the first of which decides.
 
 use bytemuck::{Pod, Zeroable};
 
-/// Most numbers of an entry.
+/// Numbers of an entry.
 pub(super) const WIDTH: usize = 7;
+
+/// An entry as the heap has it: bits of floats.
+type Entry = [u32; WIDTH];
 
 /// Sums over the entries that are shown, without those of the k largest values. Values are not negative; which of equal
 /// ones is left out is decided by their order.
@@ -31,9 +34,9 @@ pub(crate) struct TrimmedSums {
 }
 
 impl TrimmedSums {
-    /// Words of the heap for the `k` largest entries of `W` numbers.
-    pub(crate) fn heap_len<const W: usize>(k: u64) -> usize {
-        usize::try_from(k).unwrap_or(usize::MAX).saturating_mul(W)
+    /// Words of the heap for the `k` largest entries.
+    pub(crate) fn heap_len(k: u64) -> usize {
+        usize::try_from(k).unwrap_or(usize::MAX).saturating_mul(WIDTH)
     }
 
     /// Sums of nothing; the heap that the other methods are given has room for `k` entries.
@@ -48,7 +51,7 @@ impl TrimmedSums {
 
     /// Takes an entry.
     #[inline(always)]
-    pub(crate) fn show<const W: usize>(&mut self, entry: [f32; W], heap: &mut [u32]) {
+    pub(crate) fn show(&mut self, entry: [f32; WIDTH], heap: &mut [u32]) {
         let entry = entry.map(f32::to_bits);
         if self.held < self.room {
             self.insert(entry, heap);
@@ -60,21 +63,21 @@ impl TrimmedSums {
     }
 
     /// Ends: of the values in the heap the `k` largest are left out, all if there are not more.
-    pub(crate) fn end<const W: usize>(&mut self, k: u64, heap: &mut [u32]) {
+    pub(crate) fn end(&mut self, k: u64, heap: &mut [u32]) {
         while self.held > k {
             self.held -= 1;
-            let entries = heap.as_chunks::<W>().0;
+            let entries = heap.as_chunks::<WIDTH>().0;
             let Some(last) = entries.get(self.held as usize).copied() else { break };
             self.replace_least(last, heap);
         }
-        let left_out = heap.as_chunks::<W>().0.iter().take(self.held as usize);
+        let left_out = heap.as_chunks::<WIDTH>().0.iter().take(self.held as usize);
         self.rest = left_out.clone().map(|e| f64::from(f32::from_bits(key(e)))).sum();
         self.limit = left_out.map(|e| f32::from_bits(key(e))).next().unwrap_or(f32::INFINITY);
     }
 
     /// Adds an entry to the sums.
-    #[inline(always)]
-    fn add<const W: usize>(&mut self, entry: [u32; W]) {
+    #[inline(never)]
+    fn add(&mut self, entry: Entry) {
         let value = f64::from(f32::from_bits(key(&entry)));
         self.count += 1;
         self.sum_sqr += value * value;
@@ -83,8 +86,8 @@ impl TrimmedSums {
 
     /// Puts an entry into the heap, which has room.
     #[inline(never)]
-    fn insert<const W: usize>(&mut self, entry: [u32; W], heap: &mut [u32]) {
-        let entries = heap.as_chunks_mut::<W>().0;
+    fn insert(&mut self, entry: Entry, heap: &mut [u32]) {
+        let entries = heap.as_chunks_mut::<WIDTH>().0;
         let mut at = self.held as usize;
         self.held += 1;
         while at > 0 {
@@ -100,8 +103,8 @@ impl TrimmedSums {
 
     /// Adds the least entry of the heap to the sums and puts another in its place, which is not less.
     #[inline(never)]
-    fn replace_least<const W: usize>(&mut self, entry: [u32; W], heap: &mut [u32]) {
-        let entries = heap.as_chunks_mut::<W>().0;
+    fn replace_least(&mut self, entry: Entry, heap: &mut [u32]) {
+        let entries = heap.as_chunks_mut::<WIDTH>().0;
         if let Some(least) = entries.first() {
             self.add(*least);
         }
@@ -132,11 +135,11 @@ const MAGNITUDE: u32 = !(1 << 31);
 
 /// Orders entries like their values: bits of floats that are not negative compare like these.
 #[inline(always)]
-fn key<const W: usize>(entry: &[u32; W]) -> u32 {
-    entry.first().map_or(0, |x| x & MAGNITUDE)
+fn key(entry: &Entry) -> u32 {
+    entry[0] & MAGNITUDE
 }
 
-fn put<const W: usize>(entries: &mut [[u32; W]], at: usize, entry: [u32; W]) {
+fn put(entries: &mut [Entry], at: usize, entry: Entry) {
     if let Some(e) = entries.get_mut(at) {
         *e = entry;
     }
@@ -150,12 +153,12 @@ mod tests {
     use std::vec::Vec;
 
     fn of(k: u64, values: &[f32]) -> TrimmedSums {
-        let mut heap = vec![7; TrimmedSums::heap_len::<2>(k)];
+        let mut heap = vec![7; TrimmedSums::heap_len(k)];
         let mut s = TrimmedSums::new(k);
         for (i, x) in values.iter().enumerate() {
-            s.show([*x, i as f32], &mut heap);
+            s.show([*x, i as f32, 0.0, 0.0, 0.0, 0.0, 0.0], &mut heap);
         }
-        s.end::<2>(k, &mut heap);
+        s.end(k, &mut heap);
         s
     }
 
@@ -207,9 +210,9 @@ mod tests {
     /// that gives away its largest.
     #[test]
     fn fewer_are_left_out_of_fewer() {
-        let (mut s, mut heap) = (TrimmedSums::new(5), [0; 5]);
-        [4.0, 1.0, 5.0, 2.0, 6.0, 3.0].iter().for_each(|x| s.show([*x], &mut heap));
-        s.end::<1>(2, &mut heap);
+        let (mut s, mut heap) = (TrimmedSums::new(5), [0; 35]);
+        [4.0, 1.0, 5.0, 2.0, 6.0, 3.0].iter().for_each(|x| s.show([*x; 7], &mut heap));
+        s.end(2, &mut heap);
         assert_eq!((s.count, s.sums[0], s.rest, s.limit), (4, 10.0, 11.0, 5.0));
     }
 }

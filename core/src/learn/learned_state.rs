@@ -363,20 +363,20 @@ impl<'m> LearnedState<'m> {
 
     /// Words that the sums of [`Self::begin_errors`] need.
     pub(crate) fn largest_len(pixels: usize) -> usize {
-        TrimmedSums::heap_len::<1>(outliers(pixels as u64))
+        TrimmedSums::heap_len(outliers(pixels as u64))
     }
 
     /// Shows the error of an iteration's pixel.
     pub(crate) fn show_error(&self, film: usize, sums: &PixelSums, s: &mut TrimmedSums, largest: &mut [u32]) {
         if sums.samples > 0 {
             let error = error_of(film as u32, sums, self.learning.norm, &self.pixels, &self.allocation);
-            s.show([error], largest);
+            s.show([error, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], largest);
         }
     }
 
     /// Takes variance and cost of the iteration from the sums that have seen all of its pixels.
     pub(crate) fn picture_measured(&mut self, s: &mut TrimmedSums, largest: &mut [u32], counters: &Counters) {
-        s.end::<1>(outliers(s.shown()), largest);
+        s.end(outliers(s.shown()), largest);
         self.picture.measured(&self.learning, s, counters);
     }
 
