@@ -209,7 +209,11 @@ fn memory_is_as_stated() {
     let expected = planes * bytes("planes of AOVs")[0] + bytes("rays, with")[0];
     assert_eq!(session(&aovs(&base)) - session(&none(&base)), 64 * 64 * expected);
     let twice = |s: &Settings| Settings { size: [128, 64], ..none(s) };
-    assert_eq!(session(&twice(&base)) - session(&none(&base)), 64 * 64 * bytes("sums of pixels")[0]);
+    let largest = bytes("pixels with most error");
+    let expected = 64 * 64 * bytes("sums of pixels")[0] + largest[0] * 64 * 64 / largest[1];
+    let found = session(&twice(&base)) - session(&none(&base));
+    // blocks are aligned
+    assert!(found.abs_diff(expected) < 64, "{found} bytes, not {expected}");
     let size = CacheSize::within(base.learning.cache_bytes, 1).unwrap();
     let bins = 16 * size.leaves() as usize;
     assert!(Training::layout(size).unwrap().size - bins * bytes("training")[0] < 128);
