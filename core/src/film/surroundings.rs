@@ -69,14 +69,16 @@ impl Seen {
     /// Sets `columns` of row `row` of the picture, from place `at` on.
     #[inline(never)]
     fn set(&mut self, at: usize, columns: Range<u32>, row: u32, pixel: &impl Fn(u32, u32) -> PixelStats) {
-        for (at, column) in (at..COLUMNS).zip(columns) {
+        for (i, column) in columns.enumerate() {
+            let at = at + i;
+            let Some(class_at) = self.classes.get_mut(at) else { return };
             let p = pixel(column, row);
             let (mean, variance) = (p.mean(), p.variance_of_mean());
             for c in 0..3 {
                 self.mean[c][at] = mean[c];
                 self.variance[c][at] = variance[c];
             }
-            self.classes[at] = class(&p) as u8;
+            *class_at = class(&p) as u8;
         }
     }
 }

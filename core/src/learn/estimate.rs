@@ -225,8 +225,7 @@ impl NoisySource for NoisyFilm<'_, '_> {
             },
             None => F32x8::splat(unknown),
         };
-        let [albedo, normal] = &self.features;
-        let three = |planes: &[Option<&[f32]>; 3], unknown| [0, 1, 2].map(|c: usize| load(planes[c], unknown));
-        (three(albedo, 1.0), three(normal, 0.0))
+        let [albedo, normal] = self.features;
+        (albedo.map(|plane| load(plane, 1.0)), normal.map(|plane| load(plane, 0.0)))
     }
 }
