@@ -106,7 +106,7 @@ impl Sums {
     const NOTHING: Self = Self { mean: [0.0; COLUMNS], square: [0.0; COLUMNS], variance: [0.0; COLUMNS] };
 
     /// Adds `columns` columns of channel `c` of a row.
-    #[inline(always)]
+    #[inline(never)]
     fn add(&mut self, row: &Seen, c: usize, columns: usize) {
         let row = fours(&row.mean[c]).iter().zip(fours(&row.variance[c]));
         let Self { mean, square, variance } = self;
@@ -269,7 +269,7 @@ type OfBlock = [[[Others; 2]; 3]; 2];
 fn of_block([x, y]: [Span; 2], pixel: &impl Fn(u32, u32) -> PixelStats) -> OfBlock {
     // by parity of the row and channel, of every fourth column: two each of both parities
     let mut sums = [[[[0.0f64; 4]; 3]; 3]; 2];
-    let mut counts = [[0.0; 2]; 2];
+    let mut counts = [[0.0f64; 4]; 2];
     let mut seen = const { Seen::NOTHING };
     let columns = (x.to - x.from) as usize;
     for row in y.from..y.to {
@@ -290,16 +290,16 @@ fn of_block([x, y]: [Span; 2], pixel: &impl Fn(u32, u32) -> PixelStats) -> OfBlo
         }
     }
     let mut out = OfBlock::default();
-    for (row, out) in out.iter_mut().enumerate() {
-        for (c, out) in out.iter_mut().enumerate() {
-            for (column, out) in out.iter_mut().enumerate() {
-                // all of the other rows, and of the same the other columns
-                let parts = [[row ^ 1, 0], [row ^ 1, 1], [row, column ^ 1]];
-                let total = |of: &dyn Fn([usize; 2]) -> f64| parts.iter().map(|p| of(*p)).sum::<f64>();
-                let sums = [0, 1, 2].map(|k| total(&|[r, i]| sums[r & 1][c][k][i & 1] + sums[r & 1][c][k][i & 1 | 2]));
-                *out = Others::of(total(&|[r, i]| counts[r & 1][i & 1]), sums);
-            }
-        }
+    for (i, out) in out.as_flattened_mut().as_flattened_mut().iter_mut().enumerate() {
+        let (later_row, c, later_column) = (i >= 6, i / 2 % 3, i & 1 == 1);
+        let others = |own: &[f64; 4], other: &[f64; 4]| {
+            let same_row = if later_column { own[0] + own[2] } else { own[1] + own[3] };
+            other.iter().sum::<f64>() + same_row
+        };
+        let [own, other] = if later_row { [1, 0] } else { [0, 1] };
+        let ([mean, square, variance], [m, s, v]) = (&sums[own][c], &sums[other][c]);
+        let pixels = others(&counts[own], &counts[other]);
+        *out = Others::of(pixels, [others(mean, m), others(square, s), others(variance, v)]);
     }
     out
 }

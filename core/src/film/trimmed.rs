@@ -50,7 +50,7 @@ impl TrimmedSums {
     }
 
     /// Takes an entry.
-    #[inline(always)]
+    #[inline(never)]
     pub(crate) fn show(&mut self, entry: [f32; WIDTH], heap: &mut [u32]) {
         let entry = entry.map(f32::to_bits);
         if self.held < self.room {

@@ -216,7 +216,8 @@ impl NoisySource for NoisyFilm<'_, '_> {
         (color.map(F32x8::new), variance.map(F32x8::new))
     }
 
-    #[inline(always)]
+    // once: it is called in several passes, which small modules cannot afford
+    #[inline(never)]
     fn features(&self, at: usize) -> ([F32x8; 3], [F32x8; 3]) {
         let load = |plane: Option<&[f32]>, unknown: f32| match plane {
             Some(plane) => match plane.get(at..).and_then(|p| p.first_chunk()) {
