@@ -105,10 +105,10 @@ struct Sums {
 impl Sums {
     const NOTHING: Self = Self { mean: [0.0; COLUMNS], square: [0.0; COLUMNS], variance: [0.0; COLUMNS] };
 
-    /// Adds `columns` columns of channel `c` of a row.
+    /// Adds `columns` columns of a row.
     #[inline(never)]
-    fn add(&mut self, row: &Seen, c: usize, columns: usize) {
-        let row = fours(&row.mean[c]).iter().zip(fours(&row.variance[c]));
+    fn add(&mut self, means: &Columns, variances: &Columns, columns: usize) {
+        let row = fours(means).iter().zip(fours(variances));
         let Self { mean, square, variance } = self;
         let sums = fours_mut(mean).iter_mut().zip(fours_mut(square)).zip(fours_mut(variance));
         for ((m, v), ((mean, square), variance)) in row.zip(sums).take(columns.div_ceil(4)) {
@@ -343,9 +343,12 @@ pub(super) fn relative_errors(
         for (c, block) in block[(middle & 1) as usize].iter().enumerate() {
             let mut others = Sums::NOTHING;
             let beside = rows.clone().filter(|r| *r != middle);
-            beside.for_each(|r| others.add(&seen[r as usize % ROWS], c, reached));
+            beside.for_each(|r| {
+                let row = &seen[r as usize % ROWS];
+                others.add(&row.mean[c], &row.variance[c], reached);
+            });
             let mut all = others;
-            all.add(own, c, reached);
+            all.add(&own.mean[c], &own.variance[c], reached);
             into.set((c, columns), own, [&others, &all], &pixels, block);
         }
         into.line.take_logarithms(columns);
