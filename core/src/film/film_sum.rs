@@ -54,7 +54,7 @@ impl<'m> FilmSum<'m> {
         let Self { film, largest } = self;
         let mut errors = film.begin_errors();
         film.show_errors(0, usize::MAX, &mut errors, largest);
-        film.estimate_error(&mut errors, largest);
+        film.estimate_error(&mut errors, largest, u64::MAX);
         film
     }
 }

@@ -10,10 +10,10 @@
 //! | `error` | relMSE of a pixel, [`ErrorEstimate`] |
 //! | `film_sum` | films of several renders, added |
 //! | `independence` | correlation of an iteration's samples, measured |
-//! | `selection` | sums without the largest values |
 //! | `sqrt` | square root in f64 |
 //! | `surroundings` | what relMSE divides by |
 //! | `contrast` | how much more an error may be at an edge |
+//! | `trimmed` | sums without the largest values |
 
 mod aov;
 mod contrast;
@@ -314,9 +314,18 @@ impl<'m> Film<'m> {
         pixels / 10_000
     }
 
-    /// Estimates the error from the sums that have seen all pixels, without the outliers.
-    pub(crate) fn estimate_error(&mut self, t: &mut TrimmedSums, largest: &mut [u32]) {
-        t.end(Self::outliers(self.pixels.len() as u64), largest);
+    /// Estimates the error from the sums that have seen all pixels, without the outliers, in pieces as of
+    /// [`TrimmedSums::end`]. Work, and whether it is estimated.
+    pub(crate) fn estimate_error(&mut self, t: &mut TrimmedSums, largest: &mut [u32], limit: u64) -> (u64, bool) {
+        let (work, done) = t.end(Self::outliers(self.pixels.len() as u64), limit, largest);
+        if done {
+            self.set_error(t);
+        }
+        (work, done)
+    }
+
+    /// Sets the estimated error from sums without the outliers.
+    fn set_error(&mut self, t: &TrimmedSums) {
         let m = t.count.max(1) as f64;
         let [mean, other, contrast, unsure, of_classes @ ..] = t.sums.map(|x| x / m);
         let noise =

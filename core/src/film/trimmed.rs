@@ -30,8 +30,12 @@ pub(crate) struct TrimmedSums {
     room: u64,
     /// Smallest value that is left out, from [`Self::end`] on; infinite if there is none.
     pub limit: f32,
-    reserved: u32,
+    /// Number of entries of the heap that are in `rest`.
+    summed: u32,
 }
+
+/// Entries of the heap that are summed in the time in which one is taken out.
+const SUMMED_PER_TAKEN: u64 = 32;
 
 impl TrimmedSums {
     /// Words of the heap for the `k` largest entries.
@@ -62,17 +66,28 @@ impl TrimmedSums {
         }
     }
 
-    /// Ends: of the values in the heap the `k` largest are left out, all if there are not more.
-    pub(crate) fn end(&mut self, k: u64, heap: &mut [u32]) {
-        while self.held > k {
+    /// Ends, in pieces with the same `k`, not more than that of [`Self::new`]: of the values in the heap the `k` largest are
+    /// left out, all if there are not more. A piece takes `limit` entries out of the heap at most, or sums as many as take
+    /// that time. How many that was, and whether the sums are complete.
+    pub(crate) fn end(&mut self, k: u64, limit: u64, heap: &mut [u32]) -> (u64, bool) {
+        let taken = self.held.saturating_sub(k).min(limit);
+        for _ in 0..taken {
             self.held -= 1;
-            let entries = heap.as_chunks::<WIDTH>().0;
-            let Some(last) = entries.get(self.held as usize).copied() else { break };
-            self.replace_least(last, heap);
+            if let Some(last) = heap.as_chunks::<WIDTH>().0.get(self.held as usize).copied() {
+                self.replace_least(last, heap);
+            }
         }
+        let room = (limit - taken).saturating_mul(SUMMED_PER_TAKEN).min(u32::MAX.into());
         let left_out = heap.as_chunks::<WIDTH>().0.iter().take(self.held as usize);
-        self.rest = left_out.clone().map(|e| f64::from(f32::from_bits(key(e)))).sum();
-        self.limit = left_out.map(|e| f32::from_bits(key(e))).next().unwrap_or(f32::INFINITY);
+        self.limit = left_out.clone().next().map_or(f32::INFINITY, |e| f32::from_bits(key(e)));
+        let mut n = 0;
+        for e in left_out.skip(self.summed as usize).take(room as usize) {
+            self.rest += f64::from(f32::from_bits(key(e)));
+            n += 1;
+        }
+        self.summed += n;
+        let n = u64::from(n);
+        (taken + n.div_ceil(SUMMED_PER_TAKEN), n < room)
     }
 
     /// Adds an entry to the sums.
@@ -158,7 +173,7 @@ mod tests {
         for (i, x) in values.iter().enumerate() {
             s.show([*x, i as f32, 0.0, 0.0, 0.0, 0.0, 0.0], &mut heap);
         }
-        s.end(k, &mut heap);
+        assert!(s.end(k, u64::MAX, &mut heap).1);
         s
     }
 
@@ -212,7 +227,32 @@ mod tests {
     fn fewer_are_left_out_of_fewer() {
         let (mut s, mut heap) = (TrimmedSums::new(5), [0; 35]);
         [4.0, 1.0, 5.0, 2.0, 6.0, 3.0].iter().for_each(|x| s.show([*x; 7], &mut heap));
-        s.end(2, &mut heap);
+        assert!(s.end(2, u64::MAX, &mut heap).1);
         assert_eq!((s.count, s.sums[0], s.rest, s.limit), (4, 10.0, 11.0, 5.0));
+    }
+
+    /// Ends in pieces do no more than they may and give the bits of one piece; so do sums that stop half way. Killed by:
+    /// taking out or summing all at once, work that is not counted, a piece that begins the sum again.
+    #[test]
+    fn ends_in_pieces_are_bounded_and_give_the_same_bits() {
+        let values: Vec<f32> = (0..1000).map(|i| (i * 7919 % 1009) as f32 * 0.1).collect();
+        for (room, shown, k) in [(1000, 700, 1), (600, 1000, 600), (600, 1000, 40), (9, 5, 9), (0, 5, 0)] {
+            let mut heap = vec![7; TrimmedSums::heap_len(room)];
+            let mut s = TrimmedSums::new(room);
+            values.iter().take(shown).for_each(|x| s.show([*x; 7], &mut heap));
+            let (mut whole, mut same) = (s, heap.clone());
+            let (all, done) = whole.end(k, u64::MAX, &mut same);
+            assert!(done && all >= s.held.saturating_sub(k), "{all} of {room}");
+            for limit in [1, 3, 50] {
+                let (mut s, mut heap, mut sum, mut done) = (s, heap.clone(), 0, false);
+                while !done {
+                    let (work, last) = s.end(k, limit, &mut heap);
+                    assert!(work <= limit && (last || work > 0), "{work} of {limit}");
+                    (sum, done) = (sum + work, last);
+                }
+                assert_eq!(s, whole);
+                assert!(sum >= all && sum <= 2 * all, "{sum} in pieces, {all} in one");
+            }
+        }
     }
 }

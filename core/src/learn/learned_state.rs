@@ -374,10 +374,21 @@ impl<'m> LearnedState<'m> {
         }
     }
 
-    /// Takes variance and cost of the iteration from the sums that have seen all of its pixels.
-    pub(crate) fn picture_measured(&mut self, s: &mut TrimmedSums, largest: &mut [u32], counters: &Counters) {
-        s.end(outliers(s.shown()), largest);
-        self.picture.measured(&self.learning, s, counters);
+    /// Takes variance and cost of the iteration from the sums that have seen all of its pixels, in pieces as of
+    /// [`TrimmedSums::end`]: of an iteration that was stopped early few pixels are left out, and nearly all that wait in
+    /// the heap are taken out. Work, and whether it is done.
+    pub(crate) fn picture_measured(
+        &mut self,
+        s: &mut TrimmedSums,
+        largest: &mut [u32],
+        counters: &Counters,
+        limit: u64,
+    ) -> (u64, bool) {
+        let (work, done) = s.end(outliers(s.shown()), limit, largest);
+        if done {
+            self.picture.measured(&self.learning, s, counters);
+        }
+        (work, done)
     }
 
     /// Weight of each sample of a pixel: less where adaptive sampling took more, so that an iteration has the same

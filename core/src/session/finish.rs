@@ -51,6 +51,9 @@ const REPLAYED_PER_RAY: u64 = 4;
 const RAYS_PER_DENSITY: u64 = 24;
 /// Rays in the time of which a pixel's contribution to the error is computed, from the window around it.
 const RAYS_PER_ESTIMATED: u64 = 4;
+/// Rays in the time of which statistics are computed from complete sums; an entry is taken out of the heap of the largest
+/// in that of one ray.
+const RAYS_PER_ESTIMATE: u64 = 8;
 
 /// Shards as callers give them.
 pub(super) trait Shards<'a, 'b: 'a>: IntoIterator<Item = &'a Shard<'b>> + Clone {}
@@ -293,10 +296,11 @@ impl SessionState<'_> {
             }
             return 1 + n / MEASURED_PER_RAY;
         }
-        (*shard, *cursor) = (0, ShardCursor::default());
-        learned.picture_measured(errors, largest, counters);
-        self.next_stage();
-        8
+        let (work, done) = learned.picture_measured(errors, largest, counters, rays);
+        if done {
+            self.next_stage();
+        }
+        work + RAYS_PER_ESTIMATE
     }
 
     /// Merges pixels into the film.
@@ -360,14 +364,16 @@ impl SessionState<'_> {
     /// Estimates the error of the film.
     fn estimate_error(&mut self, rays: u64) -> u64 {
         let Finishing { sums, at, .. } = &mut self.finishing;
-        let limit = (rays / RAYS_PER_ESTIMATED).clamp(1, 1 << 30) as usize;
-        let [blocks, n] = self.film.show_errors(*at, limit, sums, self.largest);
-        *at += blocks;
         if *at < self.film.blocks() {
+            let limit = (rays / RAYS_PER_ESTIMATED).clamp(1, 1 << 30) as usize;
+            let [blocks, n] = self.film.show_errors(*at, limit, sums, self.largest);
+            *at += blocks;
             return 1 + n * RAYS_PER_ESTIMATED;
         }
-        self.film.estimate_error(sums, self.largest);
-        self.next_stage();
-        8 + n * RAYS_PER_ESTIMATED
+        let (work, done) = self.film.estimate_error(sums, self.largest, rays);
+        if done {
+            self.next_stage();
+        }
+        work + RAYS_PER_ESTIMATE
     }
 }
