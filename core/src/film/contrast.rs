@@ -37,6 +37,12 @@ pub(super) struct Line {
     left: [[f32; PADDED]; 3],
 }
 
+/// Eight values from `at` of a row on, 0 if it has not as many.
+#[inline(always)]
+pub(super) fn eight(row: &[f32], at: usize) -> F32x8 {
+    row.get(at..).and_then(|row| row.first_chunk()).map_or(F32x8::ZERO, |values| F32x8::new(*values))
+}
+
 impl Line {
     pub(super) const EMPTY: Self = Self { denominator: [[0.0; PADDED]; 3], left: [[0.0; PADDED]; 3] };
 
@@ -74,8 +80,6 @@ impl Line {
             rows += 1.0;
         }
         let mut root = [1.0; PADDED];
-        let at =
-            |a: &[f32], at: usize| a.get(at..).and_then(|a| a.first_chunk()).map_or(F32x8::ZERO, |a| F32x8::new(*a));
         for (i, root) in root.as_chunks_mut::<8>().0.iter_mut().enumerate().take(columns.div_ceil(8)) {
             let from = 8 * i;
             let others = F32x8::from_fn(|lane| {
@@ -84,11 +88,11 @@ impl Line {
                 (rows * width as f32 - 1.0).max(1.0)
             });
             // logarithms are within 70: taking the own one off loses nothing that matters
-            let all = (at(&sums, from) + at(&sums, from + 1))
-                + (at(&sums, from + 2) + at(&sums, from + 3))
-                + at(&sums, from + 4);
-            let own = at(&self.denominator[c % 3], from);
-            let rise = at(&self.left[c % 3], from) * (own - (all - own) / others);
+            let all = (eight(&sums, from) + eight(&sums, from + 1))
+                + (eight(&sums, from + 2) + eight(&sums, from + 3))
+                + eight(&sums, from + 4);
+            let own = eight(&self.denominator[c % 3], from);
+            let rise = eight(&self.left[c % 3], from) * (own - (all - own) / others);
             *root = (rise.clamp(-MOST, MOST) * 0.5).exp().to_array();
         }
         root

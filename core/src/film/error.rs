@@ -71,9 +71,16 @@ pub const REL_MSE_EPSILON: f64 = 1e-2;
 /// the whole sum.
 pub(super) const TAKEN_OFF: f64 = 0.9;
 
+/// The larger number; unlike that of `f64` a single comparison.
+#[inline(always)]
+pub(super) fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
 /// Denominator of relMSE, of a mean and its variance.
+#[inline(always)]
 pub(super) fn relative_denominator(mean: f64, variance: f64) -> f64 {
-    (mean * mean - TAKEN_OFF * variance).max(0.0) + REL_MSE_EPSILON
+    larger(mean * mean - TAKEN_OFF * variance, 0.0) + REL_MSE_EPSILON
 }
 
 #[cfg(test)]

@@ -30,8 +30,8 @@
 //! nothing where it is small, and [`UNSURE_SHARE`] of the sum counts. Both numbers were found with the benchmark
 //! `intervals`.
 
-use super::contrast::{LARGEST, LONGEST, Line, PADDED, REACH};
-use super::error::{REL_MSE_EPSILON, TAKEN_OFF};
+use super::contrast::{LARGEST, LONGEST, Line, PADDED, REACH, eight};
+use super::error::{REL_MSE_EPSILON, TAKEN_OFF, larger, relative_denominator};
 use super::independence::class;
 use super::pixel::PixelStats;
 use core::ops::Range;
@@ -92,6 +92,16 @@ fn fours_mut(columns: &mut Columns) -> &mut [[f64; 4]] {
     columns.as_chunks_mut().0
 }
 
+/// Adds means and variances of four columns to the sums of means, squared means and variances.
+#[inline(always)]
+fn add_four(means: &[f64; 4], variances: &[f64; 4], [mean, square, variance]: [&mut [f64; 4]; 3]) {
+    for i in 0..4 {
+        mean[i] += means[i];
+        square[i] += means[i] * means[i];
+        variance[i] += variances[i];
+    }
+}
+
 /// Sums over the pixels of some rows in a channel, by column.
 #[derive(Clone, Copy)]
 struct Sums {
@@ -112,11 +122,7 @@ impl Sums {
         let Self { mean, square, variance } = self;
         let sums = fours_mut(mean).iter_mut().zip(fours_mut(square)).zip(fours_mut(variance));
         for ((m, v), ((mean, square), variance)) in row.zip(sums).take(columns.div_ceil(4)) {
-            for i in 0..4 {
-                mean[i] += m[i];
-                square[i] += m[i] * m[i];
-                variance[i] += v[i];
-            }
+            add_four(m, v, [mean, square, variance]);
         }
     }
 }
@@ -130,12 +136,6 @@ struct Others {
     contrast: f64,
     /// Mean of their variances.
     noise: f64,
-}
-
-/// The larger number; unlike that of `f64` a single comparison.
-#[inline(always)]
-fn larger(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
 }
 
 impl Others {
@@ -218,15 +218,12 @@ impl Row {
         window: impl Iterator<Item = &'a Line> + Clone,
         mut show: impl FnMut(PixelError),
     ) {
-        let at = |a: &[f32; PADDED], at: usize| {
-            a.get(at..).and_then(|a| a.first_chunk()).map_or(F32x8::ZERO, |a| F32x8::new(*a))
-        };
         let rises: [[f32; PADDED]; 3] = core::array::from_fn(|c| self.line.root_of_rise(c, columns, window.clone()));
         let third = F32x8::splat(1.0 / 3.0);
         for from in (0..columns).step_by(8) {
             let mut sums = [F32x8::ZERO; 4];
             for ([errors, others], rise) in self.errors.iter().zip(&rises) {
-                let (q, other, rise) = (at(errors, from), at(others, from), at(rise, from));
+                let (q, other, rise) = (eight(errors, from), eight(others, from), eight(rise, from));
                 let error = q * rise;
                 let unsure = error * (error / (error + UNSURE));
                 for (sum, x) in sums.iter_mut().zip([error, other * rise, (error * rise - q).abs(), unsure]) {
@@ -281,11 +278,7 @@ fn of_block([x, y]: [Span; 2], pixel: &impl Fn(u32, u32) -> PixelStats) -> OfBlo
         for ((means, variances), [mean, square, variance]) in channels {
             // columns behind the block's are 0
             for (m, v) in fours(means).iter().zip(fours(variances)).take(columns.div_ceil(4)) {
-                for i in 0..4 {
-                    mean[i] += m[i];
-                    square[i] += m[i] * m[i];
-                    variance[i] += v[i];
-                }
+                add_four(m, v, [mean, square, variance]);
             }
         }
     }
@@ -390,7 +383,7 @@ fn denominators([m, v]: [f64; 2], window: &Others, block: &Others) -> (f64, f64,
         (larger(e * e - variance, 0.0) + REL_MSE_EPSILON, (1.0 - w) * u * u)
     };
     let ((d, left), (other, _)) = (with(1.0), with(DOUBT));
-    let alone = larger(m * m - TAKEN_OFF * v, 0.0) + REL_MSE_EPSILON;
+    let alone = relative_denominator(m, v);
     let enough = window.pixels >= ENOUGH && block.pixels >= ENOUGH;
     (if enough { d } else { alone }, if enough { other } else { alone }, if enough { left } else { 0.0 })
 }
