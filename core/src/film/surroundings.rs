@@ -502,6 +502,83 @@ mod tests {
         }
     }
 
+    /// Number of values, their mean, the variance among them beyond their noise, and the mean of their variances.
+    fn of_others(values: impl Iterator<Item = [f64; 2]>) -> [f64; 4] {
+        let [n, mean, square, noise] =
+            values.fold([0.0; 4], |s, [m, v]| [s[0] + 1.0, s[1] + m, s[2] + m * m, s[3] + v]);
+        let [mean, square, noise] = [mean, square, noise].map(|x| x / n);
+        [n, mean, (square - mean * mean - noise).max(0.0), noise]
+    }
+
+    /// Every pixel of blocks of odd and even sides, at each edge of the picture and at none, against the formulas at the
+    /// head of this file, of one pixel at a time. Killed by: columns that are placed as in the first block, windows of 25
+    /// pixels at the picture's edge, contrast with rows of the block before, channels or classes of other pixels.
+    #[test]
+    fn blocks_anywhere_follow_the_formulas() {
+        let mut random = random(9);
+        let size = [51, 50];
+        let pixels: Vec<PixelStats> = (0..size[0] * size[1])
+            .map(|i| {
+                let bright = if i % 51 / 7 % 2 == i / 51 / 9 % 2 { 10.0 } else { 0.2 };
+                let mut one =
+                    || pixel(16, bright * (0.5 + random()), bright * bright * random() * [0.01, 2.0][i as usize % 2]);
+                let channels = [one(), one(), one()];
+                let of = |value: fn(&PixelStats) -> [f64; 3]| [0, 1, 2].map(|c| value(&channels[c])[c]);
+                PixelStats { sum: of(|p| p.sum), spread: of(|p| p.spread), ..channels[0] }
+            })
+            .collect();
+        let at = |x: u32, y: u32| pixels[(y * size[0] + x) as usize];
+        let edges = [[0, 17, 34, 51], [0, 16, 33, 50]];
+        for (column, row) in (0..9).map(|i| (i % 3, i / 3)) {
+            let span = |k: usize, i: usize| Span { from: edges[k][i], to: edges[k][i + 1], size: size[k] };
+            let [x, y] = [span(0, column), span(1, row)];
+            let mut found = Vec::new();
+            relative_errors([x, y], at, |e| found.push(e));
+            let inside: Vec<_> = (y.from..y.to).flat_map(|j| (x.from..x.to).map(move |i| (i, j))).collect();
+            // D, D with the other k, and t
+            let denominators = |c: usize, (i, j): (u32, u32)| {
+                let of = |(i, j): (u32, u32)| [at(i, j).mean()[c], at(i, j).variance_of_mean()[c]];
+                let near = |a: u32, n: u32| a.saturating_sub(2)..(a + 3).min(n);
+                let window = near(j, size[1]).flat_map(|j| near(i, size[0]).map(move |i| (i, j)));
+                let window = of_others(window.filter(|p| *p != (i, j)).map(of));
+                let others = inside.iter().filter(|p| (p.0 + i) % 2 == 1 || (p.1 + j) % 2 == 1);
+                let block = of_others(others.map(|p| of(*p)));
+                let share = |a: f64, b: f64| if a > 0.0 { a / (a + b) } else { 0.0 };
+                let u = share(block[2], window[3].max(block[3]) / window[0]);
+                let mu = block[1] + u * (window[1] - block[1]);
+                let [m, v] = of((i, j));
+                let with = |k: f64| {
+                    let w = share(window[2], v.max(window[3])).max(1.0 - k * v / (m - mu).powi(2));
+                    let of_mu = u * u * window[3] / window[0] + (1.0 - u).powi(2) * block[3] / block[0];
+                    let variance = 0.9 * w * w * v + (1.0 - w).powi(2) * of_mu;
+                    (((mu + w * (m - mu)).powi(2) - variance).max(0.0) + 0.01, (1.0 - w) * u * u)
+                };
+                [with(1.0).0, with(4.0).0, with(1.0).1]
+            };
+            let known = [0, 1, 2].map(|c| inside.iter().map(|p| denominators(c, *p)).collect::<Vec<_>>());
+            for (n, ((i, j), found)) in inside.iter().zip(&found).enumerate() {
+                let mut sums = [0.0; 4];
+                for (c, known) in known.iter().enumerate() {
+                    let [d, other, t] = known[n];
+                    let near = |p: &(u32, u32)| p != &(*i, *j) && p.0.abs_diff(*i) < 3 && p.1.abs_diff(*j) < 3;
+                    let logs = inside.iter().zip(known).filter(|(p, _)| near(p)).map(|(_, d)| d[0].ln());
+                    let (count, sum) = logs.fold((0.0, 0.0), |(n, sum), x| (n + 1.0, sum + x));
+                    let root = (0.5 * (t * (d.ln() - sum / count)).clamp(-1.6, 1.6)).exp();
+                    let v = at(*i, *j).variance_of_mean()[c];
+                    let error = v / d * root;
+                    let values =
+                        [error, v / other * root, (error * root - v / d).abs(), error * error / (error + 0.25)];
+                    sums.iter_mut().zip(values).for_each(|(sum, x)| *sum += x / 3.0);
+                }
+                let values = [found.error, found.other, found.contrast, found.unsure].map(f64::from);
+                let same = |a: f64, b: f64| (a - b).abs() < 1e-4 * b + 1e-5 * sums[0];
+                assert!(values.iter().zip(sums).all(|(a, b)| same(*a, b)), "{i} {j}: {found:?}, not {sums:?}");
+                assert_eq!(found.class, class(&at(*i, *j)));
+            }
+            assert_eq!(found.len(), inside.len());
+        }
+    }
+
     /// Nothing that is finite makes an error that is not: pixels alone, black, huge, of one sample. Killed by: a division
     /// by nothing.
     #[test]
