@@ -85,9 +85,11 @@ impl Plan {
     /// 1920 x 1080 another 2 come to those of `ears` for the denoiser's window of rows, and 12 for the 24 MiB of
     /// statistics, which are the same for any picture.
     ///
-    /// The rest does not grow: statistics of the scene ([`Learning::cache_bytes`](crate::unstable::learn::Learning) in all), 2112
-    /// bytes a column for a denoised estimate, and in each shard 200 bytes per slot of [`Settings::ring`] and, if the
-    /// strategy learns, 68 bytes per record of its ledger. [`Self::session`] and [`Self::shard_of`] are exact.
+    /// Not in these numbers are 28 bytes of the session for every 1,000 pixels with an estimate of the pixels, for every
+    /// 10,000 without: those with most error, while an iteration ends. The rest does not grow with the number of pixels:
+    /// statistics of the scene ([`Learning::cache_bytes`](crate::unstable::learn::Learning) in all), 2112 bytes a column for a
+    /// denoised estimate, and in each shard 200 bytes per slot of [`Settings::ring`] and, if the strategy learns, 68 bytes
+    /// per record of its ledger. [`Self::session`] and [`Self::shard_of`] are exact.
     /// [`STACK_BYTES`](crate::unstable::STACK_BYTES) of stack come to that.
     pub fn bytes_per_pixel(&self) -> [f64; 2] {
         let s = self.settings();

@@ -140,7 +140,14 @@ impl Settings {
     /// Words of memory for the pixels with most error, at the end of an iteration.
     pub(crate) fn largest_len(&self) -> usize {
         let pixels = self.film_layout().pixels();
-        Film::largest_len(pixels).max(LearnedState::largest_len(pixels))
+        let measured = if self.estimates_pixels() { LearnedState::largest_len(pixels) } else { 0 };
+        Film::largest_len(pixels).max(measured)
+    }
+
+    /// Is there an estimate of the pixels, against which iterations are measured?
+    fn estimates_pixels(&self) -> bool {
+        let tries = self.learning.guiding == Guiding::Auto;
+        self.strategy.needs_image() || self.shadow_roulette || self.adaptive || tries
     }
 
     /// Does anything learn between iterations, so that the cost of a camera sample changes?
@@ -155,14 +162,12 @@ impl Settings {
 
     /// What these settings have the render learn, with room for `cache`.
     pub(crate) fn needs(&self, cache: Option<CacheSize>) -> Needs {
-        let tries = self.learning.guiding == Guiding::Auto;
-        let pixels = self.strategy.needs_image() || self.shadow_roulette || self.adaptive || tries;
         Needs {
             size: self.size,
             space: self.strategy.space(),
             cache,
             guide: self.guide_size(),
-            pixels: pixels.then_some(self.learning.pixel_estimator),
+            pixels: self.estimates_pixels().then_some(self.learning.pixel_estimator),
             adaptive: self.adaptive,
             learning: self.learning,
         }

@@ -208,12 +208,15 @@ fn memory_is_as_stated() {
     let planes: usize = Aov::ALL.iter().filter(|a| AovSet::STANDARD.has(**a)).map(|a| a.channels().len()).sum();
     let expected = planes * bytes("planes of AOVs")[0] + bytes("rays, with")[0];
     assert_eq!(session(&aovs(&base)) - session(&none(&base)), 64 * 64 * expected);
-    let twice = |s: &Settings| Settings { size: [128, 64], ..none(s) };
+    assert_eq!(Plan::new(&none(&base)).unwrap().bytes_per_pixel()[0], bytes("sums of pixels")[0] as f64);
     let largest = bytes("pixels with most error");
-    let expected = 64 * 64 * bytes("sums of pixels")[0] + largest[0] * 64 * 64 / largest[1];
-    let found = session(&twice(&base)) - session(&none(&base));
-    // blocks are aligned
-    assert!(found.abs_diff(expected) < 64, "{found} bytes, not {expected}");
+    for (s, pixels) in [(base, largest[1]), (none(&base), largest[2])] {
+        let [once, twice] = [1024, 2048].map(|rows| Settings { size: [1024, rows], ..s });
+        let of_pixels = Plan::new(&once).unwrap().bytes_per_pixel()[0] as usize * (1 << 20);
+        let (found, expected) = (session(&twice) - session(&once), of_pixels + largest[0] * (1 << 20) / pixels);
+        // blocks are aligned
+        assert!(found.abs_diff(expected) < 128, "{found} bytes, not {expected}");
+    }
     let size = CacheSize::within(base.learning.cache_bytes, 1).unwrap();
     let bins = 16 * size.leaves() as usize;
     assert!(Training::layout(size).unwrap().size - bins * bytes("training")[0] < 128);
