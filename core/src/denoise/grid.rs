@@ -72,8 +72,10 @@ impl Grid {
     }
 
     /// Row `y`; `None` if the picture has no such row.
+    // once, not in each pass: for the size of modules and firmware
     #[inline(never)]
     pub(super) fn row(self, window: &[f32], y: usize) -> Option<Row<'_>> {
+        const { assert!(SIGNAL == 4 && FEATURES == 6 + 1, "the planes that are taken one by one below") };
         let row = window.get(self.window_row(y))?;
         let mut planes = row.chunks_exact(self.stride.max(1));
         let mut next = || planes.next();
