@@ -29,7 +29,8 @@ pub(super) fn class(p: &PixelStats) -> usize {
 }
 
 /// What squared standard errors of pixels ([`PixelStats::variance_of_mean`]) are to be multiplied by so that they are right
-/// on average, with Sobol' points, roulette and splitting too: by the spread of a pixel's samples. 1 while the samples do
+/// on average, with Sobol' points, roulette and splitting too: one factor for each of three classes of pixels, by the spread
+/// of their samples (squared coefficient of variation below 1, below 8, from 8 on). A factor is 1 while the iterations do
 /// not tell it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VarianceFactors {
@@ -40,15 +41,12 @@ pub struct VarianceFactors {
 const SURE: f64 = 0.2;
 
 impl VarianceFactors {
-    /// Those of independent samples.
-    pub const INDEPENDENT: Self = Self { of_classes: [1.0; CLASSES] };
-
     /// Ratios of classes, as far as their standard errors are small.
     pub(super) fn told(classes: &[Independence; CLASSES]) -> Self {
         Self { of_classes: classes.map(|i| if i.noise < SURE * i.ratio { i.ratio } else { 1.0 }) }
     }
 
-    /// The factor of a pixel.
+    /// The factor of a pixel's class.
     pub fn of(&self, p: &PixelStats) -> f64 {
         self.of_classes[class(p) % CLASSES]
     }

@@ -186,15 +186,17 @@ impl<'m> Film<'m> {
         (0..n).map(|i| self.aovs.sums(i, self.samples(i)))
     }
 
-    /// Standard error of a pixel's mean per channel, right on average over the picture: that of independent samples, times
-    /// the root of its factor of [`Self::variance_factors`]. See [`Self::pixel`] for pixels without samples.
+    /// Standard error of a pixel's mean per channel, right on average over the pixels of its class: that of independent
+    /// samples, times the root of its factor of [`Self::variance_factors`]. See [`Self::pixel`] for pixels without samples.
     pub fn standard_error(&self, index: usize) -> [f64; 3] {
         let p = self.pixel(index);
         let factor = self.variance_factors().of(&p);
         p.variance_of_mean().map(|v| (factor * v).sqrt_newton())
     }
 
-    /// What the variances of pixels that independent samples would have are to be multiplied by.
+    /// What the variances of pixels that independent samples would have are to be multiplied by, as of the last iteration
+    /// whose pixels were all merged: the factors change before the end of an iteration that is finished in pieces
+    /// ([`crate::SessionState::finish_iteration`]).
     pub fn variance_factors(&self) -> VarianceFactors {
         VarianceFactors::told(&self.scalars.independence)
     }

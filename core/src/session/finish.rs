@@ -100,8 +100,12 @@ impl SessionState<'_> {
     /// shading along; many small calls and one big call give the same bits. It is exceeded by a few pixels, or by a piece
     /// of work that is larger than it: the largest are a row of the denoiser that loads 16 others, 4 units per column, and
     /// a block of pixels whose errors are computed, up to 31 x 31 pixels at four units each. Each call looks at all shards
-    /// first, at some 20 instructions each, whatever the budget. A budget of 0 checks the shards and does nothing. Until
-    /// the end the film has the iteration in some pixels and not in others, and the estimates of before.
+    /// first, at some 20 instructions each, whatever the budget. A budget of 0 checks the shards and does nothing.
+    ///
+    /// While pixels are merged, the film has the iteration in some pixels and not in others. When all are,
+    /// [`Film::variance_factors`](crate::Film::variance_factors), and with them
+    /// [`Film::standard_error`](crate::Film::standard_error), include the iteration;
+    /// [`Film::error_estimate`](crate::Film::error_estimate) does not before [`StepResult::Done`].
     /// [`Self::begin_iteration`] abandons what is left to do: pixels that have been merged keep the iteration, others do
     /// not.
     ///

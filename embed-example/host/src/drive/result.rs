@@ -102,7 +102,7 @@ impl Rendered {
         self.pixels.iter().map(|p| p.mean().map(|x| x as f32)).collect()
     }
 
-    /// Standard error of the mean radiance, row by row, rgb; right on average over the picture
+    /// Standard error of the mean radiance, row by row, rgb; right on average over the pixels of each class
     /// ([`VarianceFactors`]).
     pub fn stderr(&self) -> Vec<[f32; 3]> {
         let of_pixel = |p: &PixelStats| {
