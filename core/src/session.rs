@@ -64,7 +64,7 @@ pub struct Session<
 pub struct SessionState<'m> {
     plan: Plan,
     record: &'m mut SessionRecord,
-    /// Counters of a selection among the pixels.
+    /// Heap of the pixels with most error, while an iteration ends.
     largest: &'m mut [u32],
     film: Film<'m>,
     finishing: Finishing,

@@ -67,6 +67,7 @@ impl Seen {
     const NOTHING: Self = Self { mean: [[0.0; COLUMNS]; 3], variance: [[0.0; COLUMNS]; 3], classes: [0; COLUMNS] };
 
     /// Sets `columns` of row `row` of the picture, from place `at` on.
+    // once, not for blocks and windows apart: for the size of modules and firmware
     #[inline(never)]
     fn set(&mut self, at: usize, columns: Range<u32>, row: u32, pixel: &impl Fn(u32, u32) -> PixelStats) {
         for (i, column) in columns.enumerate() {
@@ -83,7 +84,7 @@ impl Seen {
     }
 }
 
-/// Columns in fours: loops over as many become vectors.
+/// Columns in groups of four: compilers make vector instructions of loops over an array of four.
 fn fours(columns: &Columns) -> &[[f64; 4]] {
     columns.as_chunks().0
 }
@@ -116,6 +117,7 @@ impl Sums {
     const NOTHING: Self = Self { mean: [0.0; COLUMNS], square: [0.0; COLUMNS], variance: [0.0; COLUMNS] };
 
     /// Adds `columns` columns of a row.
+    // once, not unrolled over rows: for the size of modules and firmware
     #[inline(never)]
     fn add(&mut self, means: &Columns, variances: &Columns, columns: usize) {
         let row = fours(means).iter().zip(fours(variances));
@@ -175,8 +177,9 @@ struct Row {
 impl Row {
     const EMPTY: Self = Self { errors: [[[0.0; PADDED]; 2]; 3], classes: [0; PADDED], line: Line::EMPTY };
 
-    /// Sets channel `c` of `columns` pixels: of the row itself, of sums over the other rows of their windows and over all,
-    /// of how many pixels are in the others, and of what the block says of columns of both parities.
+    /// Computes channel `c` of the row's first `columns` pixels. `own` is the row's values; `others` and `all` are the sums
+    /// by column over the other rows of the windows and over all of their rows; `pixels` is the number of other pixels in
+    /// each window; `block` is what the block says of even and of odd columns, counted from its first.
     #[inline(always)]
     fn set(
         &mut self,
@@ -284,12 +287,13 @@ fn of_block([x, y]: [Span; 2], pixel: &impl Fn(u32, u32) -> PixelStats) -> OfBlo
     }
     let mut out = OfBlock::default();
     for (i, out) in out.as_flattened_mut().as_flattened_mut().iter_mut().enumerate() {
-        let (later_row, c, later_column) = (i >= 6, i / 2 % 3, i & 1 == 1);
+        // flattened, the row's parity changes every 6 entries, the channel every 2, the column's parity with each
+        let (odd_row, c, odd_column) = (i >= 6, i / 2 % 3, i & 1 == 1);
         let others = |own: &[f64; 4], other: &[f64; 4]| {
-            let same_row = if later_column { own[0] + own[2] } else { own[1] + own[3] };
+            let same_row = if odd_column { own[0] + own[2] } else { own[1] + own[3] };
             other.iter().sum::<f64>() + same_row
         };
-        let [own, other] = if later_row { [1, 0] } else { [0, 1] };
+        let [own, other] = if odd_row { [1, 0] } else { [0, 1] };
         let ([mean, square, variance], [m, s, v]) = (&sums[own][c], &sums[other][c]);
         let pixels = others(&counts[own], &counts[other]);
         *out = Others::of(pixels, [others(mean, m), others(square, s), others(variance, v)]);

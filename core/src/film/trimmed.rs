@@ -54,6 +54,7 @@ impl TrimmedSums {
     }
 
     /// Takes an entry.
+    // this and what it calls once each, not in every visit of pixels: for the size of modules and firmware
     #[inline(never)]
     pub(crate) fn show(&mut self, entry: [f32; WIDTH], heap: &mut [u32]) {
         let entry = entry.map(f32::to_bits);
@@ -91,6 +92,7 @@ impl TrimmedSums {
     }
 
     /// Adds an entry to the sums.
+    // see `show`
     #[inline(never)]
     fn add(&mut self, entry: Entry) {
         let value = f64::from(f32::from_bits(key(&entry)));
@@ -100,6 +102,7 @@ impl TrimmedSums {
     }
 
     /// Puts an entry into the heap, which has room.
+    // see `show`
     #[inline(never)]
     fn insert(&mut self, entry: Entry, heap: &mut [u32]) {
         let entries = heap.as_chunks_mut::<WIDTH>().0;
@@ -117,6 +120,7 @@ impl TrimmedSums {
     }
 
     /// Adds the least entry of the heap to the sums and puts another in its place, which is not less.
+    // see `show`
     #[inline(never)]
     fn replace_least(&mut self, entry: Entry, heap: &mut [u32]) {
         let entries = heap.as_chunks_mut::<WIDTH>().0;
