@@ -6,15 +6,18 @@
 //!
 //! With [`Sampler::Hashed`] all bits of a key are random, and a block is a hash of them. With [`Sampler::Sobol`] a key
 //! either is such a one, of which bit 63 is set, or it belongs to a sequence: then its low word is the same for all
-//! samples of a pixel, and its high word is the number of the camera sample in the iteration. Its blocks are points of
-//! that number, of a sequence with a scramble of its own for each block, depth, pixel and iteration. Samples of the
+//! samples of a pixel, and its high word is the number of the camera sample in the picture. Its blocks are points of
+//! that number, of a sequence with a scramble of its own for each block, depth and pixel. Samples of the
 //! first [`SOBOL_DEPTH`] vertices belong to sequences. Those that splitting makes of one path are siblings, each with a
 //! number, and each number has a sequence of its own: they are independent of each other, and each is spread evenly
 //! among the siblings of its number in the other paths of the pixel.
 //!
-//! What holds for both: numbers of different blocks and keys are independent, but for the samples of a pixel in an
-//! iteration. Iterations are independent, so that the film's error estimate, which measures how much they differ
-//! ([`crate::film::ErrorEstimate`]), is right for any sampler.
+//! What holds for both: numbers of different blocks and keys are independent, but for the samples of a pixel. Sequences
+//! go on from iteration to iteration, so that an iteration fills what those before left open. What iterations learn may
+//! decide how many samples roulette and splitting take, whose numbers belong to no sequence: expectations stay what they
+//! are for any such decision. It must not decide what a number means, or how many points a pixel takes: its next points depend on those before. So
+//! pixels that are guided have sequences of their own in each iteration ([`Origin::apart`]), and so have all of them with
+//! adaptive sampling. The film's error estimate knows ([`crate::film::ErrorEstimate`]).
 
 mod sobol;
 
@@ -27,21 +30,12 @@ use croupier_simd::{F32x8, Mask8, U32x8};
 pub enum Sampler {
     /// Independent numbers, hashes of pixel, sample and depth.
     Hashed,
-    /// Owen-scrambled Sobol' points for the samples of a pixel in an iteration, which are spread more evenly. Pays
-    /// where iterations have 4 samples and more; those of one sample take hashed numbers.
+    /// Owen-scrambled Sobol' points for the samples of a pixel, which are spread more evenly.
     #[default]
     Sobol,
 }
 
 names!(Sampler: Hashed = "hashed", Sobol = "sobol");
-
-impl Sampler {
-    /// What iterations of so many samples per pixel take: one sample has nothing to be spread among.
-    #[inline(always)]
-    pub(crate) fn of_iteration(self, samples: u32) -> Self {
-        if samples > 1 { self } else { Self::Hashed }
-    }
-}
 
 /// Vertices of a path whose samples may belong to sequences: beyond, numbers are hashed.
 const SOBOL_DEPTH: u32 = 4;
@@ -74,15 +68,27 @@ pub(crate) const MAX_FLIGHT_STEPS: u32 = 64;
 pub(crate) const MAX_TRANSMITTANCE_STEPS: u32 = 4096;
 
 impl Key8 {
-    /// Key of the camera sample `sample` of an iteration, `first` samples after the first of the picture.
+    /// Key of the camera sample `sample` of an iteration; in the lanes of `apart` with sequences of this iteration alone.
     #[inline(always)]
-    pub(crate) fn camera_sample(sampler: Sampler, seed: Seed, pixel: U32x8, sample: U32x8) -> Self {
+    pub(crate) fn camera_sample(
+        sampler: Sampler,
+        origin: Origin,
+        pixel: U32x8,
+        sample: U32x8,
+        apart: impl FnOnce() -> Mask8,
+    ) -> Self {
+        let number = sample + U32x8::splat(origin.first);
         match sampler {
-            Sampler::Hashed => Self::camera(seed.seed, pixel, sample + U32x8::splat(seed.first)),
-            Sampler::Sobol => Self {
-                lo: Self::camera(seed.of_iteration(), pixel, U32x8::splat(0)).lo,
-                hi: sample & U32x8::splat(!HASHED),
-            },
+            Sampler::Hashed => Self::camera(origin.seed, pixel, number),
+            Sampler::Sobol => {
+                let sequence = |seed| Self::camera(seed, pixel, U32x8::splat(0)).lo;
+                let (mut lo, mut hi, apart) = (sequence(origin.seed), number, apart());
+                if apart.any() {
+                    lo = U32x8::select(apart, sequence(origin.apart().seed), lo);
+                    hi = U32x8::select(apart, sample, hi);
+                }
+                Self { lo, hi: hi & U32x8::splat(!HASHED) }
+            }
         }
     }
 
@@ -256,8 +262,8 @@ impl Key8 {
 
 /// What the numbers of an iteration depend on.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Seed {
-    /// That of the settings.
+pub(crate) struct Origin {
+    /// Seed of the sequences.
     pub seed: u64,
     /// Number of the iteration.
     pub iteration: u64,
@@ -265,10 +271,11 @@ pub(crate) struct Seed {
     pub first: u32,
 }
 
-impl Seed {
-    /// A seed for this iteration alone.
-    pub(crate) fn of_iteration(self) -> u64 {
-        self.seed ^ self.iteration.wrapping_mul(0x9e37_79b9_7f4a_7c15)
+impl Origin {
+    /// For sequences of this iteration alone.
+    pub(crate) fn apart(self) -> Self {
+        let seed = self.seed ^ self.iteration.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        Self { seed, iteration: 0, first: 0 }
     }
 }
 
@@ -323,8 +330,8 @@ mod tests {
 
     /// Keys of the first vertices of camera samples.
     fn vertex(sampler: Sampler, iteration: u64, pixel: U32x8, sample: U32x8) -> Key8 {
-        let seed = Seed { seed: 9, iteration, first: 0 };
-        Key8::camera_sample(sampler, seed, pixel, sample).next_vertex(sampler, U32x8::splat(1))
+        let origin = Origin { seed: 9, iteration, first: 0 };
+        Key8::camera_sample(sampler, origin, pixel, sample, Mask8::all_lanes).next_vertex(sampler, U32x8::splat(1))
     }
 
     /// What 64 samples of a pixel draw with Sobol' points at vertex `depth`: sample number `n` of each.
@@ -391,12 +398,32 @@ mod tests {
         }
     }
 
+    /// Sequences go on from iteration to iteration: the 64 samples of two fill all 64 cells, however they are divided, but
+    /// not in the lanes that are apart, where those of the second iteration are independent of the first's. Killed by: an
+    /// iteration that begins anew, one that repeats points, lanes that are apart and others exchanged.
+    #[test]
+    fn sequences_go_on() {
+        let s = Sampler::Sobol;
+        for (first, odd) in [(8, false), (24, false), (56, false), (24, true)] {
+            let mut cells = std::collections::HashSet::new();
+            for sample in 0..64u32 {
+                let (iteration, from) = if sample < first { (1, 0) } else { (2, first) };
+                let origin = Origin { seed: 9, iteration, first: from };
+                let apart = || Mask8::from_bits(0b1010_1010);
+                let key = Key8::camera_sample(s, origin, U32x8::splat(3), U32x8::splat(sample - from), apart);
+                let [u, v, ..] = key.pixel_and_lens(s).map(|x| x.lane(usize::from(odd)));
+                cells.insert((u * 8.0) as usize * 8 + (v * 8.0) as usize);
+            }
+            assert_eq!(cells.len() == 64, !odd, "{first} samples before: {} cells", cells.len());
+        }
+    }
+
     /// Hashed numbers are what they were before there was a choice. Killed by: a key that another sampler changed.
     #[test]
     fn hashed_keys_are_hashes() {
         let (pixel, sample) = (U32x8::from_fn(|i| i as u32), U32x8::splat(5));
-        let seed = Seed { seed: 9, iteration: 3, first: 40 };
-        let key = Key8::camera_sample(Sampler::Hashed, seed, pixel, sample);
+        let origin = Origin { seed: 9, iteration: 3, first: 40 };
+        let key = Key8::camera_sample(Sampler::Hashed, origin, pixel, sample, Mask8::all_lanes);
         let wanted = Key8::camera(9, pixel, U32x8::splat(45));
         assert_eq!((key.lo, key.hi), (wanted.lo, wanted.hi));
         let (a, b) = (key.next_vertex(Sampler::Hashed, ZERO), wanted.child(ZERO));

@@ -339,8 +339,7 @@ macro_rules! worlds {
 
             #[inline(always)]
             fn sampler(&self) -> Sampler {
-                let sampler = if P::SOBOL { self.state.plan.settings().sampler } else { Sampler::Hashed };
-                sampler.of_iteration(self.state.iteration.samples)
+                if P::SOBOL { self.state.plan.settings().sampler } else { Sampler::Hashed }
             }
 
             #[inline(always)]
@@ -479,7 +478,8 @@ impl<'m> SessionState<'m> {
 
     /// Goes on as if so many iterations, of so many camera samples per pixel in all, had been before: for one picture in
     /// parts that are rendered apart. Parts with other numbers of iterations and disjoint ranges of samples draw other
-    /// random numbers, so that they are independent. Not while an iteration runs: nothing happens then.
+    /// random numbers: other points of the same sequences, or independent ones. Not while an iteration runs: nothing
+    /// happens then.
     pub fn skip(&mut self, iterations: u64, samples: u32) {
         if !self.running {
             self.iteration = Iteration { number: iterations, first_sample: samples, samples: 0 };

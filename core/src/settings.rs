@@ -27,7 +27,8 @@ settings! {
             SettingRange::Size { max_pixels: 1 << 31 }, scene;
         seed: u64 = 0 =>
             "seed", "Seed of all random numbers: another one gives another, independent image";
-        /// With Sobol' points the picture depends on how its samples are divided into iterations.
+        /// Sequences of Sobol' points go on from iteration to iteration, but for pixels that are guided and with
+        /// [`Self::adaptive`].
         sampler: Sampler = Sampler::Sobol =>
             "sampler", "Random numbers: Owen-scrambled Sobol points, spread evenly over a pixel, or independent hashes";
         /// The picture depends on it (rounding and the comb), never on threads.

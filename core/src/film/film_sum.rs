@@ -45,7 +45,7 @@ impl<'m> FilmSum<'m> {
             }
             film.merge(i, &sums, rays, row.get(..planes).unwrap_or(&[]), 1.0);
         }
-        film.end_merge();
+        film.end_merge(0, 0.0);
     }
 
     /// The film, with the estimated error of the picture. Its correction for samples that are not independent is

@@ -40,7 +40,7 @@ use crate::memory::{Carver, Measure, MemoryError};
 use aov::AovPlanes;
 use bytemuck::{Pod, Zeroable};
 pub use independence::VarianceFactors;
-use independence::{CLASSES, Differences, Independence, class};
+use independence::{CLASSES, Continued, Differences, Independence, class};
 use pixel::PixelWeights;
 use surroundings::{SIDE, Span, UNSURE_SHARE, relative_errors};
 
@@ -89,6 +89,9 @@ pub struct Film<'m> {
 pub(crate) struct FilmScalars {
     /// By class of pixels.
     differences: [Differences; CLASSES],
+    /// As if iterations were independent.
+    found: [Independence; CLASSES],
+    continued: Continued,
     independence: [Independence; CLASSES],
     error: ErrorEstimate,
     /// 0 until an iteration is merged: what memory holds are no pixels then.
@@ -100,6 +103,8 @@ impl FilmScalars {
     pub(crate) fn new() -> Self {
         Self {
             differences: [Differences::default(); CLASSES],
+            found: [Independence::UNKNOWN; CLASSES],
+            continued: Continued::default(),
             independence: [Independence::UNKNOWN; CLASSES],
             error: ErrorEstimate { independence: Independence::UNKNOWN.ratio, ..ErrorEstimate::default() },
             filled: 0,
@@ -243,11 +248,15 @@ impl<'m> Film<'m> {
         self.scalars.differences = Default::default();
     }
 
-    /// Ends the merge of an iteration: all its pixels were added.
-    pub(crate) fn end_merge(&mut self) {
+    /// Ends the merge of an iteration of so many samples per pixel: all its pixels were added. The share `in_sequence` of
+    /// the samples goes on with the sampler's sequences of those before.
+    pub(crate) fn end_merge(&mut self, samples: u32, in_sequence: f64) {
         let s = &mut self.scalars;
-        for (known, d) in s.independence.iter_mut().zip(core::mem::take(&mut s.differences)) {
-            *known = known.after(&d);
+        s.continued.add(samples, in_sequence);
+        let of_classes = s.found.iter_mut().zip(&mut s.independence);
+        for ((found, known), d) in of_classes.zip(core::mem::take(&mut s.differences)) {
+            *found = found.after(&d);
+            *known = s.continued.ratio(*found);
         }
         s.filled = 1;
     }
@@ -371,7 +380,7 @@ mod tests {
         (0..4u8).for_each(|i| sums.add([f64::from(i); 3]));
         let nothing = |film: &Film<'_>| bytemuck::bytes_of(&film.scalars.differences).iter().all(|b| *b == 0);
         film.merge(0, &sums, 0, &[], 1.0);
-        film.end_merge();
+        film.end_merge(0, 0.0);
         film.merge(0, &sums, 0, &[], 1.0);
         assert!(!nothing(&film));
         film.begin_merge();

@@ -13,7 +13,7 @@ use crate::camera;
 use crate::extension::{Extension, PixelSamples8, SourceRays8};
 use crate::geometry::Ray8;
 use crate::rng::Key8;
-use crate::sampler::Seed;
+use crate::sampler::Origin;
 use crate::scene::Effects;
 use crate::tiles::{TILE_PIXELS, Tiles};
 use crate::world::World;
@@ -127,11 +127,12 @@ pub(super) fn camera_samples<W: World>(
 ) -> CameraSamples8 {
     let (settings, tiles, learned, iteration) = (&job.settings, &job.tiles, world.learned(), world.iteration());
     let sampler = world.sampler();
-    let mut seed = Seed { seed: settings.seed, iteration: iteration.number, first: iteration.first_sample };
+    let mut origin = Origin { seed: settings.seed, iteration: iteration.number, first: iteration.first_sample };
     if settings.adaptive {
         // numbers of one pixel must not come back in another iteration, however many samples it had
-        seed = Seed { seed: seed.of_iteration(), first: 0, iteration: 0 };
+        origin = origin.apart();
     }
+    let mut guided_lanes = 0;
     let (mut x, mut y, mut pixel, mut sample) = ([0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8]);
     let (mut root, mut record, mut weight) = ([0u32; 8], [NO_RECORD; 8], [[1.0; 3]; 8]);
     let mut lanes = 0;
@@ -147,6 +148,7 @@ pub(super) fn camera_samples<W: World>(
         if W::GUIDING {
             let guided = learned.is_guided(iteration.number, p);
             target = target.with_guiding(guided);
+            guided_lanes |= u32::from(guided && learned.guide().is_some()) << lanes;
             learning = learned.learned_samples(guided);
         }
         let Some(opened) = book.open_camera_sample(target, s < learning) else { break };
@@ -157,7 +159,8 @@ pub(super) fn camera_samples<W: World>(
         (root[lanes], record[lanes]) = opened;
         lanes += 1;
     }
-    let key = Key8::camera_sample(sampler, seed, U32x8::new(pixel), U32x8::new(sample));
+    let apart = || if W::GUIDING { Mask8::from_bits(guided_lanes) } else { Mask8::NONE };
+    let key = Key8::camera_sample(sampler, origin, U32x8::new(pixel), U32x8::new(sample), apart);
     let [u0, u1, u2, u3] = key.pixel_and_lens(sampler);
     let px = F32x8::from_fn(|i| x[i] as f32) + u0;
     let py = F32x8::from_fn(|i| y[i] as f32) + u1;
