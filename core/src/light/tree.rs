@@ -132,20 +132,23 @@ fn select_one(nodes: &[LightNode], p: [f32; 3], n: [f32; 3], r: u32) -> (u32, f3
     for _ in 0..MAX_LIGHT_DEPTH {
         let Some(node) = nodes.get(index as usize) else { break };
         let importance = light_importance(node, p, n);
-        let total = sum(importance);
+        // sums of what is before each child, and of all
+        let (mut upto, mut total) = ([0.0; 9], 0.0);
+        for (sum, x) in upto.iter_mut().skip(1).zip(importance.to_array()) {
+            total += f64::from(x);
+            *sum = total;
+        }
         if total == 0.0 {
             break;
         }
         let at = u * total;
-        let (mut chosen, mut before, mut own, mut upto) = (NONE, 0.0, 1.0f32, 0.0);
-        for (importance, child) in importance.to_array().into_iter().zip(node.child) {
-            if importance > 0.0 && (upto <= at || chosen == NONE) {
-                (chosen, before, own) = (child, upto, importance);
-            }
-            upto += f64::from(importance);
-        }
+        // the first child that reaches beyond, all of which have importance; the last one that has if none does by rounding
+        let below = upto.iter().skip(1).filter(|sum| **sum <= at).count();
+        let last = importance.gt(F32x8::ZERO).bits().checked_ilog2().unwrap_or(0) as usize;
+        let k = below.min(last) & 7;
+        let (chosen, before, own) = (node.child[k], upto[k], importance.lane(k));
         probability *= share(own, total);
-        if chosen == NONE || chosen & LEAF_BIT != 0 {
+        if chosen & LEAF_BIT != 0 {
             return (if chosen == NONE { NONE } else { chosen & CHILD_INDEX }, probability);
         }
         u = ((at - before) / f64::from(own)).clamp(0.0, BELOW_ONE);
