@@ -49,7 +49,8 @@ impl<'m> FilmSum<'m> {
     }
 
     /// The film, with the estimated error of the picture. Its correction for samples that are not independent is
-    /// measured between the films that were added, if they have two samples in each pixel at least.
+    /// measured between the films that were added, if they have two samples in each pixel at least, as if these films were
+    /// independent: of parts whose Sobol' points go on from one to the next it states too much.
     pub fn finish(&mut self) -> &Film<'m> {
         let Self { film, largest } = self;
         let mut errors = film.begin_errors();
