@@ -75,15 +75,15 @@ impl Key8 {
         origin: Origin,
         pixel: U32x8,
         sample: U32x8,
-        apart: impl FnOnce() -> Mask8,
+        apart: Option<Mask8>,
     ) -> Self {
         let number = sample + U32x8::splat(origin.first);
         match sampler {
             Sampler::Hashed => Self::camera(origin.seed, pixel, number),
             Sampler::Sobol => {
                 let sequence = |seed| Self::camera(seed, pixel, U32x8::splat(0)).lo;
-                let (mut lo, mut hi, apart) = (sequence(origin.seed), number, apart());
-                if apart.any() {
+                let (mut lo, mut hi) = (sequence(origin.seed), number);
+                if let Some(apart) = apart.filter(|lanes| lanes.any()) {
                     lo = U32x8::select(apart, sequence(origin.apart().seed), lo);
                     hi = U32x8::select(apart, sample, hi);
                 }
@@ -331,7 +331,8 @@ mod tests {
     /// Keys of the first vertices of camera samples.
     fn vertex(sampler: Sampler, iteration: u64, pixel: U32x8, sample: U32x8) -> Key8 {
         let origin = Origin { seed: 9, iteration, first: 0 };
-        Key8::camera_sample(sampler, origin, pixel, sample, Mask8::all_lanes).next_vertex(sampler, U32x8::splat(1))
+        Key8::camera_sample(sampler, origin, pixel, sample, Some(Mask8::all_lanes()))
+            .next_vertex(sampler, U32x8::splat(1))
     }
 
     /// What 64 samples of a pixel draw with Sobol' points at vertex `depth`: sample number `n` of each.
@@ -409,7 +410,7 @@ mod tests {
             for sample in 0..64u32 {
                 let (iteration, from) = if sample < first { (1, 0) } else { (2, first) };
                 let origin = Origin { seed: 9, iteration, first: from };
-                let apart = || Mask8::from_bits(0b1010_1010);
+                let apart = Some(Mask8::from_bits(0b1010_1010));
                 let key = Key8::camera_sample(s, origin, U32x8::splat(3), U32x8::splat(sample - from), apart);
                 let [u, v, ..] = key.pixel_and_lens(s).map(|x| x.lane(usize::from(odd)));
                 cells.insert((u * 8.0) as usize * 8 + (v * 8.0) as usize);
@@ -423,7 +424,7 @@ mod tests {
     fn hashed_keys_are_hashes() {
         let (pixel, sample) = (U32x8::from_fn(|i| i as u32), U32x8::splat(5));
         let origin = Origin { seed: 9, iteration: 3, first: 40 };
-        let key = Key8::camera_sample(Sampler::Hashed, origin, pixel, sample, Mask8::all_lanes);
+        let key = Key8::camera_sample(Sampler::Hashed, origin, pixel, sample, Some(Mask8::all_lanes()));
         let wanted = Key8::camera(9, pixel, U32x8::splat(45));
         assert_eq!((key.lo, key.hi), (wanted.lo, wanted.hi));
         let (a, b) = (key.next_vertex(Sampler::Hashed, ZERO), wanted.child(ZERO));

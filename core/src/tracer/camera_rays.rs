@@ -159,7 +159,8 @@ pub(super) fn camera_samples<W: World>(
         (root[lanes], record[lanes]) = opened;
         lanes += 1;
     }
-    let apart = || if W::GUIDING { Mask8::from_bits(guided_lanes) } else { Mask8::NONE };
+    // the profile once more: compilers for wasm do not compute lanes of constant masks
+    let apart = W::GUIDING.then(|| Mask8::from_bits(guided_lanes));
     let key = Key8::camera_sample(sampler, origin, U32x8::new(pixel), U32x8::new(sample), apart);
     let [u0, u1, u2, u3] = key.pixel_and_lens(sampler);
     let px = F32x8::from_fn(|i| x[i] as f32) + u0;
