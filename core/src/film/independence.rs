@@ -335,7 +335,7 @@ mod tests {
             c.ratio(Independence { ratio: found, noise: 0.01 })
         };
         let doubling = [1, 1, 2, 4, 8, 16, 32, 64];
-        let g = |a: f64, n: f64| a + (1.0 - a) / n.sqrt();
+        let g = |a: f64, n: f64| a + (1.0 - a) / n.sqrt_newton();
         for a in [0.2, 0.5, 0.9] {
             let found = 2.0 * g(a, 64.0) - g(a, 128.0);
             let whole = of(&doubling, 1.0, found);
