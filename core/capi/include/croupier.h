@@ -1548,7 +1548,7 @@ croupier_status croupier_shard_load(struct croupier_shard *shard,
 
 // Goes on as if so many iterations, of so many camera samples per pixel in all, had been before: for one picture in
 // parts that are rendered apart and added afterwards. Parts with other numbers of iterations and disjoint ranges of
-// samples are independent. CROUPIER_ITERATION if one has begun since the picture did.
+// samples take other random numbers. CROUPIER_ITERATION if one has begun since the picture did.
 croupier_status croupier_session_skip(struct croupier_session *session,
                                       uint64_t iterations,
                                       uint32_t samples,

@@ -90,7 +90,7 @@ pub unsafe extern "C" fn croupier_shard_load(
 
 /// Goes on as if so many iterations, of so many camera samples per pixel in all, had been before: for one picture in
 /// parts that are rendered apart and added afterwards. Parts with other numbers of iterations and disjoint ranges of
-/// samples are independent. CROUPIER_ITERATION if one has begun since the picture did.
+/// samples take other random numbers. CROUPIER_ITERATION if one has begun since the picture did.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_skip(
     session: *mut croupier_session,

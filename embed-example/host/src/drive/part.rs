@@ -1,8 +1,8 @@
 //! Parts of one picture that are rendered apart, by processes that know nothing of each other.
 //!
-//! A part is a range of the camera samples of every pixel: those that a render without parts would have taken with these
-//! numbers, so that parts draw other random numbers and are independent. The combs that round roulette factors are told
-//! apart by the numbers of iterations. Each part learns from its own samples alone.
+//! A part is a range of the camera samples of every pixel: those that a render without parts would have taken with
+//! these numbers, other points of the same sequences, so that together they are spread as evenly. The combs that round
+//! roulette factors are told apart by the numbers of iterations. Each part learns from its own samples alone.
 
 use super::Target;
 use std::fmt;
