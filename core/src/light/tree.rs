@@ -132,12 +132,7 @@ fn select_one(nodes: &[LightNode], p: [f32; 3], n: [f32; 3], r: u32) -> (u32, f3
     for _ in 0..MAX_LIGHT_DEPTH {
         let Some(node) = nodes.get(index as usize) else { break };
         let importance = light_importance(node, p, n);
-        // sums of what is before each child, and of all
-        let (mut upto, mut total) = ([0.0; 9], 0.0);
-        for (sum, x) in upto.iter_mut().skip(1).zip(importance.to_array()) {
-            total += f64::from(x);
-            *sum = total;
-        }
+        let (upto, total) = sums(importance);
         if total == 0.0 {
             break;
         }
@@ -157,10 +152,15 @@ fn select_one(nodes: &[LightNode], p: [f32; 3], n: [f32; 3], r: u32) -> (u32, f3
     (NONE, 0.0)
 }
 
-/// Sum of the importances, in the order of the children.
+/// Sums of the importances before each child, in their order, and of all.
 #[inline(always)]
-fn sum(importance: F32x8) -> f64 {
-    importance.to_array().into_iter().fold(0.0, |sum, x| sum + f64::from(x))
+fn sums(importance: F32x8) -> ([f64; 9], f64) {
+    let (mut upto, mut total) = ([0.0; 9], 0.0);
+    for (sum, x) in upto.iter_mut().skip(1).zip(importance.to_array()) {
+        total += f64::from(x);
+        *sum = total;
+    }
+    (upto, total)
 }
 
 /// The probability of a child.
@@ -198,7 +198,7 @@ fn along_trail(nodes: &[LightNode], p: [f32; 3], n: [f32; 3], trail: u32, light:
     for _ in 0..MAX_LIGHT_DEPTH {
         let Some(node) = nodes.get(index as usize).filter(|_| trail != NONE) else { return 0.0 };
         let importance = light_importance(node, p, n);
-        let total = sum(importance);
+        let (_, total) = sums(importance);
         let slot = rest as usize & 7;
         let own = importance.lane(slot);
         if own == 0.0 {
