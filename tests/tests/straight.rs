@@ -181,20 +181,24 @@ fn boundaries_around_everything_change_nothing() {
     let air = veiled.add_material("air", Model::Null);
     add_box(&mut veiled, air, [-30.0; 3], [30.0; 3], false);
     add_box(&mut veiled, air, [-0.97; 3], [0.97; 3], false);
-    for (strategy, iterations) in
-        [("none", &[512][..]), ("classic", &[512]), ("fixed:1.7", &[256]), ("ears", &[16, 64, 128, 512])]
+    // what `ears` learns in such small pictures makes its paths 0.9 % (one standard deviation) longer or shorter
+    for (strategy, iterations, seeds) in
+        [("none", &[512][..], 1), ("classic", &[512], 1), ("fixed:1.7", &[256], 1), ("ears", &[16, 64, 128, 512], 8)]
     {
         let both = [&plain, &veiled].map(|s| {
             let scene = blob(s);
-            let settings = Settings { max_depth: 6, ..settings(&scene, strategy) };
-            scheduled(&scene, &settings, iterations, Schedule::InOrder(1 << 20))
+            let base = Settings { max_depth: 6, ..settings(&scene, strategy) };
+            let render = |seed| scheduled(&scene, &Settings { seed, ..base }, iterations, Schedule::InOrder(1 << 20));
+            (0..seeds).map(render).collect::<Vec<_>>()
         });
-        let [a, b] = &both;
+        let [a, b] = [&both[0][0], &both[1][0]];
         let (difference, error) = (a.mean() - b.mean(), a.error_of_mean().hypot(b.error_of_mean()));
         assert!(difference.abs() < LIMIT * error, "{strategy}: {difference} +- {error}");
         assert!(error < 0.008 * a.mean(), "{strategy}: {error} of {}", a.mean());
-        let per_sample = |i: &Image| i.counters.path_segments as f64 / i.counters.paths() as f64;
-        assert!((per_sample(b) / per_sample(a) - 1.0).abs() < 0.02, "{strategy}: paths of another length");
+        let of_all = |images: &[Image], f: fn(&Image) -> u64| images.iter().map(f).sum::<u64>() as f64;
+        let [of_plain, of_veiled] =
+            [&both[0], &both[1]].map(|i| of_all(i, |i| i.counters.path_segments) / of_all(i, |i| i.counters.paths()));
+        assert!((of_veiled / of_plain - 1.0).abs() < 0.02, "{strategy}: paths of {of_veiled}, not {of_plain} segments");
         assert_eq!((b.counters.passages_cut, b.counters.non_finite), (0, 0));
     }
 }
