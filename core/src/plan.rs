@@ -1,6 +1,6 @@
 //! How much memory a render needs: sizes first, so that nothing is ever asked for again.
 
-use crate::film::{AovLayout, Film, FilmSum};
+use crate::film::{AovLayout, Film, FilmSum, PixelSums};
 use crate::learn::{LearnedState, PixelEstimator};
 use crate::memory::{BLOCK_ALIGN, Carver, Layout, Measure, MemoryError};
 use crate::record::{SessionRecord, fingerprint};
@@ -74,13 +74,13 @@ impl Plan {
     ///
     /// | | session | shards |
     /// |---|---|---|
-    /// | always | 40 | 40 |
+    /// | always | 48 | 48 |
     /// | per plane of [`Settings::aovs`] | 4 | 4 |
     /// | with [`Settings::adaptive`] or the AOV `cost` | 4 | 4 |
     /// | with [`Settings::adaptive`] | 40.1 | |
     /// | with an estimate of the pixels, denoised (strategies that learn, [`Settings::adaptive`]) | 20 | |
     ///
-    /// So `classic` takes 80 without auxiliary values, `ears` 156 with albedo, normal and depth, and 244 with the standard set
+    /// So `classic` takes 96 without auxiliary values, `ears` 172 with albedo, normal and depth, and 260 with the standard set
     /// ([`AovSet::STANDARD`](crate::unstable::film::AovSet::STANDARD), 17 planes and the cost), which the program asks for. At
     /// 1920 x 1080 another 2 come to those of `ears` for the denoiser's window of rows, and 12 for the 24 MiB of
     /// statistics, which are the same for any picture.
@@ -101,7 +101,7 @@ impl Plan {
             Some(PixelEstimator::Blocks) => 12.0 / 64.0,
             None => 0.0,
         };
-        let both = 40.0 + 4.0 * planes + rays;
+        let both = size_of::<PixelSums>() as f64 + 4.0 * planes + rays;
         [both + weights + estimate, both]
     }
 

@@ -83,28 +83,31 @@ fn the_error_estimate_is_right_on_average() {
     }
 }
 
-/// A diffuse box with strategies that end and split paths: `classic`, which starts late, states the true relMSE; where
-/// roulette or splitting meets every path, packets' combs make the true one smaller, up to 2.4 times: one iteration
-/// states an upper bound, several show it. Intervals miss on the low side, because few samples contain the rare bright
-/// paths: with 64 samples 84 of 100 intervals of `classic` hold the true error, with 16 those of `fixed:3.3` as many.
-/// The limits of the mean ratios after iterations were set beforehand; those of the intervals, and the 64 samples of
-/// `fixed:3.3`, were set after runs had shown this. Killed by: a sum of squares per path instead of per camera sample,
-/// weights of iterations that the sums of squares do not have, a ratio upside down, samples of one iteration compared
-/// instead of iterations.
+/// A diffuse box with strategies that end and split paths. Where roulette or splitting meets every path, packets' combs
+/// make the true error less than the samples' spread says, up to 2.4 times, and so do Sobol' points, up to 4 times: the
+/// halves of the samples show how much, after one iteration as after several. Limits were set beforehand. Killed by: a sum
+/// of squares per path instead of per camera sample, a ratio upside down, halves that share a sequence or a comb's packets.
 #[test]
-fn the_error_estimate_is_right_with_roulette_after_iterations() {
+fn the_error_estimate_is_right_with_roulette_and_sobol_points() {
     let scene = blob(&cornell([16, 16]));
     let growing = [1, 1, 2, 4, 8, 16, 32];
-    for (strategy, max_depth, iterations, [least, most]) in [
-        ("classic", 12, &[256][..], [0.93, 1.07]),
-        ("classic", 12, &[64; 4], [0.93, 1.07]),
-        ("classic:1", 12, &[64], [1.9, 2.7]),
-        ("classic:1", 12, &growing, [0.9, 1.1]),
-        ("fixed:3.3", 3, &[16], [1.2, 1.5]),
-        ("fixed:3.3", 3, &[16; 4], [0.9, 1.1]),
-        ("ears", 12, &growing, [0.9, 1.1]),
+    let mut wrong = Vec::new();
+    for (sampler, strategy, max_depth, iterations) in [
+        (Sampler::Hashed, "classic", 12, &[256][..]),
+        (Sampler::Hashed, "classic", 12, &[64; 4]),
+        (Sampler::Hashed, "classic:1", 12, &[64]),
+        (Sampler::Hashed, "classic:1", 12, &growing),
+        (Sampler::Hashed, "fixed:3.3", 3, &[16]),
+        (Sampler::Hashed, "fixed:3.3", 3, &[16; 4]),
+        (Sampler::Hashed, "ears", 12, &growing),
+        (Sampler::Sobol, "none", 12, &[64]),
+        (Sampler::Sobol, "none", 12, &[15, 16]),
+        (Sampler::Sobol, "none", 12, &growing),
+        (Sampler::Sobol, "classic", 12, &[64; 4]),
+        (Sampler::Sobol, "classic:1", 12, &growing),
+        (Sampler::Sobol, "ears", 12, &growing),
     ] {
-        let base = Settings { max_depth, ..settings(&scene, strategy) };
+        let base = Settings { max_depth, sampler, ..settings(&scene, strategy) };
         let run = |seed| scheduled(&scene, &Settings { seed, ..base }, iterations, Schedule::InOrder(1 << 20));
         let images: Vec<Image> = (0..100).map(run).collect();
         let truth = rel_mse_of(&images);
@@ -112,43 +115,16 @@ fn the_error_estimate_is_right_with_roulette_after_iterations() {
         let count = |f: &dyn Fn(&Image) -> bool| images.iter().filter(|i| f(i)).count();
         let (below, held) =
             (count(&|i| i.error.high < truth), count(&|i| i.error.low <= truth && truth <= i.error.high));
-        println!("{strategy}: {ratio:.3} of the true relMSE; {held} of 100 intervals hold it, {below} are below");
-        assert!((least..=most).contains(&ratio), "{strategy}: {ratio} of the true relMSE is stated");
-        assert!(below <= 12, "{strategy}: {below} of 100 intervals are below the true error");
-        assert!(most > 1.1 || held >= 85, "{strategy}: {held} of 100 intervals hold the true error");
+        let what = format!(
+            "{sampler:?} {strategy} {iterations:?}: {ratio:.3} of the true relMSE; {held} of 100 intervals hold it, \
+             {below} are below"
+        );
+        println!("{what}");
+        if !(0.93..=1.07).contains(&ratio) || below > 10 || held < 88 {
+            wrong.push(what);
+        }
     }
-}
-
-/// With Sobol' points samples are spread evenly, so that one iteration states more than the true error, as with combs;
-/// from the second on the film measures how they differ, and a model tells what points bring that go on from iteration to
-/// iteration. It cannot tell these from combs, so `none`, which has none, states a little too much, and `classic:1`, where
-/// combs meet every path, too little: 1.09 and 0.93 of the truth. The limits of the intervals were set after runs had
-/// shown this. Killed by: no such model (1.2 of the truth), all of its correction with no doubt (31 of 100 intervals
-/// below the truth).
-#[test]
-fn the_error_estimate_is_right_with_sobol_points() {
-    let scene = blob(&cornell([16, 16]));
-    let growing = [1, 1, 2, 4, 8, 16, 32];
-    for (strategy, iterations, [least, most]) in [
-        ("none", &[64][..], [1.2, 4.0]),
-        ("none", &growing, [0.9, 1.1]),
-        ("classic", &[64; 4], [0.9, 1.1]),
-        ("classic:1", &growing, [0.9, 1.1]),
-        ("ears", &growing, [0.9, 1.1]),
-    ] {
-        let base = Settings { max_depth: 12, sampler: Sampler::Sobol, ..settings(&scene, strategy) };
-        let run = |seed| scheduled(&scene, &Settings { seed, ..base }, iterations, Schedule::InOrder(1 << 20));
-        let images: Vec<Image> = (0..100).map(run).collect();
-        let truth = rel_mse_of(&images);
-        let ratio = images.iter().map(|i| i.error.rel_mse).sum::<f64>() / images.len() as f64 / truth;
-        let count = |f: &dyn Fn(&Image) -> bool| images.iter().filter(|i| f(i)).count();
-        let (below, held) =
-            (count(&|i| i.error.high < truth), count(&|i| i.error.low <= truth && truth <= i.error.high));
-        println!("{strategy}: {ratio:.3} of the true relMSE; {held} of 100 intervals hold it, {below} are below");
-        assert!((least..=most).contains(&ratio), "{strategy}: {ratio} of the true relMSE is stated");
-        assert!(below <= 20, "{strategy}: {below} of 100 intervals are below the true error");
-        assert!(most > 1.1 || held >= 78, "{strategy}: {held} of 100 intervals hold the true error");
-    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 /// The relMSE that independent pictures of one scene have on average, from how they differ.
@@ -236,16 +212,41 @@ impl Blocks<'_> {
     }
 }
 
+/// Class of a pixel, by the spread of its samples.
+fn class(p: &PixelStats) -> usize {
+    let squares = |x: [f64; 3]| x.iter().map(|x| x * x).sum::<f64>();
+    let of_samples = p.variance_of_mean().iter().sum::<f64>() * p.samples as f64;
+    [1.0, 8.0].iter().filter(|least| of_samples >= **least * squares(p.mean())).count()
+}
+
+/// Variances that the halves of pixels show over those that their samples state, by class: one channel of each pixel.
+fn ratios(pixels: &[PixelStats]) -> [f64; 3] {
+    let mut sums = [[0.0; 2]; 3];
+    for (i, p) in pixels.iter().enumerate() {
+        let (mean, variance) = (p.mean()[i % 3], p.variance_of_mean()[i % 3]);
+        let scale = (mean * mean - 0.9 * variance).max(0.0) + REL_MSE_EPSILON;
+        let (n, ahead) = (p.samples as f64, f64::from(p.ahead));
+        let difference = f64::from(p.difference) - ahead * mean;
+        let [found, stated] = &mut sums[class(p)];
+        *found += difference * difference / (n * n - ahead * ahead) / scale;
+        *stated += variance / scale;
+    }
+    sums.map(|[found, stated]| found / stated)
+}
+
 /// The discarded pixels are the worst 0.01 %, and every pixel counts by what window and block say. Killed by: a selection that
 /// takes the smallest, or one too many; a block that leaves pixels out or counts them twice, another parity; a window
-/// with its own pixel, or that ends at the block; rows of logarithms of another place, a seam that is not one.
+/// with its own pixel, or that ends at the block; rows of logarithms of another place, a seam that is not one; halves of another channel, or
+/// of sizes that are taken to be the same.
 #[test]
 fn the_worst_pixels_are_left_out() {
     let size = [200, 151];
     let scene = blob(&cornell(size));
     let image = render(&scene, &Settings { max_depth: 3, ..settings(&scene, "none") }, 5);
     let blocks = Blocks { pixels: &image.pixels, size: size.map(|n| n as usize) };
-    let (mut errors, windows) = blocks.shares();
+    let (shares, windows) = blocks.shares();
+    let ratios = ratios(&image.pixels);
+    let mut errors: Vec<f64> = shares.iter().zip(&image.pixels).map(|(x, p)| x * ratios[class(p)]).collect();
     assert!(windows > 300, "{windows}");
     errors.sort_by(f64::total_cmp);
     let kept = &errors[..errors.len() - errors.len() / 10_000];

@@ -275,7 +275,7 @@ fn planes_take_the_film() {
     let mut memory = vec![0.0; Planes::len([2, 1], true)];
     let mut planes = Planes::carve([2, 1], true, &mut memory).unwrap();
     let (sum, spread) = ([4.0, 8.0, 0.0], [6.0, 0.0, 0.0]);
-    let stats = PixelStats { sum, spread, weight: 4.0, weight_sqr: 4.0, samples: 4, rays: 9 };
+    let stats = PixelStats { sum, spread, weight: 4.0, weight_sqr: 4.0, samples: 4, rays: 9, ..PixelStats::default() };
     let aov = PixelAov { albedo: [2.0, 1.0, 0.0], normal: [0.0, -2.0, 1.0], hits: 2.0, ..Default::default() };
     planes.set(0, &stats, Some(&aov));
     planes.set(1, &PixelStats::default(), None);

@@ -17,7 +17,6 @@ mod example {
         let mut session = Session::new(scene, &plan, shared)?;
         let mut shard = Shard::new(&plan, 0, rest)?; // one per unit of parallel work: `Settings::shards`
         for _ in 0..2 {
-            // how much iterations differ tells the error
             session.begin_iteration(8); // samples per pixel
             while shard.step(&session, Budget { rays: 10_000 }) == StepResult::More {} // or draw a frame in between
             session.end_iteration([&shard])?;

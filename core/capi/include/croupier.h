@@ -911,7 +911,7 @@ typedef struct croupier_counters {
 typedef struct croupier_pixel {
   // Mean radiance.
   float mean[3];
-  // Standard error of the mean, right on average over the picture from the second iteration on.
+  // Standard error of the mean, right on average over the picture from two samples on.
   float standard_error[3];
   // Camera samples; 0 before the end of the first iteration.
   uint32_t samples;

@@ -18,7 +18,7 @@ use croupier::{Counters, Film};
 pub struct croupier_pixel {
     /// Mean radiance.
     pub mean: [f32; 3],
-    /// Standard error of the mean, right on average over the picture from the second iteration on.
+    /// Standard error of the mean, right on average over the picture from two samples on.
     pub standard_error: [f32; 3],
     /// Camera samples; 0 before the end of the first iteration.
     pub samples: u32,

@@ -37,7 +37,13 @@ impl<'m> FilmSum<'m> {
             let p = pixel(i);
             let samples = u32::try_from(p.samples).unwrap_or(u32::MAX);
             let rays = u32::try_from(p.rays).unwrap_or(u32::MAX);
-            let sums = PixelSums { sum: p.sum, spread: p.spread.map(short), samples };
+            let sums = PixelSums {
+                sum: p.sum,
+                spread: p.spread.map(short),
+                samples,
+                difference: p.difference,
+                ahead: p.ahead,
+            };
             let planes = film.aovs.planes();
             for (at, value) in row.iter_mut().take(planes).enumerate() {
                 let mean = plane(at, i);
@@ -45,12 +51,10 @@ impl<'m> FilmSum<'m> {
             }
             film.merge(i, &sums, rays, row.get(..planes).unwrap_or(&[]), 1.0);
         }
-        film.end_merge(0, 0.0);
+        film.end_merge();
     }
 
-    /// The film, with the estimated error of the picture. Its correction for samples that are not independent is
-    /// measured between the films that were added, if they have two samples in each pixel at least, as if these films were
-    /// independent: of parts whose Sobol' points go on from one to the next it states too much.
+    /// The film, with the estimated error of the picture.
     pub fn finish(&mut self) -> &Film<'m> {
         let Self { film, largest } = self;
         let mut errors = film.begin_errors();

@@ -9,9 +9,10 @@
 //! | `short` | 32-bit numbers with the range of `f64` |
 //! | `error` | relMSE of a pixel, [`ErrorEstimate`] |
 //! | `film_sum` | films of several renders, added |
-//! | `independence` | correlation of an iteration's samples, measured |
+//! | `independence` | correlation of samples, measured |
 //! | `sqrt` | square root in f64 |
 //! | `surroundings` | what relMSE divides by |
+//! | `others` | what other pixels say of one |
 //! | `contrast` | how much more an error may be at an edge |
 //! | `trimmed` | sums without the largest values |
 
@@ -21,6 +22,7 @@ mod coverage;
 mod error;
 mod film_sum;
 mod independence;
+mod others;
 mod pixel;
 mod short;
 mod sqrt;
@@ -32,7 +34,7 @@ pub(crate) use aov::{AovLayout, AovSums};
 pub use error::{ErrorEstimate, REL_MSE_EPSILON};
 pub use film_sum::FilmSum;
 pub use pixel::PixelStats;
-pub(crate) use pixel::PixelSums;
+pub(crate) use pixel::{Half, PixelSums, compared_channel};
 pub(crate) use sqrt::SqrtNewton;
 pub(crate) use trimmed::TrimmedSums;
 
@@ -40,7 +42,7 @@ use crate::memory::{Carver, Measure, MemoryError};
 use aov::AovPlanes;
 use bytemuck::{Pod, Zeroable};
 pub use independence::VarianceFactors;
-use independence::{CLASSES, Continued, Differences, Independence, class};
+use independence::{CLASSES, Differences, Independence, class};
 use pixel::PixelWeights;
 use surroundings::{SIDE, Span, UNSURE_SHARE, relative_errors};
 
@@ -87,11 +89,8 @@ pub struct Film<'m> {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct FilmScalars {
-    /// By class of pixels.
+    /// Of the merge that runs, by class of pixels.
     differences: [Differences; CLASSES],
-    /// As if iterations were independent.
-    found: [Independence; CLASSES],
-    continued: Continued,
     independence: [Independence; CLASSES],
     error: ErrorEstimate,
     /// 0 until an iteration is merged: what memory holds are no pixels then.
@@ -103,8 +102,6 @@ impl FilmScalars {
     pub(crate) fn new() -> Self {
         Self {
             differences: [Differences::default(); CLASSES],
-            found: [Independence::UNKNOWN; CLASSES],
-            continued: Continued::default(),
             independence: [Independence::UNKNOWN; CLASSES],
             error: ErrorEstimate { independence: Independence::UNKNOWN.ratio, ..ErrorEstimate::default() },
             filled: 0,
@@ -228,9 +225,8 @@ impl<'m> Film<'m> {
                 p.stats(None, 0)
             }
         };
-        let w_alike = if self.weights.is_empty() { 1.0 } else { w };
         if let Some(of_class) = self.scalars.differences.get_mut(class(&all)) {
-            of_class.add(&before, sums, w_alike, &all);
+            of_class.add(&all, compared_channel(pixel));
         }
         if let Some(r) = self.rays.get_mut(pixel) {
             *r = if fresh { rays } else { r.saturating_add(rays) };
@@ -248,15 +244,11 @@ impl<'m> Film<'m> {
         self.scalars.differences = Default::default();
     }
 
-    /// Ends the merge of an iteration of so many samples per pixel: all its pixels were added. The share `in_sequence` of
-    /// the samples goes on with the sampler's sequences of those before.
-    pub(crate) fn end_merge(&mut self, samples: u32, in_sequence: f64) {
+    /// Ends the merge of an iteration: all its pixels were added.
+    pub(crate) fn end_merge(&mut self) {
         let s = &mut self.scalars;
-        s.continued.add(samples, in_sequence);
-        let of_classes = s.found.iter_mut().zip(&mut s.independence);
-        for ((found, known), d) in of_classes.zip(core::mem::take(&mut s.differences)) {
-            *found = found.after(&d);
-            *known = s.continued.ratio(*found);
+        for (known, d) in s.independence.iter_mut().zip(core::mem::take(&mut s.differences)) {
+            *known = known.after(&d);
         }
         s.filled = 1;
     }
@@ -377,10 +369,10 @@ mod tests {
         let mut c = Carver::new(&mut memory[from..], needed).expect("room");
         let mut film = Film::carve(&mut c, &layout, FilmScalars::new()).expect("room");
         let mut sums = PixelSums::default();
-        (0..4u8).for_each(|i| sums.add([f64::from(i); 3]));
+        (0..4u8).for_each(|i| sums.add([f64::from(i); 3], if i < 2 { Half::First } else { Half::Second }, 0));
         let nothing = |film: &Film<'_>| bytemuck::bytes_of(&film.scalars.differences).iter().all(|b| *b == 0);
         film.merge(0, &sums, 0, &[], 1.0);
-        film.end_merge(0, 0.0);
+        film.end_merge();
         film.merge(0, &sums, 0, &[], 1.0);
         assert!(!nothing(&film));
         film.begin_merge();

@@ -14,6 +14,34 @@ pub(crate) struct PixelSums {
     pub spread: [u32; 3],
     /// Number of camera samples, at most 2^32 - 1.
     pub samples: u32,
+    /// Sum of w x in one channel over the samples of the first half ([`Half`]) minus that over those of the second. An
+    /// iteration of more than some million samples loses it to rounding.
+    pub difference: f32,
+    /// Sum of w over the samples of the first half minus that over those of the second.
+    pub ahead: f32,
+}
+
+/// Camera samples of a pixel belong to two halves of as many samples, as nearly as can be, which draw random numbers
+/// independently of each other, whatever the samples within a half have to do with each other: the difference of their
+/// means shows the variance of the pixel (independent replicates: Owen, "Randomly permuted (t,m,s)-nets and
+/// (t,s)-sequences", 1995; in pictures "half buffers"). A half goes on from iteration to iteration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Half {
+    First,
+    Second,
+}
+
+/// Channel in which the halves of a pixel are compared: noise has much the same size in all three, and one of them costs a
+/// third of the memory.
+pub(crate) fn compared_channel(film_index: usize) -> usize {
+    film_index % 3
+}
+
+/// `x`, or the largest finite number of its sign.
+fn finite(x: f64) -> f32 {
+    const MOST: f64 = f32::MAX as f64;
+    let x = if x < MOST { x } else { MOST };
+    (if x > -MOST { x } else { -MOST }) as f32
 }
 
 /// What the film of an adaptive render holds of a pixel besides its sums.
@@ -29,9 +57,13 @@ pub(crate) struct PixelWeights {
 }
 
 impl PixelSums {
-    /// Adds a camera sample of weight 1.
+    /// Adds a camera sample of weight 1; halves are compared in this channel.
     #[inline]
-    pub(crate) fn add(&mut self, radiance: [f64; 3]) {
+    pub(crate) fn add(&mut self, radiance: [f64; 3], half: Half, channel: usize) {
+        let sign = if half == Half::First { 1.0 } else { -1.0 };
+        let compared = radiance.get(channel).copied().unwrap_or(0.0);
+        self.difference = finite(f64::from(self.difference) + f64::from(sign) * compared);
+        self.ahead += sign;
         if self.samples == 0 {
             // a single sample has no deviation
             self.sum.iter_mut().zip(radiance).for_each(|(sum, x)| *sum += x);
@@ -51,13 +83,10 @@ impl PixelSums {
 
     /// Are these sums that samples may have?
     pub(crate) fn is_sound(&self) -> bool {
-        self.sum.iter().all(|x| x.is_finite()) && self.spread.iter().all(|x| long(*x).is_finite())
-    }
-
-    /// Mean and its squared standard error per channel, for two independent samples of weight 1 at least.
-    pub(super) fn mean_and_variance(&self) -> [[f64; 2]; 3] {
-        let n = f64::from(self.samples);
-        core::array::from_fn(|c| [self.sum[c] / n, long(self.spread[c]) / (n * (n - 1.0))])
+        self.sum.iter().all(|x| x.is_finite())
+            && self.spread.iter().all(|x| long(*x).is_finite())
+            && self.difference.is_finite()
+            && self.ahead.is_finite()
     }
 
     /// Mean squared difference of the samples from `x` per channel, for one sample of weight 1 at least.
@@ -85,7 +114,14 @@ impl PixelSums {
             self.spread[c] = short(long(self.spread[c]) + long(o.spread[c]) + d * d * scale);
             self.sum[c] += o.sum[c];
         }
+        self.merge_halves(o, 1.0);
+    }
+
+    /// Adds the number of samples and what the halves differ by.
+    fn merge_halves(&mut self, o: &Self, w: f64) {
         self.samples = self.samples.saturating_add(o.samples);
+        self.difference = finite(f64::from(self.difference) + w * f64::from(o.difference));
+        self.ahead += w as f32 * o.ahead;
     }
 
     /// Adds the samples of an iteration, each with weight `w`.
@@ -106,7 +142,7 @@ impl PixelSums {
             self.spread[c] = short(moved.max(0.0) + w2 * (long(o.spread[c]) + m * off * off));
             weights.cross[c] = before.cross[c] - step * before.weight_sqr + w2 * m * off;
         }
-        self.samples = self.samples.saturating_add(o.samples);
+        self.merge_halves(o, w);
     }
 
     /// Statistics of the pixel; `weights` if its samples have weights.
@@ -120,6 +156,8 @@ impl PixelSums {
             weight_sqr,
             samples: u64::from(self.samples),
             rays: u64::from(rays),
+            difference: self.difference,
+            ahead: self.ahead,
         }
     }
 }
@@ -142,6 +180,11 @@ pub struct PixelStats {
     /// Number of rays traced for them, of all kinds; 0 unless the settings ask for it ([`Aov::Cost`](super::Aov::Cost) or
     /// [`crate::Settings::adaptive`]).
     pub rays: u64,
+    /// Sum of w x over the first half of the samples minus that over the second, in one channel: that of the pixel's
+    /// index in the film, modulo 3. The halves are independent of each other, unlike the samples in each.
+    pub difference: f32,
+    /// Sum of w over the first half of the samples minus that over the second.
+    pub ahead: f32,
 }
 
 impl PixelStats {
@@ -192,7 +235,7 @@ mod tests {
 
     fn sums(values: &[f64]) -> PixelSums {
         let mut sums = PixelSums::default();
-        values.iter().for_each(|x| sums.add([*x, 2.0 * x, 0.0]));
+        values.iter().for_each(|x| sums.add([*x, 2.0 * x, 0.0], Half::First, 0));
         sums
     }
 
@@ -250,9 +293,9 @@ mod tests {
         let mut film = PixelSums::default();
         for i in 0..n {
             let x = [10.3 + f64::from(i % 2), 0.0, 0.0];
-            one.add(x);
+            one.add(x, Half::First, 0);
             let mut single = PixelSums::default();
-            single.add(x);
+            single.add(x, Half::First, 0);
             film.merge(&single);
         }
         for (what, sums) in [("samples", one), ("iterations", film)] {

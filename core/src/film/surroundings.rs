@@ -20,7 +20,7 @@
 //! state three times the error where most pixels have found nothing yet. The second term of w keeps pixels that stand out
 //! beyond their own noise (the positive part of James and Stein, "Estimation with quadratic loss", 1961). The others in the
 //! block are those of other parity in column or row: the pixel is in none of the sums, and nothing is subtracted
-//! (NUMERICS STA-4). k = 1 is the estimate; k = [`DOUBT`] says how much depends on this choice, which widens the interval.
+//! (NUMERICS STA-4). k = 1 is the estimate; k = [`DOUBT`](super::others::DOUBT) says how much depends on this choice, which widens the interval.
 //!
 //! At edges 1 / D is less than its mean over what the pixel may be; [`super::contrast`] says how much less it may be. The
 //! estimate is halfway in the logarithm, and the interval holds both ends.
@@ -31,8 +31,8 @@
 //! `intervals`.
 
 use super::contrast::{LARGEST, LONGEST, Line, PADDED, REACH, eight};
-use super::error::{REL_MSE_EPSILON, TAKEN_OFF, larger, relative_denominator};
 use super::independence::class;
+use super::others::{Others, denominators};
 use super::pixel::PixelStats;
 use core::ops::Range;
 use croupier_simd::F32x8;
@@ -43,10 +43,6 @@ pub(super) const SIDE: u32 = LONGEST.div_ceil(2) as u32;
 const ROWS: usize = 2 * REACH as usize + 1;
 /// Columns of a block with those that its windows reach: the block's own from `REACH` on.
 const COLUMNS: usize = PADDED + 2 * REACH as usize;
-/// Fewer other pixels say nothing.
-const ENOUGH: f64 = 8.0;
-/// The other k.
-const DOUBT: f64 = 4.0;
 /// Relative squared error of a pixel of which half is unsure.
 const UNSURE: f32 = 0.25;
 /// Part of what is unsure by which an interval is widened to both sides.
@@ -126,27 +122,6 @@ impl Sums {
         for ((m, v), ((mean, square), variance)) in row.zip(sums).take(columns.div_ceil(4)) {
             add_four(m, v, [mean, square, variance]);
         }
-    }
-}
-
-/// What other pixels say of one, in a channel.
-#[derive(Clone, Copy, Default)]
-struct Others {
-    pixels: f64,
-    mean: f64,
-    /// Variance among them beyond their noise.
-    contrast: f64,
-    /// Mean of their variances.
-    noise: f64,
-}
-
-impl Others {
-    /// From sums over so many pixels.
-    #[inline(always)]
-    fn of(pixels: f64, [mean, square, variance]: [f64; 3]) -> Self {
-        let n = 1.0 / larger(pixels, 1.0);
-        let (mean, noise) = (mean * n, variance * n);
-        Self { pixels, mean, contrast: larger(square * n - mean * mean - noise, 0.0), noise }
     }
 }
 
@@ -360,38 +335,6 @@ pub(super) fn relative_errors(
     }
 }
 
-/// D of a pixel of mean m and variance v, D with the other k, and what part of it the window tells: t of
-/// [`super::contrast`]. Without branches: the loop over pixels becomes one over vectors.
-#[inline(always)]
-fn denominators([m, v]: [f64; 2], window: &Others, block: &Others) -> (f64, f64, f64) {
-    let (noise, contrast) = (window.noise, window.contrast);
-    // a of a + b, 0 where there is none of it
-    let share = |a: f64, b: f64| {
-        let share = a / (a + b);
-        if a > 0.0 { share } else { 0.0 }
-    };
-    let u = share(block.contrast, larger(noise, block.noise) / window.pixels);
-    let mean = block.mean + u * (window.mean - block.mean);
-    let off = (m - mean) * (m - mean);
-    // a pixel that has found nothing knows nothing: it is as noisy as the others
-    let own = if v > 0.0 { v } else { noise };
-    let surer = share(contrast, larger(own, noise));
-    let of_window = u * u * noise / window.pixels;
-    let of_block = (1.0 - u) * (1.0 - u) * block.noise / block.pixels;
-    let with = |k: f64| {
-        let stands_out = 1.0 - k * own / off;
-        let stands_out = if off > k * own { stands_out } else { 0.0 };
-        let w = larger(surer, stands_out);
-        let e = mean + w * (m - mean);
-        let variance = TAKEN_OFF * w * w * v + (1.0 - w) * (1.0 - w) * (of_window + of_block);
-        (larger(e * e - variance, 0.0) + REL_MSE_EPSILON, (1.0 - w) * u * u)
-    };
-    let ((d, left), (other, _)) = (with(1.0), with(DOUBT));
-    let alone = relative_denominator(m, v);
-    let enough = window.pixels >= ENOUGH && block.pixels >= ENOUGH;
-    (if enough { d } else { alone }, if enough { other } else { alone }, if enough { left } else { 0.0 })
-}
-
 #[cfg(test)]
 mod tests {
     extern crate std;
@@ -402,7 +345,14 @@ mod tests {
     fn pixel(n: u64, mean: f64, variance: f64) -> PixelStats {
         let w = n as f64;
         let spread = variance * (w * w - w);
-        PixelStats { sum: [mean * w; 3], spread: [spread; 3], weight: w, weight_sqr: w, samples: n, rays: 0 }
+        PixelStats {
+            sum: [mean * w; 3],
+            spread: [spread; 3],
+            weight: w,
+            weight_sqr: w,
+            samples: n,
+            ..PixelStats::default()
+        }
     }
 
     /// Means of error, other error and what is unsure over rows of 16 pixels, a block of 16 x 16 if there are as many.

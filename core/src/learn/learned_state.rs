@@ -171,15 +171,6 @@ impl<'m> LearnedState<'m> {
         !self.watches() || self.watch.is_guided(iteration, at)
     }
 
-    /// Share of the pixels that are guided in this iteration.
-    pub(crate) fn guided_share(&self) -> f64 {
-        match self.guide() {
-            None => 0.0,
-            Some(_) if self.guides() => 1.0,
-            Some(_) => self.watch.tried_share(),
-        }
-    }
-
     /// How many samples of a pixel are learned from in an iteration.
     #[inline(always)]
     pub(crate) fn learned_samples(&self, guided: bool) -> u32 {

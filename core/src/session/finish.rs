@@ -16,7 +16,6 @@
 use super::{Phase, SessionError, SessionState};
 use crate::learn::LearnedState;
 use crate::record::Finishing;
-use crate::sampler::Sampler;
 use crate::tracer::{Budget, Shard, ShardCursor, StepResult};
 use core::iter::Fuse;
 
@@ -321,10 +320,7 @@ impl SessionState<'_> {
             }
             return 1 + n * RAYS_PER_MERGED;
         }
-        let settings = self.plan.settings();
-        let continued = settings.sampler == Sampler::Sobol && !settings.adaptive;
-        let in_sequence = if continued { 1.0 - learned.guided_share() } else { 0.0 };
-        film.end_merge(self.iteration.samples, in_sequence);
+        film.end_merge();
         self.counters.merge(counters);
         self.learned.begin_refresh();
         self.next_stage();

@@ -18,7 +18,7 @@ use super::root::{PixelTarget, Roots};
 use super::vertex::PathVertex;
 use crate::cost::MEDIUM_STEPS_PER_RAY;
 use crate::counters::Counters;
-use crate::film::{Aov, AovLayout, AovSet, AovSums, PixelSums, REL_MSE_EPSILON};
+use crate::film::{Aov, AovLayout, AovSet, AovSums, PixelSums, REL_MSE_EPSILON, compared_channel};
 use crate::learn::LearnedState;
 use crate::learn::cache::NO_BIN;
 use crate::learn::cache::Training;
@@ -323,7 +323,7 @@ impl<'m> Bookkeeping<'m> {
     pub(super) fn count_non_finite(&mut self, root: u32) {
         self.counters.non_finite += 1;
         if self.counters.first_non_finite == 0 {
-            self.counters.first_non_finite = u64::from(self.roots.get(root).target.film) + 1;
+            self.counters.first_non_finite = u64::from(self.roots.get(root).target.film()) + 1;
         }
     }
 
@@ -440,7 +440,8 @@ impl<'m> Bookkeeping<'m> {
             self.counters.camera_samples += 1;
             let pixel = done.target.pixel();
             if let Some(p) = self.pixels.get_mut(pixel) {
-                p.add(done.radiance);
+                let target = &done.target;
+                p.add(done.radiance, target.half(), compared_channel(target.film() as usize));
             }
             if let Some(r) = self.rays.get_mut(pixel) {
                 *r = r.saturating_add(done.rays);

@@ -1,5 +1,7 @@
-//! Camera samples in the order of tiles, pixels (Morton) and samples, eight at a time. Neighbouring lanes are samples of
-//! one pixel or of neighbouring pixels, so primary packets are coherent.
+//! Camera samples in the order of tiles, halves of their pixels' samples, pixels (Morton) and samples, eight at a time.
+//! Neighbouring lanes are samples of one pixel or of neighbouring pixels, so primary packets are coherent. The halves of
+//! a pixel are a tile's half apart, since combs, which round the samples of one packet together, must not make one depend on
+//! the other ([`Half`]).
 
 use super::book::Bookkeeping;
 use super::job::Job;
@@ -11,9 +13,10 @@ use super::root::PixelTarget;
 use super::shading::moves;
 use crate::camera;
 use crate::extension::{Extension, PixelSamples8, SourceRays8};
+use crate::film::Half;
 use crate::geometry::Ray8;
 use crate::rng::Key8;
-use crate::sampler::Origin;
+use crate::sampler::{Origin, in_first_half};
 use crate::scene::Effects;
 use crate::tiles::{TILE_PIXELS, Tiles};
 use crate::world::World;
@@ -27,12 +30,29 @@ pub(super) struct CameraCursor {
     tile: Option<u32>,
     /// First column and row of the current tile.
     start: [u32; 2],
-    /// Pixel of the shard, tile by tile in Morton order.
+    /// First pixel of the tile, of the shard's, tile by tile in Morton order.
+    first_pixel: u32,
+    /// Pixel of the shard.
     pixel: u32,
     /// Slot within the tile.
     slot: u32,
-    /// Sample within the pixel.
+    /// Sample within the half of the pixel.
     sample: u32,
+    half: Half,
+}
+
+/// The next camera sample.
+#[derive(Clone, Copy, Debug)]
+struct CameraSample {
+    /// Column and row.
+    at: [u32; 2],
+    /// Number of the pixel in the shard.
+    pixel: u32,
+    /// Number of the sample in the iteration.
+    sample: u32,
+    half: Half,
+    /// How many samples of the pixel in the iteration belong to the first half.
+    in_first_half: u32,
 }
 
 /// A cursor as numbers.
@@ -41,54 +61,68 @@ pub(super) struct CameraCursor {
 pub(super) struct CursorRecord {
     /// [`NO_TILE`] if none is left.
     tile: u32,
+    first_pixel: u32,
     pixel: u32,
     slot: u32,
     sample: u32,
+    /// Not 0 in the second half.
+    second: u32,
 }
 
 const NO_TILE: u32 = u32::MAX;
 
 impl CameraCursor {
     pub(super) fn suspend(&self) -> CursorRecord {
-        let Self { tile, pixel, slot, sample, .. } = *self;
-        CursorRecord { tile: tile.unwrap_or(NO_TILE), pixel, slot, sample }
+        let Self { tile, first_pixel, pixel, slot, sample, half, .. } = *self;
+        let second = u32::from(half == Half::Second);
+        CursorRecord { tile: tile.unwrap_or(NO_TILE), first_pixel, pixel, slot, sample, second }
     }
 
     /// `None` if there is no such tile or slot.
     pub(super) fn resume(tiles: &Tiles, r: &CursorRecord) -> Option<Self> {
-        let CursorRecord { tile, pixel, slot, sample } = *r;
+        let CursorRecord { tile, first_pixel, pixel, slot, sample, second } = *r;
         let tile = (tile != NO_TILE).then_some(tile);
         let sound = slot < TILE_PIXELS && tile.is_none_or(|tile| (tile as usize) < tiles.count());
-        sound.then(|| Self { tile, start: tile.map_or([0; 2], |tile| tiles.start(tile)), pixel, slot, sample })
+        let half = if second == 0 { Half::First } else { Half::Second };
+        sound.then(|| Self { first_pixel, pixel, slot, sample, half, ..Self::at_tile(tiles, tile) })
+    }
+
+    /// At the first sample of the shard's first tile, or of another tile.
+    fn at_tile(tiles: &Tiles, tile: Option<u32>) -> Self {
+        Self { tile, start: tile.map_or([0; 2], |tile| tiles.start(tile)), ..Self::finished() }
     }
 
     pub(super) fn new(tiles: &Tiles, shard: u32, samples: u32) -> Self {
-        let tile = if samples == 0 { None } else { tiles.next_of(shard, 0) };
-        Self { tile, start: tile.map_or([0; 2], |tile| tiles.start(tile)), pixel: 0, slot: 0, sample: 0 }
+        Self::at_tile(tiles, if samples == 0 { None } else { tiles.next_of(shard, 0) })
     }
 
     pub(super) const fn finished() -> Self {
-        Self { tile: None, start: [0; 2], pixel: 0, slot: 0, sample: 0 }
+        Self { tile: None, start: [0; 2], first_pixel: 0, pixel: 0, slot: 0, sample: 0, half: Half::First }
     }
 
     pub(super) fn is_finished(&self) -> bool {
         self.tile.is_none()
     }
 
-    /// The next (pixel, number of the pixel in the shard, sample); a finished cursor gives `None`. `samples` is the number per pixel of a
-    /// tile.
-    fn next(&mut self, tiles: &Tiles, shard: u32, samples: impl Fn(u32) -> u32) -> Option<([u32; 2], u32, u32)> {
+    /// The next camera sample; a finished cursor gives `None`. `samples` is the number per pixel of a tile, and how many of
+    /// them belong to the first half.
+    fn next(&mut self, tiles: &Tiles, shard: u32, samples: impl Fn(u32) -> [u32; 2]) -> Option<CameraSample> {
         while let Some(tile) = self.tile {
-            let found = tiles.pixel(self.start, self.slot).map(|p| (p, self.pixel, self.sample));
+            let [samples, in_first_half] = samples(tile);
+            let (half, before, wanted) = match self.half {
+                Half::First => (Half::First, 0, in_first_half),
+                Half::Second => (Half::Second, in_first_half, samples - in_first_half),
+            };
+            let pixel = tiles.pixel(self.start, self.slot);
+            let sample = |at| CameraSample { at, pixel: self.pixel, sample: before + self.sample, half, in_first_half };
+            let found = pixel.filter(|_| self.sample < wanted).map(sample);
             self.sample += 1;
-            if found.is_none() || self.sample >= samples(tile) {
+            if found.is_none() || self.sample >= wanted {
                 self.sample = 0;
-                self.pixel += u32::from(found.is_some());
+                self.pixel += u32::from(pixel.is_some());
                 self.slot += 1;
                 if self.slot == TILE_PIXELS {
-                    self.slot = 0;
-                    self.tile = tiles.next_of(shard, tile + 1);
-                    self.start = self.tile.map_or([0; 2], |tile| tiles.start(tile));
+                    self.next_half(tiles, shard, tile);
                 }
             }
             if found.is_some() {
@@ -96,6 +130,16 @@ impl CameraCursor {
             }
         }
         None
+    }
+
+    /// Goes on with the second half of a tile, or with the next tile.
+    fn next_half(&mut self, tiles: &Tiles, shard: u32, tile: u32) {
+        if self.half == Half::First {
+            (self.half, self.pixel, self.slot) = (Half::Second, self.first_pixel, 0);
+        } else {
+            let pixel = self.pixel;
+            *self = Self { first_pixel: pixel, pixel, ..Self::at_tile(tiles, tiles.next_of(shard, tile + 1)) };
+        }
     }
 }
 
@@ -128,22 +172,31 @@ pub(super) fn camera_samples<W: World>(
     let (settings, tiles, learned, iteration) = (&job.settings, &job.tiles, world.learned(), world.iteration());
     let sampler = world.sampler();
     let mut origin = Origin { seed: settings.seed, iteration: iteration.number, first: iteration.first_sample };
+    let mut before = origin.first;
     if settings.adaptive {
         // numbers of one pixel must not come back in another iteration, however many samples it had
         origin = origin.apart();
+        // the half that is one larger, if any, is the first in every other iteration
+        before = iteration.number as u32;
     }
+    let samples = |tile| {
+        let samples = learned.samples_of_tile(tile);
+        [samples, in_first_half(before, samples)]
+    };
     let mut guided_lanes = 0;
     let (mut x, mut y, mut pixel, mut sample) = ([0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8]);
+    let mut first_halves = [0u32; 8];
     let (mut root, mut record, mut weight) = ([0u32; 8], [NO_RECORD; 8], [[1.0; 3]; 8]);
     let mut lanes = 0;
     while lanes < 8 {
-        let Some((p, slot, s)) = cursor.next(tiles, index, |t| learned.samples_of_tile(t)) else { break };
+        let Some(next) = cursor.next(tiles, index, samples) else { break };
+        let (p, s) = (next.at, next.sample);
         let film = tiles.film_index(p) as u32;
         if s == 0 {
-            book.begin_pixel(slot);
+            book.begin_pixel(next.pixel);
         }
         let (error_weight, share) = learned.error_weight(film);
-        let mut target = PixelTarget::numbered(error_weight, share, film, slot, s);
+        let mut target = PixelTarget::numbered(error_weight, share, film, next.pixel, s).with_half(next.half);
         let mut learning = settings.learning.samples;
         if W::GUIDING {
             let guided = learned.is_guided(iteration.number, p);
@@ -154,14 +207,14 @@ pub(super) fn camera_samples<W: World>(
         let Some(opened) = book.open_camera_sample(target, s < learning) else { break };
         [x[lanes], y[lanes]] = p;
         pixel[lanes] = film;
-        sample[lanes] = s;
+        (sample[lanes], first_halves[lanes]) = (s, next.in_first_half);
         weight[lanes] = error_weight;
         (root[lanes], record[lanes]) = opened;
         lanes += 1;
     }
     // the profile once more: compilers for wasm do not compute lanes of constant masks
     let apart = W::GUIDING.then(|| Mask8::from_bits(guided_lanes));
-    let key = Key8::camera_sample(sampler, origin, U32x8::new(pixel), U32x8::new(sample), apart);
+    let key = Key8::camera_sample(sampler, origin, U32x8::new(pixel), [sample, first_halves].map(U32x8::new), apart);
     let [u0, u1, u2, u3] = key.pixel_and_lens(sampler);
     let px = F32x8::from_fn(|i| x[i] as f32) + u0;
     let py = F32x8::from_fn(|i| y[i] as f32) + u1;

@@ -1,6 +1,7 @@
 //! One record per camera sample in flight: what its whole tree of paths has found.
 
 use super::free_list::FreeList;
+use crate::film::Half;
 use crate::memory::{Carver, Measure, MemoryError};
 use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -32,8 +33,8 @@ pub(crate) struct PixelTarget {
     pub error_weight: [f32; 3],
     /// Samples of the pixel over those of the mean pixel; `error_weight` times its square is that of the pixel.
     pub share: f32,
-    /// Film index.
-    pub film: u32,
+    /// Film index, below 2^31, and in the highest bit whether the sample is of the second half of the pixel's.
+    film: u32,
     /// Number of the pixel in the shard, below 2^30, and in the highest bits whether the sample is its first of the
     /// iteration, and whether it may be guided; see [`Self::numbered`].
     pixel: u32,
@@ -43,19 +44,39 @@ pub(crate) struct PixelTarget {
 const FIRST: u32 = 1 << 31;
 /// Bit of a sample that may be guided.
 const GUIDED: u32 = 1 << 30;
-/// All of them.
+/// Both of them.
 const BITS: u32 = FIRST | GUIDED;
+/// Bit of a film index whose sample is of the second half.
+const SECOND: u32 = 1 << 31;
 
 impl PixelTarget {
     /// The target of sample `sample`, of this iteration, of pixel `pixel` of the shard.
     pub(crate) fn numbered(error_weight: [f32; 3], share: f32, film: u32, pixel: u32, sample: u32) -> Self {
-        Self { error_weight, share, film, pixel: pixel & !BITS | if sample == 0 { FIRST } else { 0 } }
+        Self { error_weight, share, film: film & !SECOND, pixel: pixel & !BITS | if sample == 0 { FIRST } else { 0 } }
     }
 
     /// The same of a sample that may be guided, or may not.
     #[inline(always)]
     pub(crate) fn with_guiding(self, guided: bool) -> Self {
         Self { pixel: self.pixel | if guided { GUIDED } else { 0 }, ..self }
+    }
+
+    /// The same of a sample of a half.
+    #[inline(always)]
+    pub(crate) fn with_half(self, half: Half) -> Self {
+        Self { film: self.film & !SECOND | if half == Half::Second { SECOND } else { 0 }, ..self }
+    }
+
+    /// Film index.
+    #[inline(always)]
+    pub(crate) fn film(&self) -> u32 {
+        self.film & !SECOND
+    }
+
+    /// Half of the pixel's samples that the sample belongs to.
+    #[inline(always)]
+    pub(crate) fn half(&self) -> Half {
+        if self.film & SECOND == 0 { Half::First } else { Half::Second }
     }
 
     /// Number of the pixel in the shard.
@@ -142,7 +163,7 @@ impl<'m> Roots<'m> {
         let [a, b, c, d, e, f, g, h] = U32x8::select(mask, slots, U32x8::splat(u32::MAX)).to_array();
         let rows = [row(a), row(b), row(c), row(d), row(e), row(f), row(g), row(h)];
         let [x, y, z, share, film, ..] = F32x8::transpose(rows);
-        PixelTarget8 { error_weight: Vec3x8::new(x, y, z), share, film: film.to_bits() }
+        PixelTarget8 { error_weight: Vec3x8::new(x, y, z), share, film: film.to_bits() & U32x8::splat(!SECOND) }
     }
 
     /// The times of the roots in `mask`; 0 in other lanes.

@@ -4,7 +4,7 @@
 //! | bytes | what |
 //! |---|---|
 //! | 392 | [`Header`]: which shard of which iteration, sizes, counters |
-//! | 40 per pixel | sums of the pixels that have begun, in the order of the shard |
+//! | 48 per pixel | sums of the pixels that have begun, in the order of the shard |
 //! | 4 per pixel | their rays, if the settings count them |
 //! | 4 per pixel and plane | their auxiliary sums |
 //! | 48 per bin | learned sums of the bins in use |
@@ -32,7 +32,7 @@ use core::fmt;
 /// First bytes of a saved shard.
 const MAGIC: u64 = u64::from_ne_bytes(*b"CRPSHARD");
 /// Version of the format, which covers the layout of sums and counters too.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Bytes of magic and hash, which the hash does not cover.
 const UNHASHED: usize = 16;
 
@@ -41,8 +41,8 @@ const HEADER: usize = size_of::<Header>();
 const GUIDED: usize = size_of::<GuideHeader>();
 
 // Any of these is part of the layout: other counters or sums need another version.
-const _: () = assert!(VERSION == 2 && HEADER == 392 && size_of::<PixelSums>() == 40 && Training::BIN_BYTES == 52);
-const _: () = assert!(VERSION == 2 && GUIDED == 56);
+const _: () = assert!(VERSION == 3 && HEADER == 392 && size_of::<PixelSums>() == 48 && Training::BIN_BYTES == 52);
+const _: () = assert!(VERSION == 3 && GUIDED == 56);
 
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]

@@ -4,7 +4,7 @@
 //! Head       which part, sizes, hashes, counters
 //! text       version and settings, one `name=value` a line
 //! names      of materials and objects, if coverage by index is among the layers
-//! pixels     48 bytes each, row by row
+//! pixels     56 bytes each, row by row
 //! planes     of auxiliary values, 4 bytes a pixel each
 //! cache      statistics of the scene, as `--cache-out` writes them
 //! ```
@@ -32,7 +32,7 @@ use std::{error, fmt};
 pub const MAGIC: [u8; 8] = *b"CRPRPART";
 
 /// Version of the layout of this module.
-const LAYOUT: u32 = 2;
+const LAYOUT: u32 = 3;
 
 /// Most bytes of texts that are read.
 const MAX_TEXT: u64 = 1 << 26;
@@ -77,6 +77,8 @@ struct SavedPixel {
     spread: [u32; 3],
     samples: u32,
     rays: u32,
+    difference: f32,
+    ahead: f32,
     reserved: u32,
 }
 
@@ -84,7 +86,8 @@ impl SavedPixel {
     fn new(p: &PixelStats) -> Self {
         let short = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
         let spread = p.spread.map(|x| short(x.to_bits() >> 31));
-        Self { sum: p.sum, spread, samples: short(p.samples), rays: short(p.rays), reserved: 0 }
+        let (samples, rays) = (short(p.samples), short(p.rays));
+        Self { sum: p.sum, spread, samples, rays, difference: p.difference, ahead: p.ahead, reserved: 0 }
     }
 
     fn stats(&self) -> PixelStats {
@@ -96,6 +99,8 @@ impl SavedPixel {
             weight_sqr: n,
             samples: self.samples.into(),
             rays: self.rays.into(),
+            difference: self.difference,
+            ahead: self.ahead,
         }
     }
 }

@@ -152,11 +152,6 @@ impl Watch {
         self.enabled != 0
     }
 
-    /// Share of the pixels that are guided while not all are.
-    pub(crate) fn tried_share(&self) -> f64 {
-        f64::from(self.tried) / 65_536.0
-    }
-
     /// Is the pixel in this column and row guided in iteration `iteration`, and learned from? Blocks, because samples of a
     /// packet are neighbours.
     #[inline]
