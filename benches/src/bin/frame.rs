@@ -63,7 +63,7 @@ const FINISH: [u64; 2] = [2_000, 6_000];
 /// The budget of the example for pieces of the end of an iteration.
 const EXAMPLE_FINISH: u64 = FINISH[1];
 /// Budgets of steps, in rays; the first is that of the example.
-const STEP: [u64; 3] = [1_500, 2_000, 10_000];
+const STEP: [u64; 3] = [1_250, 2_000, 10_000];
 /// A millisecond at 3 G instructions a second.
 const LIMIT: u64 = 3_000_000;
 /// Side of the square of instances: 10,000 in all.

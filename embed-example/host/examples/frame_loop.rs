@@ -22,8 +22,8 @@ use std::error::Error;
 
 /// Calls in a frame: 4 ms of 1 ms each.
 pub const CALLS_PER_FRAME: u32 = 4;
-/// A call of tracing: a ray takes some 1,500 instructions, the call under 3 million.
-pub const STEP: Budget = Budget { rays: 1_500 };
+/// A call of tracing: a ray takes up to 2,200 instructions, the call under 3 million.
+pub const STEP: Budget = Budget { rays: 1_250 };
 /// A call that ends an iteration: a unit of it takes some 300 instructions.
 pub const FINISH: Budget = Budget { rays: 6_000 };
 /// Pixels of the film that a frame reads for its preview.
