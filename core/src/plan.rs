@@ -77,13 +77,13 @@ impl Plan {
     /// | always | 48 | 48 |
     /// | per plane of [`Settings::aovs`] | 4 | 4 |
     /// | with [`Settings::adaptive`] or the AOV `cost` | 4 | 4 |
-    /// | with [`Settings::adaptive`] | 40.1 | |
+    /// | with [`Settings::adaptive`] | 48.1 | |
     /// | with an estimate of the pixels, denoised (strategies that learn, [`Settings::adaptive`]) | 20 | |
     ///
-    /// So `classic` takes 96 without auxiliary values, `ears` 172 with albedo, normal and depth, and 260 with the standard set
-    /// ([`AovSet::STANDARD`](crate::unstable::film::AovSet::STANDARD), 17 planes and the cost), which the program asks for. At
-    /// 1920 x 1080 another 2 come to those of `ears` for the denoiser's window of rows, and 12 for the 24 MiB of
-    /// statistics, which are the same for any picture.
+    /// So `classic` takes 96 without auxiliary values, `ears` 172 with albedo, normal and depth, and 260 with the
+    /// standard set ([`AovSet::STANDARD`](crate::unstable::film::AovSet::STANDARD), 17 planes and the cost), which the
+    /// program asks for. At 1920 x 1080 another 2 come to those of `ears` for the denoiser's window of rows, and 12 for
+    /// the 24 MiB of statistics, which are the same for any picture.
     ///
     /// Not in these numbers are 28 bytes of the session for every 1,000 pixels with an estimate of the pixels, for every
     /// 10,000 without: those with most error, while an iteration ends. The rest does not grow with the number of pixels:
@@ -95,7 +95,7 @@ impl Plan {
         let s = self.settings();
         let planes = AovLayout::new(s.aovs).planes as f64;
         let rays = if s.counts_rays() { 4.0 } else { 0.0 };
-        let weights = if s.adaptive { 40.0 + 8.0 / 64.0 } else { 0.0 };
+        let weights = if s.adaptive { 48.0 + 8.0 / 64.0 } else { 0.0 };
         let estimate = match s.needs(self.job.cache).pixels {
             Some(PixelEstimator::Denoised) => 20.0,
             Some(PixelEstimator::Blocks) => 12.0 / 64.0,

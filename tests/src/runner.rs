@@ -87,7 +87,7 @@ pub fn doubling(spp: u32) -> Vec<u32> {
 }
 
 /// Settings for a scene's own camera, `strategy` in the words of the program. Numbers are hashed, not the default, so
-/// that samples are independent, as standard errors of means of pixels take them; what is the program's own
+/// that samples are independent, as [`PixelStats::variance_of_mean`] assumes; what is the program's own
 /// default is tested by those who ask for it.
 pub fn settings(scene: &[u8], strategy: &str) -> Settings {
     let scene = Scene::from_bytes(scene).expect("a valid scene");

@@ -85,8 +85,8 @@ fn the_error_estimate_is_right_on_average() {
 
 /// A diffuse box with strategies that end and split paths. Where roulette or splitting meets every path, packets' combs
 /// make the true error less than the samples' spread says, up to 2.4 times, and so do Sobol' points, up to 4 times: the
-/// halves of the samples show how much, after one iteration as after several. Limits were set beforehand. Killed by: a sum
-/// of squares per path instead of per camera sample, a ratio upside down, halves that share a sequence or a comb's packets.
+/// halves of the samples show how much, after one iteration as after several. Limits were set beforehand. Killed by: a
+/// sum of squares per path instead of per camera sample, a ratio upside down, halves that share a sequence.
 #[test]
 fn the_error_estimate_is_right_with_roulette_and_sobol_points() {
     let scene = blob(&cornell([16, 16]));
@@ -225,8 +225,8 @@ fn ratios(pixels: &[PixelStats]) -> [f64; 3] {
     for (i, p) in pixels.iter().enumerate() {
         let (mean, variance) = (p.mean()[i % 3], p.variance_of_mean()[i % 3]);
         let scale = (mean * mean - 0.9 * variance).max(0.0) + REL_MSE_EPSILON;
-        let (n, ahead) = (p.samples as f64, f64::from(p.ahead));
-        let difference = f64::from(p.difference) - ahead * mean;
+        let (n, ahead) = (p.samples as f64, p.ahead);
+        let difference = p.difference - ahead * mean;
         let [found, stated] = &mut sums[class(p)];
         *found += difference * difference / (n * n - ahead * ahead) / scale;
         *stated += variance / scale;
@@ -236,8 +236,8 @@ fn ratios(pixels: &[PixelStats]) -> [f64; 3] {
 
 /// The discarded pixels are the worst 0.01 %, and every pixel counts by what window and block say. Killed by: a selection that
 /// takes the smallest, or one too many; a block that leaves pixels out or counts them twice, another parity; a window
-/// with its own pixel, or that ends at the block; rows of logarithms of another place, a seam that is not one; halves of another channel, or
-/// of sizes that are taken to be the same.
+/// with its own pixel, or that ends at the block; rows of logarithms of another place, a seam that is not one; halves
+/// of another channel.
 #[test]
 fn the_worst_pixels_are_left_out() {
     let size = [200, 151];

@@ -340,9 +340,9 @@ fn only_suspended_shards_can_be_resumed() {
     session.begin_iteration(2);
     Shard::new(&plan, 0, block.as_mut()).unwrap().suspend();
     let mut tried = 0;
-    for at in (40..600).step_by(4) {
+    for (at, byte) in (40..600).step_by(4).flat_map(|at| [(at, 0xFE), (at, 0xFF)]) {
         let mut broken = block.clone();
-        broken.as_mut()[at..at + 4].fill(0xFE);
+        broken.as_mut()[at..at + 4].fill(byte);
         match Shard::resume(&plan, 0, broken.as_mut()) {
             Ok(mut shard) => (0..4).for_each(|_| {
                 let _ = shard.step(&session, Budget { rays: 500 });

@@ -171,8 +171,8 @@ fn every_pixel_gets_its_samples() {
                 let spp = 3;
                 let image = render(&scene, &Settings { size, shards, ring, ..base }, spp);
                 assert_eq!(image.pixels.len(), (size[0] * size[1]) as usize);
-                let short = image.pixels.iter().position(|p| p.samples != u64::from(spp));
-                assert_eq!(short, None, "{size:?}, {shards} shards, ring {ring}: a pixel without its samples");
+                let wrong = image.pixels.iter().position(|p| (p.samples, p.ahead) != (u64::from(spp), 1.0));
+                assert_eq!(wrong, None, "{size:?}, {shards} shards, ring {ring}: a pixel without its samples");
                 assert_eq!(image.counters.camera_samples, u64::from(spp * size[0] * size[1]));
             }
         }

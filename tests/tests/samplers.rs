@@ -1,4 +1,4 @@
-//! The Sobol' sampler gives the pictures of hashed numbers, with less noise; its iterations are independent.
+//! The Sobol' sampler gives the pictures of hashed numbers, with less noise; its halves are independent.
 
 use croupier::unstable::Sampler;
 use croupier::unstable::profile::{Custom, Profile, WithoutSobol};

@@ -14,6 +14,8 @@ const ITERATIONS: [u32; 3] = [4, 3, 8];
 /// Bytes before what the hash covers, and where the header has other things.
 const UNHASHED: usize = 16;
 const VERSION: usize = 16;
+/// The difference of the first pixel's halves.
+const DIFFERENCE: usize = HEADER + 40;
 const PIXELS: usize = 72;
 const HEADER: usize = 392;
 
@@ -151,7 +153,12 @@ fn shards_that_do_not_belong_are_refused_by_name() {
         }
         // another shard, numbers that are none
         assert_eq!(refused(&mut shards[0], session, bytes), E::Shard { expected: 0, found: 1 });
-        for (at, what) in [(PIXELS, "pixels"), (PIXELS + 16 + 7, "counters of shard"), (HEADER + 7, "pixel")] {
+        for (at, what) in [
+            (PIXELS, "pixels"),
+            (PIXELS + 16 + 7, "counters of shard"),
+            (HEADER + 7, "pixel"),
+            (DIFFERENCE + 3, "pixel"),
+        ] {
             let mut forged = bytes.to_vec();
             forged[at..=at].fill(0xff);
             if what == "pixel" {
@@ -235,7 +242,7 @@ fn forged_bytes_never_panic() {
         assert!(taken > 500, "{taken}");
         if shards[1].load(session, bytes).is_ok() {
             let mut forged = bytes.to_vec();
-            forged[HEADER..HEADER + 40].fill(0x7e);
+            forged[HEADER..HEADER + 48].fill(0x7e);
             seal(&mut forged);
             shards[1].load(session, &forged).unwrap();
         }

@@ -5,10 +5,10 @@ use bytemuck::{Pod, Zeroable};
 /// Estimated relMSE of the picture against its own expectation.
 ///
 /// Camera samples are not independent where roulette or splitting meets every path: one comb rounds the samples of a
-/// packet together, which makes the picture better than its standard errors say, in a diffuse box 2.3 times with
-/// `classic:1`; so do Sobol' points ([`Sampler::Sobol`](crate::unstable::Sampler::Sobol)), there up to 4 times. Two halves
-/// of the samples of each pixel are independent of each other: how much they differ, over what their samples let expect,
-/// corrects the estimate (`core/src/film/independence.rs`), from two samples per pixel on.
+/// packet together, which makes the picture better than its standard errors say, in a diffuse box up to 2.4 times with
+/// `classic:1`; so do Sobol' points ([`Sampler::Sobol`](crate::unstable::Sampler::Sobol)), there up to 4 times. Two
+/// halves of the samples of each pixel are independent of each other: how much they differ, over what their samples let
+/// expect, corrects the estimate (`core/src/film/independence.rs`), from two samples per pixel on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct ErrorEstimate {
@@ -24,8 +24,9 @@ pub struct ErrorEstimate {
     pub at_least: f64,
     /// Mean as of `rel_mse`, over all pixels.
     pub rel_mse_all: f64,
-    /// Variance of the pixels over that of independent samples, measured between the halves of their samples, for pixels whose samples are
-    /// alike and for those that live on few of them apart, and weighted as their errors; 1 while there are too few.
+    /// Variance of the pixels over that of independent samples, measured between the halves of their samples, for
+    /// pixels whose samples are alike and for those that live on few of them apart, and weighted as their errors; 1 while
+    /// there are too few.
     pub independence: f64,
     /// How many pixels would cause the error if each caused as much: (sum q)^2 / sum q^2 over the pixels' contributions q. Few
     /// if the error is that of few fireflies.

@@ -6,9 +6,9 @@ use super::short::short;
 use super::{Film, FilmLayout, FilmScalars};
 use crate::memory::{Carver, Measure, MemoryError};
 
-/// Film of several renders that are independent of each other: every camera sample counts alike, whichever render it is
-/// of, so that the mean is unbiased whatever the renders have learned. Weights by inverse variance would not be: an
-/// estimated variance depends on the samples that it weighs.
+/// Film of several renders whose camera samples are different ones: every camera sample counts alike, whichever render
+/// it is of, so that the mean is unbiased whatever the renders have learned. Weights by inverse variance would not be:
+/// an estimated variance depends on the samples that it weighs.
 #[derive(Debug)]
 pub struct FilmSum<'m> {
     film: Film<'m>,
@@ -41,8 +41,8 @@ impl<'m> FilmSum<'m> {
                 sum: p.sum,
                 spread: p.spread.map(short),
                 samples,
-                difference: p.difference,
-                ahead: p.ahead,
+                difference: p.difference as f32,
+                ahead: p.ahead as i32,
             };
             let planes = film.aovs.planes();
             for (at, value) in row.iter_mut().take(planes).enumerate() {

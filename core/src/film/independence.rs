@@ -1,8 +1,8 @@
 //! How far the samples of pixels are from independent ones, measured from outside. Sobol' points are spread evenly over
-//! a pixel, and the combs of roulette round samples of one packet together, so that the picture is better than the spread of
-//! its samples says. The two halves of a pixel's samples ([`Half`](super::pixel::Half)) are independent of each other,
-//! so the expected squared difference of their sums is the true variance of the sum of both, however samples correlate within
-//! a half and whatever iterations they are of:
+//! a pixel, and the combs of roulette round samples of one packet together, so that the picture is better than the
+//! spread of its samples says. The two halves of a pixel's samples ([`Half`](super::pixel::Half)) are independent of
+//! each other, so the expected squared difference of their sums is the true variance of the sum of both, however
+//! samples correlate within a half and whatever iterations they are of:
 //!
 //! ```text
 //! d = a - b - (n_a - n_b) mean       a, b: sums of the halves, with n_a and n_b samples, n in all
@@ -74,7 +74,7 @@ pub(super) struct Differences {
 impl Differences {
     /// Adds a pixel, whose halves are compared in this channel.
     pub(super) fn add(&mut self, p: &PixelStats, channel: usize) {
-        let (ahead, c) = (f64::from(p.ahead), channel.min(2));
+        let (ahead, c) = (p.ahead, channel.min(2));
         let left = p.weight * p.weight - ahead * ahead;
         // both halves have samples
         if p.samples < 2 || left <= 0.0 {
@@ -82,7 +82,7 @@ impl Differences {
         }
         let (mean, variance) = (p.mean()[c], p.variance_of_mean()[c]);
         let scale = 1.0 / relative_denominator(mean, variance);
-        let d = f64::from(p.difference) - ahead * mean;
+        let d = p.difference - ahead * mean;
         let (found, stated) = (d * d / left * scale, variance * scale);
         self.found += found;
         self.stated += stated;
@@ -94,6 +94,9 @@ impl Differences {
 
 /// Least effective number of pixels that tell a ratio.
 const FEWEST: f64 = 8.0;
+
+/// No samples have a ratio this large; forged ones may.
+const MOST: f64 = 1e30;
 
 /// True variance of the pixels of a class over that of independent samples, and the standard error of this ratio.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -119,7 +122,8 @@ impl Independence {
         let r = d.found / d.stated;
         // variance of what was found, beyond what was expected
         let noise = (a - 2.0 * r * ab + r * r * b).max(0.0).sqrt_newton() / d.stated;
-        if r > 0.0 && r.is_finite() && noise.is_finite() { Self { ratio: r, noise } } else { self }
+        let sound = r > 0.0 && r < MOST && noise < MOST;
+        if sound { Self { ratio: r, noise } } else { self }
     }
 }
 
@@ -172,12 +176,14 @@ mod tests {
                 "{sizes:?}: {} of {truth}",
                 known.ratio * stated
             );
-            assert!(known.noise > 0.0 && known.noise < 0.05 * known.ratio, "{sizes:?}: {known:?}");
+            // two samples show what they state
+            let least = if sizes == [1, 1] && iterations == 1 { 0.0 } else { 1e-6 };
+            assert!(known.noise >= least && known.noise < 0.05 * known.ratio, "{sizes:?}: {known:?}");
         }
     }
 
-    /// Independent samples of which one half has twice as many, and samples with weights, make a ratio of 1. Killed by: a
-    /// difference that is not that of the means, one over the squared sum of weights alone (0.9).
+    /// Independent samples of which one half has twice as many, and samples with weights, make a ratio of 1. Killed by:
+    /// a difference that is not that of the means, one over the squared sum of weights alone (0.9).
     #[test]
     fn unequal_halves_of_independent_samples_have_a_ratio_of_one() {
         let mut random = random(5);

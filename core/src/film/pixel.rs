@@ -14,25 +14,26 @@ pub(crate) struct PixelSums {
     pub spread: [u32; 3],
     /// Number of camera samples, at most 2^32 - 1.
     pub samples: u32,
-    /// Sum of w x in one channel over the samples of the first half ([`Half`]) minus that over those of the second. An
-    /// iteration of more than some million samples loses it to rounding.
+    /// Sum of w x in one channel over the samples of the first half ([`Half`]) minus that over those of the second. In
+    /// an iteration of more than some 100,000 samples rounding adds to it.
     pub difference: f32,
-    /// Sum of w over the samples of the first half minus that over those of the second.
-    pub ahead: f32,
+    /// Number of samples of the first half minus that of the second.
+    pub ahead: i32,
 }
 
 /// Camera samples of a pixel belong to two halves of as many samples, as nearly as can be, which draw random numbers
 /// independently of each other, whatever the samples within a half have to do with each other: the difference of their
 /// means shows the variance of the pixel (independent replicates: Owen, "Randomly permuted (t,m,s)-nets and
-/// (t,s)-sequences", 1995; in pictures "half buffers"). A half goes on from iteration to iteration.
+/// (t,s)-sequences", 1995; in pictures "half buffers"). A half goes on from iteration to iteration. Points that are
+/// spread over half of the samples are worse than over all of them, which is what it costs that the error is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Half {
     First,
     Second,
 }
 
-/// Channel in which the halves of a pixel are compared: noise has much the same size in all three, and one of them costs a
-/// third of the memory.
+/// Channel in which the halves of a pixel are compared: noise has much the same size in all three, and one of them
+/// costs a third of the memory.
 pub(crate) fn compared_channel(film_index: usize) -> usize {
     film_index % 3
 }
@@ -54,16 +55,18 @@ pub(crate) struct PixelWeights {
     pub weight_sqr: f64,
     /// Sum of w^2 (x - mean); 0 if all weights are equal.
     pub cross: [f64; 3],
+    /// Sum of w over the samples of the first half minus that over those of the second.
+    pub ahead: f64,
 }
 
 impl PixelSums {
     /// Adds a camera sample of weight 1; halves are compared in this channel.
     #[inline]
     pub(crate) fn add(&mut self, radiance: [f64; 3], half: Half, channel: usize) {
-        let sign = if half == Half::First { 1.0 } else { -1.0 };
+        let sign = if half == Half::First { 1 } else { -1 };
         let compared = radiance.get(channel).copied().unwrap_or(0.0);
         self.difference = finite(f64::from(self.difference) + f64::from(sign) * compared);
-        self.ahead += sign;
+        self.ahead = self.ahead.saturating_add(sign);
         if self.samples == 0 {
             // a single sample has no deviation
             self.sum.iter_mut().zip(radiance).for_each(|(sum, x)| *sum += x);
@@ -86,7 +89,6 @@ impl PixelSums {
         self.sum.iter().all(|x| x.is_finite())
             && self.spread.iter().all(|x| long(*x).is_finite())
             && self.difference.is_finite()
-            && self.ahead.is_finite()
     }
 
     /// Mean squared difference of the samples from `x` per channel, for one sample of weight 1 at least.
@@ -121,7 +123,7 @@ impl PixelSums {
     fn merge_halves(&mut self, o: &Self, w: f64) {
         self.samples = self.samples.saturating_add(o.samples);
         self.difference = finite(f64::from(self.difference) + w * f64::from(o.difference));
-        self.ahead += w as f32 * o.ahead;
+        self.ahead = self.ahead.saturating_add(o.ahead);
     }
 
     /// Adds the samples of an iteration, each with weight `w`.
@@ -132,6 +134,7 @@ impl PixelSums {
         let (m, w2, before) = (f64::from(o.samples), w * w, *weights);
         weights.weight += w * m;
         weights.weight_sqr += w2 * m;
+        weights.ahead += w * f64::from(o.ahead);
         for c in 0..3 {
             let old = if self.samples == 0 { 0.0 } else { self.sum[c] / before.weight };
             self.sum[c] += w * o.sum[c];
@@ -148,7 +151,8 @@ impl PixelSums {
     /// Statistics of the pixel; `weights` if its samples have weights.
     pub(super) fn stats(&self, weights: Option<&PixelWeights>, rays: u32) -> PixelStats {
         let n = f64::from(self.samples);
-        let (weight, weight_sqr) = weights.map_or((n, n), |w| (w.weight, w.weight_sqr));
+        let alike = (n, n, f64::from(self.ahead));
+        let (weight, weight_sqr, ahead) = weights.map_or(alike, |w| (w.weight, w.weight_sqr, w.ahead));
         PixelStats {
             sum: self.sum,
             spread: self.spread.map(long),
@@ -156,8 +160,8 @@ impl PixelSums {
             weight_sqr,
             samples: u64::from(self.samples),
             rays: u64::from(rays),
-            difference: self.difference,
-            ahead: self.ahead,
+            difference: self.difference.into(),
+            ahead,
         }
     }
 }
@@ -182,9 +186,9 @@ pub struct PixelStats {
     pub rays: u64,
     /// Sum of w x over the first half of the samples minus that over the second, in one channel: that of the pixel's
     /// index in the film, modulo 3. The halves are independent of each other, unlike the samples in each.
-    pub difference: f32,
+    pub difference: f64,
     /// Sum of w over the first half of the samples minus that over the second.
-    pub ahead: f32,
+    pub ahead: f64,
 }
 
 impl PixelStats {

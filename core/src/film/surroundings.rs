@@ -14,13 +14,14 @@
 //! D = max(e^2 - Var e, 0) + 0.01        with 0.9 of the pixel's own part of Var e
 //! ```
 //!
-//! Noise is the mean of the others' variances, c the variance among them beyond it: where there is contrast, pixels are what
-//! their samples say (Lee, "Digital image enhancement and noise filtering by use of local statistics", 1980). Blocks alone
-//! stated half the error where a bright window lies in them, which lends its contrast to all their pixels; windows alone
-//! state three times the error where most pixels have found nothing yet. The second term of w keeps pixels that stand out
-//! beyond their own noise (the positive part of James and Stein, "Estimation with quadratic loss", 1961). The others in the
-//! block are those of other parity in column or row: the pixel is in none of the sums, and nothing is subtracted
-//! (NUMERICS STA-4). k = 1 is the estimate; k = [`DOUBT`](super::others::DOUBT) says how much depends on this choice, which widens the interval.
+//! Noise is the mean of the others' variances, c the variance among them beyond it: where there is contrast, pixels are
+//! what their samples say (Lee, "Digital image enhancement and noise filtering by use of local statistics", 1980).
+//! Blocks alone stated half the error where a bright window lies in them, which lends its contrast to all their pixels;
+//! windows alone state three times the error where most pixels have found nothing yet. The second term of w keeps
+//! pixels that stand out beyond their own noise (the positive part of James and Stein, "Estimation with quadratic
+//! loss", 1961). The others in the block are those of other parity in column or row: the pixel is in none of the sums,
+//! and nothing is subtracted (NUMERICS STA-4). k = 1 is the estimate; k = [`DOUBT`](super::others::DOUBT) says how much
+//! depends on this choice, which widens the interval.
 //!
 //! At edges 1 / D is less than its mean over what the pixel may be; [`super::contrast`] says how much less it may be. The
 //! estimate is halfway in the logarithm, and the interval holds both ends.

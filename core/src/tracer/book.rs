@@ -185,7 +185,7 @@ impl<'m> Bookkeeping<'m> {
             *r = 0;
         }
         self.aovs.clear(slot);
-        self.begun = slot + 1;
+        self.begun = (slot + 1).min(self.pixels.len());
     }
 
     /// Sums, rays and auxiliary sums of pixel `slot` in this iteration; none before it begins.

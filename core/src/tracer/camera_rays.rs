@@ -1,7 +1,7 @@
 //! Camera samples in the order of tiles, halves of their pixels' samples, pixels (Morton) and samples, eight at a time.
-//! Neighbouring lanes are samples of one pixel or of neighbouring pixels, so primary packets are coherent. The halves of
-//! a pixel are a tile's half apart, since combs, which round the samples of one packet together, must not make one depend on
-//! the other ([`Half`]).
+//! Neighbouring lanes are samples of one pixel or of neighbouring pixels, so primary packets are coherent. The halves
+//! of a pixel are a tile's half apart, so that they hardly ever meet in a packet: combs round the samples of one packet
+//! together, and the halves are to be independent ([`Half`]).
 
 use super::book::Bookkeeping;
 use super::job::Job;
@@ -78,11 +78,14 @@ impl CameraCursor {
         CursorRecord { tile: tile.unwrap_or(NO_TILE), first_pixel, pixel, slot, sample, second }
     }
 
-    /// `None` if there is no such tile or slot.
-    pub(super) fn resume(tiles: &Tiles, r: &CursorRecord) -> Option<Self> {
+    /// `None` if shard `index` has no such tile, slot or pixel.
+    pub(super) fn resume(tiles: &Tiles, index: u32, r: &CursorRecord) -> Option<Self> {
         let CursorRecord { tile, first_pixel, pixel, slot, sample, second } = *r;
         let tile = (tile != NO_TILE).then_some(tile);
-        let sound = slot < TILE_PIXELS && tile.is_none_or(|tile| (tile as usize) < tiles.count());
+        let sound = slot < TILE_PIXELS
+            && tile.is_none_or(|tile| (tile as usize) < tiles.count())
+            && first_pixel <= pixel
+            && pixel as usize <= tiles.pixels_of(index);
         let half = if second == 0 { Half::First } else { Half::Second };
         sound.then(|| Self { first_pixel, pixel, slot, sample, half, ..Self::at_tile(tiles, tile) })
     }
@@ -104,8 +107,8 @@ impl CameraCursor {
         self.tile.is_none()
     }
 
-    /// The next camera sample; a finished cursor gives `None`. `samples` is the number per pixel of a tile, and how many of
-    /// them belong to the first half.
+    /// The next camera sample; a finished cursor gives `None`. `samples` is the number per pixel of a tile, and how
+    /// many of them belong to the first half.
     fn next(&mut self, tiles: &Tiles, shard: u32, samples: impl Fn(u32) -> [u32; 2]) -> Option<CameraSample> {
         while let Some(tile) = self.tile {
             let [samples, in_first_half] = samples(tile);
@@ -116,7 +119,7 @@ impl CameraCursor {
             let pixel = tiles.pixel(self.start, self.slot);
             let sample = |at| CameraSample { at, pixel: self.pixel, sample: before + self.sample, half, in_first_half };
             let found = pixel.filter(|_| self.sample < wanted).map(sample);
-            self.sample += 1;
+            self.sample = self.sample.saturating_add(1);
             if found.is_none() || self.sample >= wanted {
                 self.sample = 0;
                 self.pixel += u32::from(pixel.is_some());

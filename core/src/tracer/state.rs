@@ -61,7 +61,7 @@ impl<'m> State<'m> {
     /// Goes on in `iteration` as shard `index` with the slabs and sums that the memory holds; `None` if the record is
     /// not that of such a state.
     pub(crate) fn resume(&mut self, job: &Job, index: u32, iteration: Iteration, r: &StateRecord) -> Option<()> {
-        self.cursor = CameraCursor::resume(&job.tiles, &r.cursor)?;
+        self.cursor = CameraCursor::resume(&job.tiles, index, &r.cursor)?;
         self.ring.resume(&r.ring)?;
         self.book.resume(&r.book)?;
         self.comb = CombNumbers::new(job.settings.seed, iteration.number, index).resume(r.drawn);

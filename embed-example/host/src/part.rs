@@ -78,7 +78,7 @@ struct SavedPixel {
     samples: u32,
     rays: u32,
     difference: f32,
-    ahead: f32,
+    ahead: i32,
     reserved: u32,
 }
 
@@ -87,7 +87,7 @@ impl SavedPixel {
         let short = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
         let spread = p.spread.map(|x| short(x.to_bits() >> 31));
         let (samples, rays) = (short(p.samples), short(p.rays));
-        Self { sum: p.sum, spread, samples, rays, difference: p.difference, ahead: p.ahead, reserved: 0 }
+        Self { sum: p.sum, spread, samples, rays, difference: p.difference as f32, ahead: p.ahead as i32, reserved: 0 }
     }
 
     fn stats(&self) -> PixelStats {
@@ -99,8 +99,8 @@ impl SavedPixel {
             weight_sqr: n,
             samples: self.samples.into(),
             rays: self.rays.into(),
-            difference: self.difference,
-            ahead: self.ahead,
+            difference: self.difference.into(),
+            ahead: self.ahead.into(),
         }
     }
 }

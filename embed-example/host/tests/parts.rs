@@ -58,7 +58,8 @@ fn parts(folder: &Path, scene: Scene<'_>, settings: Settings, spp: u32, of: u32)
 }
 
 /// Without roulette, hashed samples do not depend on combs: parts have those of one render, each once. Killed by: ranges with
-/// gaps or samples in common, sums, spreads, rays or auxiliary values that are lost or added with other weights.
+/// gaps or samples in common, sums, differences of halves, spreads, rays or auxiliary
+/// values that are lost or added with other weights.
 #[test]
 fn parts_have_the_samples_of_one_render() {
     let (bytes, folder) = (cornell(), tempfile::tempdir().unwrap());
@@ -70,7 +71,8 @@ fn parts_have_the_samples_of_one_render() {
         assert_eq!((merged.spp, merged.counters.rays()), (17, whole.counters.rays()));
         let near = |x: f64, y: f64, tolerance: f64| assert!((x - y).abs() <= tolerance * (x.abs() + 1e-9), "{x} {y}");
         for (a, b) in whole.pixels.iter().zip(&merged.pixels) {
-            assert_eq!((a.samples, a.rays), (b.samples, b.rays));
+            assert_eq!((a.samples, a.rays, a.ahead), (b.samples, b.rays, b.ahead));
+            assert!((a.difference - b.difference).abs() <= 1e-6 * (a.sum[0] + a.sum[1] + a.sum[2]));
             for c in 0..3 {
                 near(a.sum[c], b.sum[c], 1e-12);
                 near(a.spread[c], b.spread[c], 1e-5);
