@@ -72,7 +72,9 @@ fn parts_have_the_samples_of_one_render() {
         let near = |x: f64, y: f64, tolerance: f64| assert!((x - y).abs() <= tolerance * (x.abs() + 1e-9), "{x} {y}");
         for (a, b) in whole.pixels.iter().zip(&merged.pixels) {
             assert_eq!((a.samples, a.rays, a.ahead), (b.samples, b.rays, b.ahead));
-            assert!((a.difference - b.difference).abs() <= 1e-6 * (a.sum[0] + a.sum[1] + a.sum[2]));
+            // other iterations divide the same samples otherwise into halves
+            let same = (a.difference - b.difference).abs() <= 1e-6 * (a.sum[0] + a.sum[1] + a.sum[2]);
+            assert!(if of == 1 { same } else { (a.difference == 0.0) == (b.difference == 0.0) });
             for c in 0..3 {
                 near(a.sum[c], b.sum[c], 1e-12);
                 near(a.spread[c], b.spread[c], 1e-5);
