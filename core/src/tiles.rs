@@ -196,6 +196,11 @@ impl Tiles {
         (x < self.size[0] && y < self.size[1]).then_some([x, y])
     }
 
+    /// Number of pixels in a tile.
+    pub(crate) fn area(&self, tile: u32) -> u32 {
+        BlockGrid::tiles(self.size).area(tile)
+    }
+
     /// Film index of a pixel.
     pub(crate) fn film_index(&self, pixel: [u32; 2]) -> usize {
         film_index(self.size, pixel)

@@ -85,8 +85,9 @@ fn the_error_estimate_is_right_on_average() {
 
 /// A diffuse box with strategies that end and split paths. Where roulette or splitting meets every path, packets' combs
 /// make the true error less than the samples' spread says, up to 2.4 times, and so do Sobol' points, up to 4 times: the
-/// halves of the samples show how much, after one iteration as after several. Limits were set beforehand. Killed by: a
-/// sum of squares per path instead of per camera sample, a ratio upside down, halves that share a sequence.
+/// halves of the samples show how much, after one iteration as after several. The limits were set when the first three
+/// rows had run. Killed by: a sum of squares per path instead of per camera sample, a ratio upside down, halves that
+/// share a sequence.
 #[test]
 fn the_error_estimate_is_right_with_roulette_and_sobol_points() {
     let scene = blob(&cornell([16, 16]));

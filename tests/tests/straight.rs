@@ -181,7 +181,7 @@ fn boundaries_around_everything_change_nothing() {
     let air = veiled.add_material("air", Model::Null);
     add_box(&mut veiled, air, [-30.0; 3], [30.0; 3], false);
     add_box(&mut veiled, air, [-0.97; 3], [0.97; 3], false);
-    // what `ears` learns in such small pictures makes its paths 0.9 % (one standard deviation) longer or shorter
+    // what `ears` learns in such small pictures makes its paths longer or shorter, by a percent with one seed or another
     for (strategy, iterations, seeds) in
         [("none", &[512][..], 1), ("classic", &[512], 1), ("fixed:1.7", &[256], 1), ("ears", &[16, 64, 128, 512], 8)]
     {

@@ -30,9 +30,7 @@ pub(super) struct CameraCursor {
     tile: Option<u32>,
     /// First column and row of the current tile.
     start: [u32; 2],
-    /// First pixel of the tile, of the shard's, tile by tile in Morton order.
-    first_pixel: u32,
-    /// Pixel of the shard.
+    /// Pixel of the shard, tile by tile in Morton order.
     pixel: u32,
     /// Slot within the tile.
     slot: u32,
@@ -43,7 +41,7 @@ pub(super) struct CameraCursor {
 
 /// The next camera sample.
 #[derive(Clone, Copy, Debug)]
-struct CameraSample {
+struct NextSample {
     /// Column and row.
     at: [u32; 2],
     /// Number of the pixel in the shard.
@@ -61,33 +59,30 @@ struct CameraSample {
 pub(super) struct CursorRecord {
     /// [`NO_TILE`] if none is left.
     tile: u32,
-    first_pixel: u32,
     pixel: u32,
+    /// [`TILE_PIXELS`] more in the second half.
     slot: u32,
     sample: u32,
-    /// Not 0 in the second half.
-    second: u32,
 }
 
 const NO_TILE: u32 = u32::MAX;
 
 impl CameraCursor {
     pub(super) fn suspend(&self) -> CursorRecord {
-        let Self { tile, first_pixel, pixel, slot, sample, half, .. } = *self;
-        let second = u32::from(half == Half::Second);
-        CursorRecord { tile: tile.unwrap_or(NO_TILE), first_pixel, pixel, slot, sample, second }
+        let Self { tile, pixel, slot, sample, half, .. } = *self;
+        let slot = if half == Half::Second { slot + TILE_PIXELS } else { slot };
+        CursorRecord { tile: tile.unwrap_or(NO_TILE), pixel, slot, sample }
     }
 
     /// `None` if shard `index` has no such tile, slot or pixel.
     pub(super) fn resume(tiles: &Tiles, index: u32, r: &CursorRecord) -> Option<Self> {
-        let CursorRecord { tile, first_pixel, pixel, slot, sample, second } = *r;
+        let CursorRecord { tile, pixel, slot, sample } = *r;
         let tile = (tile != NO_TILE).then_some(tile);
-        let sound = slot < TILE_PIXELS
+        let sound = slot < 2 * TILE_PIXELS
             && tile.is_none_or(|tile| (tile as usize) < tiles.count())
-            && first_pixel <= pixel
             && pixel as usize <= tiles.pixels_of(index);
-        let half = if second == 0 { Half::First } else { Half::Second };
-        sound.then(|| Self { first_pixel, pixel, slot, sample, half, ..Self::at_tile(tiles, tile) })
+        let (half, slot) = if slot < TILE_PIXELS { (Half::First, slot) } else { (Half::Second, slot - TILE_PIXELS) };
+        sound.then(|| Self { pixel, slot, sample, half, ..Self::at_tile(tiles, tile) })
     }
 
     /// At the first sample of the shard's first tile, or of another tile.
@@ -100,7 +95,7 @@ impl CameraCursor {
     }
 
     pub(super) const fn finished() -> Self {
-        Self { tile: None, start: [0; 2], first_pixel: 0, pixel: 0, slot: 0, sample: 0, half: Half::First }
+        Self { tile: None, start: [0; 2], pixel: 0, slot: 0, sample: 0, half: Half::First }
     }
 
     pub(super) fn is_finished(&self) -> bool {
@@ -109,7 +104,7 @@ impl CameraCursor {
 
     /// The next camera sample; a finished cursor gives `None`. `samples` is the number per pixel of a tile, and how
     /// many of them belong to the first half.
-    fn next(&mut self, tiles: &Tiles, shard: u32, samples: impl Fn(u32) -> [u32; 2]) -> Option<CameraSample> {
+    fn next(&mut self, tiles: &Tiles, shard: u32, samples: impl Fn(u32) -> [u32; 2]) -> Option<NextSample> {
         while let Some(tile) = self.tile {
             let [samples, in_first_half] = samples(tile);
             let (half, before, wanted) = match self.half {
@@ -117,7 +112,7 @@ impl CameraCursor {
                 Half::Second => (Half::Second, in_first_half, samples - in_first_half),
             };
             let pixel = tiles.pixel(self.start, self.slot);
-            let sample = |at| CameraSample { at, pixel: self.pixel, sample: before + self.sample, half, in_first_half };
+            let sample = |at| NextSample { at, pixel: self.pixel, sample: before + self.sample, half, in_first_half };
             let found = pixel.filter(|_| self.sample < wanted).map(sample);
             self.sample = self.sample.saturating_add(1);
             if found.is_none() || self.sample >= wanted {
@@ -138,10 +133,10 @@ impl CameraCursor {
     /// Goes on with the second half of a tile, or with the next tile.
     fn next_half(&mut self, tiles: &Tiles, shard: u32, tile: u32) {
         if self.half == Half::First {
-            (self.half, self.pixel, self.slot) = (Half::Second, self.first_pixel, 0);
+            (self.half, self.slot) = (Half::Second, 0);
+            self.pixel = self.pixel.saturating_sub(tiles.area(tile));
         } else {
-            let pixel = self.pixel;
-            *self = Self { first_pixel: pixel, pixel, ..Self::at_tile(tiles, tiles.next_of(shard, tile + 1)) };
+            *self = Self { pixel: self.pixel, ..Self::at_tile(tiles, tiles.next_of(shard, tile + 1)) };
         }
     }
 }
