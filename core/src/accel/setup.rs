@@ -103,7 +103,7 @@ impl Setup {
     /// Rows of a node that hold the near planes of lane `i`; the far ones are at `3 - x`, `5 - y`, `7 - z`.
     #[inline(always)]
     pub(super) fn rows(&self, i: usize) -> [usize; 3] {
-        each(|k| if self.negative[k] >> i & 1 == 1 { k + 3 } else { k })
+        each(|k| k + 3 * (self.negative[k] >> i & 1) as usize)
     }
 
     /// Lanes among `of` with the octant and the major axis of lane `i`.
