@@ -3,7 +3,7 @@
 use super::adaptive::{AllocationScalars, SampleAllocation};
 use super::cache::{BINS, Cache, CacheScalars, NO_BIN, Training, VertexKind8};
 use super::estimate::{EstimateScalars, PixelEstimates};
-use super::guiding::{COMPILED, Guide, GuideLog, GuideScalars, GuideUse, LEARNED, Promise, Watch};
+use super::guiding::{COMPILED, Guide, GuideLog, GuideScalars, GuideUse, LEARNED, Promise, TrialShares, Watch};
 use super::needs::Needs;
 use super::picture::{Picture, PictureStatistics, error_of, outliers};
 use super::settings::{Guiding, Learning, Objective};
@@ -28,6 +28,7 @@ pub struct LearnedState<'m> {
     guide: Option<Guide<'m>>,
     /// Whether guiding pays, if the settings leave that open.
     watch: Watch,
+    trial: TrialShares,
     /// Side of the pixel blocks of statistics over the picture.
     block: u32,
     pixels: PixelEstimates<'m>,
@@ -95,6 +96,7 @@ impl<'m> LearnedState<'m> {
             cache,
             guide: n.guide.filter(|_| COMPILED).map(|size| Guide::carve(c, size, &scalars.guide)).transpose()?,
             watch: scalars.watch,
+            trial: TrialShares::of(n.size),
             block,
             pixels: PixelEstimates::carve(c, n.size, n.pixels, &n.learning, scalars.estimate)?,
             allocation: SampleAllocation::carve(c, n.size, n.adaptive, scalars.allocation)?,
@@ -168,7 +170,7 @@ impl<'m> LearnedState<'m> {
     /// Are samples of the pixel in column and row `at` guided in iteration `iteration`, and learned from?
     #[inline(always)]
     pub(crate) fn is_guided(&self, iteration: u64, at: [u32; 2]) -> bool {
-        !self.watches() || self.watch.is_guided(iteration, at)
+        !self.watches() || self.watch.is_guided(iteration, at, self.trial)
     }
 
     /// How many samples of a pixel are learned from in an iteration.

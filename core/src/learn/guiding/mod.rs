@@ -47,4 +47,4 @@ pub(crate) use shared::GuideScalars;
 pub use shared::{Guide, Guide8};
 pub use size::GuideSize;
 pub use watch::{GuideGain, GuideUse};
-pub(crate) use watch::{LEARNED, Promise, Watch};
+pub(crate) use watch::{LEARNED, Promise, TrialShares, Watch};

@@ -32,10 +32,14 @@ const ENABLED_ABOVE: f64 = 1.12;
 const DOUBT: f64 = 0.25;
 /// Gain below which it is disabled again.
 const DISABLED_BELOW: f64 = 1.06;
-/// Share of the blocks of pixels that are guided while nothing is decided, in 65536ths.
-const TRIED: u32 = 65_536 / 2;
-/// The same after a gain is out of the question.
-const UNPROMISING: u32 = 65_536 / 32;
+/// Pixels that are guided while nothing is decided, and after a gain is out of the question. A guided pixel costs some
+/// of what Sobol' points gain, because its samples have a sequence of their own in each iteration; what they tell of the
+/// gain depends on their number, not on the size of the picture.
+const WANTED: [u64; 2] = [4096, 1024];
+/// Largest shares of the pixels that those may be, in 65536ths.
+const MOST: [u32; 2] = [65_536 / 8, 65_536 / 32];
+/// Least share: light that is rare in the picture must be met somewhere.
+const LEAST: u32 = 65_536 / 256;
 /// Binary logarithm of the edge of a block.
 const BLOCK_BITS: u32 = 3;
 /// Samples before which nothing is decided.
@@ -128,20 +132,27 @@ impl Promise {
 }
 
 /// What is known of the gain, and whether the guide is enabled.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Watch {
     promise: Promise,
     /// Not 0: all pixels are guided.
     enabled: u32,
-    /// Share of the blocks of pixels that are guided while it is 0, in 65536ths.
-    tried: u32,
+    /// Not 0: a gain is out of the question.
+    unpromising: u32,
 }
 
-impl Default for Watch {
-    /// Nothing is known.
-    fn default() -> Self {
-        Self { promise: Promise::default(), enabled: 0, tried: TRIED }
+/// Shares of the blocks of pixels that are guided while the guide is disabled, in 65536ths: see [`WANTED`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TrialShares([u32; 2]);
+
+impl TrialShares {
+    /// Those of a picture of this size.
+    pub(crate) fn of(size: [u32; 2]) -> Self {
+        let pixels = (u64::from(size[0]) * u64::from(size[1])).max(1);
+        let share = |wanted: u64, most| (wanted * 65_536 / pixels).min(u64::from(most)) as u32;
+        let [undecided, unpromising] = WANTED;
+        Self([share(undecided, MOST[0]), share(unpromising, MOST[1])].map(|x| x.max(LEAST)))
     }
 }
 
@@ -155,9 +166,11 @@ impl Watch {
     /// Is the pixel in this column and row guided in iteration `iteration`, and learned from? Blocks, because samples of a
     /// packet are neighbours.
     #[inline]
-    pub(crate) fn is_guided(&self, iteration: u64, [x, y]: [u32; 2]) -> bool {
+    pub(crate) fn is_guided(&self, iteration: u64, [x, y]: [u32; 2], shares: TrialShares) -> bool {
         let block = u64::from(y >> BLOCK_BITS) << 32 | u64::from(x >> BLOCK_BITS);
-        self.enabled() || (mix(mix(block) ^ mix(iteration)) >> 48) < u64::from(self.tried)
+        let [undecided, unpromising] = shares.0;
+        let share = if self.unpromising != 0 { unpromising } else { undecided };
+        self.enabled() || (mix(mix(block) ^ mix(iteration)) >> 48) < u64::from(share)
     }
 
     /// Adds what a shard has found.
@@ -175,7 +188,7 @@ impl Watch {
         if let Some(GuideGain { gain, error }) = self.gain() {
             let least = if self.enabled() { DISABLED_BELOW } else { ENABLED_ABOVE };
             self.enabled = (gain * (1.0 - DOUBT * error) > least).into();
-            self.tried = if gain * (1.0 + 2.0 * error) < DISABLED_BELOW { UNPROMISING } else { TRIED };
+            self.unpromising = (gain * (1.0 + 2.0 * error) < DISABLED_BELOW).into();
         }
         self.promise = self.promise.times(decay);
     }
@@ -236,11 +249,29 @@ mod tests {
         assert!(!decided(enabled, &promise(400_000, 2.0)).enabled());
         let rejected = decided(Watch::default(), &promise(100_000, 2.0));
         let open = decided(Watch::default(), &Promise::default());
-        for (watch, share) in [(enabled, 65_536), (rejected, UNPROMISING), (open, TRIED)] {
-            let tried = (0..1u32 << 20).filter(|i| watch.is_guided(7, [i % 1024, i / 1024])).count();
-            let (share, tried) = (f64::from(share) / 65_536.0, tried as f64 / f64::from(1 << 20));
-            // 16,384 blocks: four standard deviations are 0.011
-            assert!((tried - share).abs() < 0.011, "{tried}, not {share}");
+        for size in [[128, 128], [320, 200], [1024, 1024]] {
+            let shares = TrialShares::of(size);
+            let [undecided, unpromising] = shares.0.map(|x| f64::from(x) / 65_536.0);
+            for (watch, share) in [(enabled, 1.0), (rejected, unpromising), (open, undecided)] {
+                let tried = (0..1u32 << 20).filter(|i| watch.is_guided(7, [i % 1024, i / 1024], shares)).count();
+                let tried = tried as f64 / f64::from(1 << 20);
+                // of 16,384 blocks
+                let deviation = (share * (1.0 - share) / 16_384.0).sqrt();
+                assert!((tried - share).abs() <= 4.0 * deviation, "{tried}, not {share}");
+            }
+        }
+    }
+
+    /// Killed by: a bound that does not hold, pixels of the two exchanged, a product that overflows.
+    #[test]
+    fn as_many_pixels_are_tried_in_pictures_of_any_size() {
+        let pixels =
+            |size: [u32; 2]| TrialShares::of(size).0.map(|x| u64::from(x) * u64::from(size[0] * size[1]) / 65_536);
+        assert_eq!(pixels([512, 256]), [4096, 1024]);
+        assert_eq!(pixels([128, 64]), [1024, 256], "no more than an eighth, a thirty-second");
+        assert_eq!(pixels([2048, 1024]), [8192, 8192], "no less than one in 256");
+        for size in [[0, 0], [1, 1], [u32::MAX; 2]] {
+            assert!(TrialShares::of(size).0.iter().all(|x| (256..=8192).contains(x)), "{size:?}");
         }
     }
 }
