@@ -37,7 +37,7 @@ const DISABLED_BELOW: f64 = 1.06;
 /// gain depends on their number, not on the size of the picture.
 const WANTED: [u64; 2] = [4096, 1024];
 /// Largest shares of the pixels that those may be, in 65536ths.
-const MOST: [u32; 2] = [65_536 / 8, 65_536 / 32];
+const MOST: [u32; 2] = [65_536 / 2, 65_536 / 32];
 /// Least share: light that is rare in the picture must be met somewhere.
 const LEAST: u32 = 65_536 / 256;
 /// Binary logarithm of the edge of a block.
@@ -268,10 +268,10 @@ mod tests {
         let pixels =
             |size: [u32; 2]| TrialShares::of(size).0.map(|x| u64::from(x) * u64::from(size[0] * size[1]) / 65_536);
         assert_eq!(pixels([512, 256]), [4096, 1024]);
-        assert_eq!(pixels([128, 64]), [1024, 256], "no more than an eighth, a thirty-second");
+        assert_eq!(pixels([64, 64]), [2048, 128], "no more than a half, a thirty-second");
         assert_eq!(pixels([2048, 1024]), [8192, 8192], "no less than one in 256");
         for size in [[0, 0], [1, 1], [u32::MAX; 2]] {
-            assert!(TrialShares::of(size).0.iter().all(|x| (256..=8192).contains(x)), "{size:?}");
+            assert!(TrialShares::of(size).0.iter().all(|x| (256..=32_768).contains(x)), "{size:?}");
         }
     }
 }
