@@ -255,9 +255,9 @@ mod tests {
             for (watch, share) in [(enabled, 1.0), (rejected, unpromising), (open, undecided)] {
                 let tried = (0..1u32 << 20).filter(|i| watch.is_guided(7, [i % 1024, i / 1024], shares)).count();
                 let tried = tried as f64 / f64::from(1 << 20);
-                // of 16,384 blocks
-                let deviation = (share * (1.0 - share) / 16_384.0).sqrt();
-                assert!((tried - share).abs() <= 4.0 * deviation, "{tried}, not {share}");
+                // four standard deviations of a share of 16,384 blocks
+                let variance = share * (1.0 - share) / 16_384.0;
+                assert!((tried - share).powi(2) <= 16.0 * variance, "{tried}, not {share}");
             }
         }
     }
