@@ -32,9 +32,9 @@ const ENABLED_ABOVE: f64 = 1.12;
 const DOUBT: f64 = 0.25;
 /// Gain below which it is disabled again.
 const DISABLED_BELOW: f64 = 1.06;
-/// Pixels that are guided while nothing is decided, and after a gain is out of the question. A guided pixel costs some
-/// of what Sobol' points gain, because its samples have a sequence of their own in each iteration; what they tell of the
-/// gain depends on their number, not on the size of the picture.
+/// Pixels that are guided while nothing is decided, and after a gain is out of the question, within the bounds [`MOST`]
+/// and [`LEAST`]. A guided pixel costs some of what Sobol' points gain, because its samples have a sequence of their own
+/// in each iteration; what they tell of the gain depends on their number, not on the size of the picture.
 const WANTED: [u64; 2] = [4096, 1024];
 /// Largest shares of the pixels that those may be, in 65536ths.
 const MOST: [u32; 2] = [65_536 / 2, 65_536 / 32];
@@ -264,7 +264,7 @@ mod tests {
 
     /// Killed by: a bound that does not hold, pixels of the two exchanged, a product that overflows.
     #[test]
-    fn as_many_pixels_are_tried_in_pictures_of_any_size() {
+    fn as_many_pixels_are_tried_in_pictures_of_most_sizes() {
         let pixels =
             |size: [u32; 2]| TrialShares::of(size).0.map(|x| u64::from(x) * u64::from(size[0] * size[1]) / 65_536);
         assert_eq!(pixels([512, 256]), [4096, 1024]);
