@@ -28,6 +28,7 @@ pub struct LearnedState<'m> {
     guide: Option<Guide<'m>>,
     /// Whether guiding pays, if the settings leave that open.
     watch: Watch,
+    /// Follows from `size`; every camera sample reads it.
     trial: TrialShares,
     /// Side of the pixel blocks of statistics over the picture.
     block: u32,

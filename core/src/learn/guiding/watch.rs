@@ -44,8 +44,8 @@ const LEAST: u32 = 65_536 / 256;
 const BLOCK_BITS: u32 = 3;
 /// Samples before which nothing is decided.
 const FEWEST: f64 = 256.0;
-/// Samples of a guided pixel that are learned from in each iteration, at least: a choice. 8 learn too little where light is hard to
-/// find, 64 cost more.
+/// Samples of a guided pixel that are learned from in each iteration, at least: a choice. 8 learn too little where light
+/// is hard to find, 64 cost more.
 pub(crate) const LEARNED: u32 = 16;
 
 /// Whether path guiding pays, as [`Guiding::Auto`](crate::unstable::learn::Guiding::Auto) predicts it.
