@@ -72,6 +72,8 @@ pub struct SessionState<'m> {
     learned: LearnedState<'m>,
     /// Content hash of the scene.
     scene: u64,
+    /// [`Records::highlight`](crate::scene::Records::highlight) of the scene.
+    highlight: f32,
     epoch: u64,
     iteration: Iteration,
     running: bool,
@@ -205,6 +207,7 @@ impl<'s, P: Profile, I: Intersector, L: LightSelector, X: Extension> SessionBuil
             running: scalars.running != 0,
             max_depth: s.max_depth.min(MAX_PATH_LENGTH),
             scene: scene.hash,
+            highlight: scene.highlight,
             camera_media: scalars.camera_media,
         };
         let mut session = Session { scene, intersector, selector, extension, state, profile };
@@ -453,7 +456,8 @@ impl<'m> SessionState<'m> {
     ) -> Result<(), SessionError> {
         check_effects::<P, X>(&to.scene)?;
         self.restart(keep_statistics);
-        (self.scene, self.camera_media) = (to.scene.hash, camera_media::<P, I>(&to.scene, &to.intersector));
+        (self.scene, self.highlight) = (to.scene.hash, to.scene.highlight);
+        self.camera_media = camera_media::<P, I>(&to.scene, &to.intersector);
         Ok(())
     }
 

@@ -111,6 +111,7 @@ pub(crate) fn scene<R>(f: impl FnOnce(&Scene<'_>) -> R) -> R {
         names: &[],
         // nothing that light may pass
         effects: Effects(!Effects::STRAIGHT.0),
+        highlight: 0.0,
         hash: 1,
     }))
 }

@@ -30,6 +30,7 @@ pub(crate) fn none<'s>(info: &'s SceneInfo, camera: &'s Camera) -> Records<'s> {
         instances: &[],
         names: &[],
         effects: Effects::default(),
+        highlight: 0.0,
         hash: 0,
     }
 }

@@ -37,6 +37,8 @@ pub struct EditableScene<B> {
     bytes: B,
     table: SectionTable,
     effects: Effects,
+    /// [`Records::highlight`].
+    highlight: f32,
     /// [`Records::hash`], changed by edits.
     identity: u64,
     /// Largest values of the environment map.
@@ -57,9 +59,10 @@ impl<B: AsRef<[u8]>> EditableScene<B> {
     /// The first fault found.
     pub fn new(bytes: B) -> Result<Self, SceneError> {
         let (scene, table) = Scene::validated(bytes.as_ref())?;
-        let (effects, identity, brightest) = (scene.effects, scene.hash, check::brightest(&scene));
+        let (effects, highlight) = (scene.effects, scene.highlight);
+        let (identity, brightest) = (scene.hash, check::brightest(&scene));
         let sky = sky(&scene);
-        Ok(Self { bytes, table, effects, identity, brightest, sky, relit: false })
+        Ok(Self { bytes, table, effects, highlight, identity, brightest, sky, relit: false })
     }
 
     /// The scene as it is now; an empty one with a hash of 0 if the container does not give the bytes any more, or not at
@@ -67,7 +70,8 @@ impl<B: AsRef<[u8]>> EditableScene<B> {
     pub fn scene(&self) -> Scene<'_> {
         let sections = Sections::assume_sound(self.table, self.bytes.as_ref());
         let records = Scene::records(&sections);
-        let changed = |records| Records { effects: self.effects, hash: self.identity, ..records };
+        let changed =
+            |records| Records { effects: self.effects, highlight: self.highlight, hash: self.identity, ..records };
         Scene::assume_valid(records.map_or(Records::NOTHING, changed))
     }
 
@@ -91,11 +95,13 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> EditableScene<B> {
             bytes: self.bytes.as_mut(),
             table: &self.table,
             effects: &mut self.effects,
+            highlight: &mut self.highlight,
             identity: &mut self.identity,
             brightest: self.brightest,
             sky: self.sky,
             relit: &mut self.relit,
             lights_changed: false,
+            materials_changed: false,
             lights_moved: false,
             world_moved: false,
             moved_within: None,
@@ -147,11 +153,13 @@ pub struct SceneEdit<'a> {
     pub(super) bytes: &'a mut [u8],
     pub(super) table: &'a SectionTable,
     pub(super) effects: &'a mut Effects,
+    highlight: &'a mut f32,
     identity: &'a mut u64,
     brightest: [f32; 3],
     sky: [f64; 3],
     relit: &'a mut bool,
     pub(super) lights_changed: bool,
+    pub(super) materials_changed: bool,
     /// Lights have other places.
     pub(super) lights_moved: bool,
     /// An instance of the world has moved.
@@ -321,6 +329,11 @@ impl SceneEdit<'_> {
 impl Drop for SceneEdit<'_> {
     fn drop(&mut self) {
         self.settle_moves(None);
+        if (self.lights_changed || self.materials_changed)
+            && let Some(scene) = self.records()
+        {
+            *self.highlight = check::highlight(&scene, self.brightest);
+        }
         if self.lights_changed {
             self.relight();
         } else if self.lights_moved {

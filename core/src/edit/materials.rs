@@ -64,6 +64,7 @@ impl SceneEdit<'_> {
         };
         self.write(of, index, &material);
         *self.effects = self.effects.with(effects);
+        self.materials_changed = true;
         Ok(())
     }
 }

@@ -28,6 +28,10 @@ pub struct ErrorEstimate {
     /// pixels whose samples are alike and for those that live on few of them apart, and weighted as their errors; 1 while
     /// there are too few.
     pub independence: f64,
+    /// What `rel_mse` would grow by, on average over the pixels, if one more camera sample showed the brightest light of the
+    /// scene in a mirror or another narrow lobe: no light sample finds that, and few camera samples may. 0 without such
+    /// surfaces, and in pictures of 40,000 pixels and more, whose worst pixels are left out.
+    pub highlight: f64,
     /// How many pixels would cause the error if each caused as much: (sum q)^2 / sum q^2 over the pixels' contributions q. Few
     /// if the error is that of few fireflies.
     pub effective_pixels: f64,
@@ -35,13 +39,17 @@ pub struct ErrorEstimate {
 
 /// Fewest effective pixels of an error that is told from samples.
 const RESOLVED: f64 = 64.0;
+/// Most that one highlight may be of it.
+const HIGHLIGHT: f64 = 0.1;
 
 impl ErrorEstimate {
-    /// Whether the samples tell the error: 64 effective pixels or more. If fewer cause most of what is found (heavy tails),
-    /// more of their kind are probably not found yet, or one that is found counts for more than it is: then the error is
-    /// `at_least` so large, and `low` and `high` mean nothing. Pictures of less than some hundred pixels are never resolved.
+    /// Whether the samples tell the error: 64 effective pixels or more, and no single highlight that is not found yet would
+    /// make it more than a tenth larger. If fewer pixels cause most of what is found (heavy tails), more of their kind are
+    /// probably not found yet, or one that is found counts for more than it is; and a picture without the sun in a tap does
+    /// not know of the few that have it. Then the error is `at_least` so large, and `low` and `high` mean nothing. Pictures
+    /// of less than some hundred pixels are never resolved.
     pub fn is_resolved(&self) -> bool {
-        self.effective_pixels >= RESOLVED
+        self.effective_pixels >= RESOLVED && self.highlight <= HIGHLIGHT * self.rel_mse
     }
 
     /// 95 % confidence interval of `rel_mse`; `None` where the samples do not tell it.

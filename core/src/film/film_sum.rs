@@ -54,12 +54,13 @@ impl<'m> FilmSum<'m> {
         film.end_merge();
     }
 
-    /// The film, with the estimated error of the picture.
+    /// The film, with the estimated error of the picture; highlights that were not found
+    /// ([`ErrorEstimate::highlight`](super::ErrorEstimate::highlight)) are not thought of.
     pub fn finish(&mut self) -> &Film<'m> {
         let Self { film, largest } = self;
         let mut errors = film.begin_errors();
         film.show_errors(0, usize::MAX, &mut errors, largest);
-        film.estimate_error(&mut errors, largest, u64::MAX);
+        film.estimate_error(&mut errors, largest, u64::MAX, 0.0);
         film
     }
 }

@@ -46,6 +46,10 @@ use independence::{CLASSES, Differences, Independence, class};
 use pixel::PixelWeights;
 use surroundings::{SIDE, Span, UNSURE_SHARE, relative_errors};
 
+/// Pixels with most error that must be left out for single highlights that were not found not to matter: they would be
+/// among them, and where there are many of a kind one was found.
+const FORGIVEN: u64 = 4;
+
 /// What a film holds of each pixel besides its mean and error.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FilmLayout {
@@ -304,7 +308,8 @@ impl<'m> Film<'m> {
                 let mut of_classes = [0.0; CLASSES];
                 of_classes[class] = e.error;
                 let [a, b, c] = of_classes;
-                s.show([ratio * e.error, ratio * e.other, ratio * e.contrast, ratio * e.unsure, a, b, c], largest);
+                let [error, other, contrast, unsure] = [e.error, e.other, e.contrast, e.unsure].map(|x| ratio * x);
+                s.show([error, other, contrast, unsure, e.highlight, a, b, c], largest);
                 pixels += 1;
             });
             blocks += 1;
@@ -318,19 +323,26 @@ impl<'m> Film<'m> {
     }
 
     /// Estimates the error from the sums that have seen all pixels, without the outliers, in pieces as of
-    /// [`TrimmedSums::end`]. Work, and whether it is estimated.
-    pub(crate) fn estimate_error(&mut self, t: &mut TrimmedSums, largest: &mut [u32], limit: u64) -> (u64, bool) {
+    /// [`TrimmedSums::end`]. `highlight` is that of the scene
+    /// ([`Records::highlight`](crate::unstable::scene::Records::highlight)). Work, and whether it is estimated.
+    pub(crate) fn estimate_error(
+        &mut self,
+        t: &mut TrimmedSums,
+        largest: &mut [u32],
+        limit: u64,
+        highlight: f32,
+    ) -> (u64, bool) {
         let (work, done) = t.end(Self::outliers(self.pixels.len() as u64), limit, largest);
         if done {
-            self.set_error(t);
+            self.set_error(t, highlight.into());
         }
         (work, done)
     }
 
     /// Sets the estimated error from sums without the outliers.
-    fn set_error(&mut self, t: &TrimmedSums) {
+    fn set_error(&mut self, t: &TrimmedSums, highlight: f64) {
         let m = t.count.max(1) as f64;
-        let [mean, other, contrast, unsure, of_classes @ ..] = t.sums.map(|x| x / m);
+        let [mean, other, contrast, unsure, of_highlight, of_classes @ ..] = t.sums.map(|x| x / m);
         let noise =
             self.scalars.independence.iter().zip(of_classes).map(|(i, x)| i.noise * i.noise * x * x).sum::<f64>();
         let spread = (t.sum_sqr / m - mean * mean).max(0.0) / m + noise;
@@ -346,6 +358,10 @@ impl<'m> Film<'m> {
             at_least: (mean - unsure - contrast).max(0.0),
             rel_mse_all: (t.sums[0] + t.rest) / self.pixels.len().max(1) as f64,
             independence: if known && independent > 0.0 { mean / independent } else { Independence::UNKNOWN.ratio },
+            highlight: match Self::outliers(self.pixels.len() as u64) {
+                0..FORGIVEN => highlight * highlight * of_highlight / m,
+                _ => 0.0,
+            },
             effective_pixels: if t.sum_sqr > 0.0 { t.sums[0] * t.sums[0] / t.sum_sqr } else { m },
         };
     }

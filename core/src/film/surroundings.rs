@@ -137,6 +137,8 @@ pub(super) struct PixelError {
     pub contrast: f32,
     /// What of it is unsure because of the pixel's own noise.
     pub unsure: f32,
+    /// Error that a sample of radiance 1 in each channel would be if nothing else had been found: 1 / (n^2 D).
+    pub highlight: f32,
     /// Class of the pixel by the spread of its samples.
     pub class: usize,
 }
@@ -190,30 +192,38 @@ impl Row {
         }
     }
 
-    /// Shows the errors of `columns` pixels.
+    /// Shows the errors of `columns` pixels, of which a sample has this part in the mean.
     fn show<'a>(
         &self,
-        columns: usize,
+        (columns, part): (usize, f32),
         window: impl Iterator<Item = &'a Line> + Clone,
         mut show: impl FnMut(PixelError),
     ) {
         let rises: [[f32; PADDED]; 3] = core::array::from_fn(|c| self.line.root_of_rise(c, columns, window.clone()));
         let third = F32x8::splat(1.0 / 3.0);
         for from in (0..columns).step_by(8) {
-            let mut sums = [F32x8::ZERO; 4];
-            for ([errors, others], rise) in self.errors.iter().zip(&rises) {
+            let mut sums = [F32x8::ZERO; 5];
+            for (c, ([errors, others], rise)) in self.errors.iter().zip(&rises).enumerate() {
                 let (q, other, rise) = (eight(errors, from), eight(others, from), eight(rise, from));
                 let error = q * rise;
                 let unsure = error * (error / (error + UNSURE));
-                for (sum, x) in sums.iter_mut().zip([error, other * rise, (error * rise - q).abs(), unsure]) {
+                let highlight = self.line.inverses(c, from) * (part * part);
+                let all = [error, other * rise, (error * rise - q).abs(), unsure, highlight];
+                for (sum, x) in sums.iter_mut().zip(all) {
                     *sum += x * third;
                 }
             }
-            let [error, other, contrast, unsure] = sums.map(F32x8::to_array);
+            let [error, other, contrast, unsure, highlight] = sums.map(F32x8::to_array);
             let classes: [u8; 8] = self.classes.get(from..).and_then(|c| c.first_chunk()).copied().unwrap_or_default();
             for i in 0..(columns - from).min(8) {
-                let [error, other, contrast, unsure] = [error[i], other[i], contrast[i], unsure[i]];
-                show(PixelError { error, other, contrast, unsure, class: classes[i].into() });
+                show(PixelError {
+                    error: error[i],
+                    other: other[i],
+                    contrast: contrast[i],
+                    unsure: unsure[i],
+                    highlight: highlight[i],
+                    class: classes[i].into(),
+                });
             }
         }
     }
@@ -286,6 +296,9 @@ pub(super) fn relative_errors(
 ) {
     let block = of_block([x, y], &pixel);
     let columns = (x.to - x.from) as usize;
+    // the same in all pixels, but where an iteration was stopped early
+    let weight = pixel(x.from, y.from).weight;
+    let part = if weight > 0.0 { (1.0 / weight) as f32 } else { 0.0 };
     let reached = columns + 2 * REACH as usize;
     // the first column that windows reach is at 0 if the picture has it
     let first = (x.reach().start + REACH - x.from) as usize;
@@ -330,7 +343,7 @@ pub(super) fn relative_errors(
         while next < complete {
             let window = next.saturating_sub(REACH).max(y.from)..(next + REACH + 1).min(y.to);
             let lines = window.map(|r| &known[r as usize % ROWS].line);
-            known[next as usize % ROWS].show(columns, lines, &mut show);
+            known[next as usize % ROWS].show((columns, part), lines, &mut show);
             next += 1;
         }
     }

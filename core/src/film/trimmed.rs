@@ -6,7 +6,7 @@
 use bytemuck::{Pod, Zeroable};
 
 /// Numbers of an entry.
-pub(super) const WIDTH: usize = 7;
+pub(super) const WIDTH: usize = 8;
 
 /// An entry as the heap has it: bits of floats.
 type Entry = [u32; WIDTH];
@@ -167,7 +167,7 @@ fn put(entries: &mut [Entry], at: usize, entry: Entry) {
 #[cfg(test)]
 mod tests {
     extern crate std;
-    use super::TrimmedSums;
+    use super::{TrimmedSums, WIDTH};
     use std::vec;
     use std::vec::Vec;
 
@@ -175,7 +175,9 @@ mod tests {
         let mut heap = vec![7; TrimmedSums::heap_len(k)];
         let mut s = TrimmedSums::new(k);
         for (i, x) in values.iter().enumerate() {
-            s.show([*x, i as f32, 0.0, 0.0, 0.0, 0.0, 0.0], &mut heap);
+            let mut entry = [0.0; WIDTH];
+            (entry[0], entry[1]) = (*x, i as f32);
+            s.show(entry, &mut heap);
         }
         assert!(s.end(k, u64::MAX, &mut heap).1);
         s
@@ -220,7 +222,7 @@ mod tests {
                 assert!((s.sums[0] - kept).abs() <= 1e-12 * kept);
                 let places = values.iter().enumerate().filter(|(_, x)| **x < s.limit).map(|(i, _)| i as f64);
                 assert_eq!(s.sums[1], places.sum::<f64>(), "{k}");
-                assert_eq!(s.sums[2..], [0.0; 5]);
+                assert_eq!(s.sums[2..], [0.0; WIDTH - 2]);
             }
         }
     }
@@ -229,8 +231,8 @@ mod tests {
     /// that gives away its largest.
     #[test]
     fn fewer_are_left_out_of_fewer() {
-        let (mut s, mut heap) = (TrimmedSums::new(5), [0; 35]);
-        [4.0, 1.0, 5.0, 2.0, 6.0, 3.0].iter().for_each(|x| s.show([*x; 7], &mut heap));
+        let (mut s, mut heap) = (TrimmedSums::new(5), [0; 5 * WIDTH]);
+        [4.0, 1.0, 5.0, 2.0, 6.0, 3.0].iter().for_each(|x| s.show([*x; WIDTH], &mut heap));
         assert!(s.end(2, u64::MAX, &mut heap).1);
         assert_eq!((s.count, s.sums[0], s.rest, s.limit), (4, 10.0, 11.0, 5.0));
     }
@@ -243,7 +245,7 @@ mod tests {
         for (room, shown, k) in [(1000, 700, 1), (600, 1000, 600), (600, 1000, 40), (9, 5, 9), (0, 5, 0)] {
             let mut heap = vec![7; TrimmedSums::heap_len(room)];
             let mut s = TrimmedSums::new(room);
-            values.iter().take(shown).for_each(|x| s.show([*x; 7], &mut heap));
+            values.iter().take(shown).for_each(|x| s.show([*x; WIDTH], &mut heap));
             let (mut whole, mut same) = (s, heap.clone());
             let (all, done) = whole.end(k, u64::MAX, &mut same);
             assert!(done && all >= s.held.saturating_sub(k), "{all} of {room}");

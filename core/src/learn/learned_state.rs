@@ -373,7 +373,7 @@ impl<'m> LearnedState<'m> {
     pub(crate) fn show_error(&self, film: usize, sums: &PixelSums, s: &mut TrimmedSums, largest: &mut [u32]) {
         if sums.samples > 0 {
             let error = error_of(film as u32, sums, self.learning.norm, &self.pixels, &self.allocation);
-            s.show([error, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], largest);
+            s.show([error, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], largest);
         }
     }
 

@@ -55,6 +55,9 @@ pub struct Records<'s> {
     pub names: &'s [u8],
     /// Effects that the scene calls for: of the materials that triangles use, of lights and camera.
     pub effects: Effects,
+    /// Largest radiance, of any channel, that mirrors and other narrow lobes may show of the emitters that rays can meet,
+    /// where no light sample stands in for it; 0 without such lobes.
+    pub highlight: f32,
     /// [`content_hash`] of the blob.
     pub hash: u64,
 }
@@ -87,6 +90,7 @@ impl<'s> Records<'s> {
             instances: &[],
             names: &[],
             effects: Effects(0),
+            highlight: 0.0,
             hash: 0,
         }
     }

@@ -53,7 +53,7 @@ impl<'s> Scene<'s> {
     fn checked(bytes: &'s [u8]) -> Result<(Self, SectionTable), SceneError> {
         let sections = Sections::new(bytes)?;
         let mut records = Self::records(&sections)?;
-        records.effects = validate::scene(&records)?;
+        (records.effects, records.highlight) = validate::scene(&records)?;
         Ok((Self(records), sections.table()))
     }
 
@@ -92,6 +92,7 @@ impl<'s> Scene<'s> {
             instances: sections.records(SectionKind::Instances)?,
             names: sections.records(SectionKind::Names)?,
             effects: Effects::default(),
+            highlight: 0.0,
             hash: sections.table().hash,
         })
     }

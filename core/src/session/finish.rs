@@ -374,7 +374,7 @@ impl SessionState<'_> {
             *at += blocks;
             return 1 + n * RAYS_PER_ESTIMATED;
         }
-        let (work, done) = self.film.estimate_error(sums, self.largest, rays);
+        let (work, done) = self.film.estimate_error(sums, self.largest, rays, self.highlight);
         if done {
             self.next_stage();
         }

@@ -29,7 +29,7 @@ use std::{error, fmt};
 pub const MAGIC: [u8; 8] = *b"CRPCHKPT";
 
 /// Version of the layout of this module.
-const LAYOUT: u32 = 2;
+const LAYOUT: u32 = 3;
 
 /// Most bytes of the text and most records that are read.
 const MAX_TEXT: u64 = 1 << 16;
@@ -68,7 +68,7 @@ struct SavedIteration {
     seconds: [f64; 5],
     counters: Counters,
     picture: PictureStatistics,
-    error: [f64; 7],
+    error: [f64; 8],
     leaves: u64,
     subdivisions_refused: u64,
 }
@@ -76,14 +76,15 @@ struct SavedIteration {
 impl From<&IterationRecord> for SavedIteration {
     fn from(i: &IterationRecord) -> Self {
         let nothing = PictureStatistics { variance: f64::NAN, ..PictureStatistics::default() };
-        let ErrorEstimate { rel_mse, low, high, at_least, rel_mse_all, independence, effective_pixels } = i.error;
+        let ErrorEstimate { rel_mse, low, high, at_least, rel_mse_all, independence, highlight, effective_pixels } =
+            i.error;
         Self {
             samples: i.work.samples.into(),
             rays: i.work.rays,
             seconds: [i.work.seconds, i.tracing, i.merging, i.estimating, i.learning],
             counters: i.counters,
             picture: i.picture.unwrap_or(nothing),
-            error: [rel_mse, low, high, at_least, rel_mse_all, independence, effective_pixels],
+            error: [rel_mse, low, high, at_least, rel_mse_all, independence, highlight, effective_pixels],
             leaves: i.cache.map_or(u64::MAX, |c| c.leaves.into()),
             subdivisions_refused: i.cache.map_or(0, |c| c.subdivisions_refused),
         }
@@ -93,7 +94,7 @@ impl From<&IterationRecord> for SavedIteration {
 impl From<SavedIteration> for IterationRecord {
     fn from(s: SavedIteration) -> Self {
         let [seconds, tracing, merging, estimating, learning] = s.seconds;
-        let [rel_mse, low, high, at_least, rel_mse_all, independence, effective_pixels] = s.error;
+        let [rel_mse, low, high, at_least, rel_mse_all, independence, highlight, effective_pixels] = s.error;
         let cache = u32::try_from(s.leaves).ok();
         Self {
             work: Work { samples: u32::try_from(s.samples).unwrap_or(u32::MAX), rays: s.rays, seconds },
@@ -104,7 +105,16 @@ impl From<SavedIteration> for IterationRecord {
             learning,
             picture: Some(s.picture).filter(|p| !p.variance.is_nan()),
             cache: cache.map(|leaves| CacheRecord { leaves, subdivisions_refused: s.subdivisions_refused }),
-            error: ErrorEstimate { rel_mse, low, high, at_least, rel_mse_all, independence, effective_pixels },
+            error: ErrorEstimate {
+                rel_mse,
+                low,
+                high,
+                at_least,
+                rel_mse_all,
+                independence,
+                highlight,
+                effective_pixels,
+            },
         }
     }
 }

@@ -6,11 +6,12 @@ use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError, SectionFault};
 use crate::scene::{Effects, Records};
 
-/// Effects of a sound environment, and whether it emits.
+/// Effects of a sound environment, whether it emits, and the largest values of its map by channel.
 #[derive(Default)]
 pub(super) struct Found {
     pub effects: Effects,
     pub emits: bool,
+    pub brightest: [f32; 3],
 }
 
 /// The environment, if any, and that its sections have the sizes it calls for.
@@ -34,7 +35,7 @@ pub(super) fn environment(scene: &Records<'_>) -> Result<Found, SceneError> {
     }
     at.all_within(Field::Emission, &e.radiance, 0.0, MAX_EMISSION)?;
     if map.is_none() {
-        return Ok(Found { effects, emits: e.radiance != [0.0; 3] });
+        return Ok(Found { effects, emits: e.radiance != [0.0; 3], brightest: [0.0; 3] });
     }
     rotation(at, e)?;
     at.side(Field::Width, e.width, 1)?;
@@ -53,7 +54,8 @@ pub(super) fn environment(scene: &Records<'_>) -> Result<Found, SceneError> {
     if tables != 0 {
         self::tables(scene.env_alias, e)?;
     }
-    Ok(Found { effects, emits: brightest.iter().zip(&e.radiance).any(|(texel, scale)| texel * scale > 0.0) })
+    let emits = brightest.iter().zip(&e.radiance).any(|(texel, scale)| texel * scale > 0.0);
+    Ok(Found { effects, emits, brightest })
 }
 
 /// Another rotation and scale of the environment, where `brightest` are the map's largest values by channel.

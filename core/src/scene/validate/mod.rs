@@ -5,6 +5,7 @@
 mod alias;
 mod environment;
 mod geometry;
+mod highlight;
 mod instances;
 mod light_tree;
 mod lights;
@@ -20,8 +21,9 @@ use crate::scene::effects::Effects;
 use crate::scene::records::Records;
 use record::{Record, cross, dot64};
 
-/// Validates all records of a scene whose sections are sound; returns the effects that it calls for.
-pub(super) fn scene(scene: &Records<'_>) -> Result<Effects, SceneError> {
+/// Validates all records of a scene whose sections are sound; returns the effects that it calls for, and
+/// [`Records::highlight`].
+pub(super) fn scene(scene: &Records<'_>) -> Result<(Effects, f32), SceneError> {
     info(scene.info)?;
     let camera = camera(scene.camera)?;
     names(scene)?;
@@ -36,7 +38,8 @@ pub(super) fn scene(scene: &Records<'_>) -> Result<Effects, SceneError> {
     lights::table(scene, environment.emits)?;
     light_tree::light_tree(scene)?;
     tree::tree(scene)?;
-    Ok(surfaces.with(instances).with(lights).with(environment.effects).with(camera))
+    let effects = surfaces.with(instances).with(lights).with(environment.effects).with(camera);
+    Ok((effects, highlight::highlight(scene, environment.brightest)))
 }
 
 /// Effects that the materials of a validated scene call for, whether or not triangles have them.
@@ -91,6 +94,11 @@ pub(crate) mod single {
 
     pub(crate) fn brightest(scene: &Records<'_>) -> [f32; 3] {
         environment::brightest(scene)
+    }
+
+    /// [`Records::highlight`]; takes a pass over materials and lights.
+    pub(crate) fn highlight(scene: &Records<'_>, brightest: [f32; 3]) -> f32 {
+        highlight::highlight(scene, brightest)
     }
 }
 
