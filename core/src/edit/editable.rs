@@ -101,7 +101,6 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> EditableScene<B> {
             sky: self.sky,
             relit: &mut self.relit,
             lights_changed: false,
-            materials_changed: false,
             lights_moved: false,
             world_moved: false,
             moved_within: None,
@@ -159,7 +158,6 @@ pub struct SceneEdit<'a> {
     sky: [f64; 3],
     relit: &'a mut bool,
     pub(super) lights_changed: bool,
-    pub(super) materials_changed: bool,
     /// Lights have other places.
     pub(super) lights_moved: bool,
     /// An instance of the world has moved.
@@ -309,6 +307,13 @@ impl SceneEdit<'_> {
             *self.identity ^= RELIT;
         }
         self.refit_light_tree();
+        self.find_highlight();
+    }
+
+    /// Finds what narrow lobes may show now, in a pass over materials and lights.
+    pub(super) fn find_highlight(&mut self) {
+        let found = self.records().map(|scene| check::highlight(&scene, self.brightest));
+        *self.highlight = found.unwrap_or(0.0);
     }
 
     /// Makes the nodes of the light tree say what the lights are now. Which lights hang together stays.
@@ -329,11 +334,6 @@ impl SceneEdit<'_> {
 impl Drop for SceneEdit<'_> {
     fn drop(&mut self) {
         self.settle_moves(None);
-        if (self.lights_changed || self.materials_changed)
-            && let Some(scene) = self.records()
-        {
-            *self.highlight = check::highlight(&scene, self.brightest);
-        }
         if self.lights_changed {
             self.relight();
         } else if self.lights_moved {

@@ -64,7 +64,7 @@ impl SceneEdit<'_> {
         };
         self.write(of, index, &material);
         *self.effects = self.effects.with(effects);
-        self.materials_changed = true;
+        self.find_highlight();
         Ok(())
     }
 }

@@ -61,12 +61,6 @@ impl Line {
         }
     }
 
-    /// 1 / D of eight pixels of channel `c` from `at` on.
-    #[inline(always)]
-    pub(super) fn inverses(&self, c: usize, at: usize) -> F32x8 {
-        (-eight(&self.denominator[c % 3], at)).exp()
-    }
-
     /// Roots of D / D' of channel `c` of the row, of `columns` columns; `window` are the rows that it is seen with, it
     /// among them.
     // once, not unrolled over the channels

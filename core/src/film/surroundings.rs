@@ -32,6 +32,7 @@
 //! `intervals`.
 
 use super::contrast::{LARGEST, LONGEST, Line, PADDED, REACH, eight};
+use super::error::relative_denominator;
 use super::independence::class;
 use super::others::{Others, denominators};
 use super::pixel::PixelStats;
@@ -137,7 +138,8 @@ pub(super) struct PixelError {
     pub contrast: f32,
     /// What of it is unsure because of the pixel's own noise.
     pub unsure: f32,
-    /// Error that a sample of radiance 1 in each channel would be if nothing else had been found: 1 / (n^2 D).
+    /// Error that one sample of radiance 1 in each channel would add to those of the n that have found nothing like it:
+    /// 1 / (n^2 D), with D of the mean of the pixel's block.
     pub highlight: f32,
     /// Class of the pixel by the spread of its samples.
     pub class: usize,
@@ -192,28 +194,26 @@ impl Row {
         }
     }
 
-    /// Shows the errors of `columns` pixels, of which a sample has this part in the mean.
+    /// Shows the errors of `columns` pixels with this `highlight`.
     fn show<'a>(
         &self,
-        (columns, part): (usize, f32),
+        (columns, highlight): (usize, f32),
         window: impl Iterator<Item = &'a Line> + Clone,
         mut show: impl FnMut(PixelError),
     ) {
         let rises: [[f32; PADDED]; 3] = core::array::from_fn(|c| self.line.root_of_rise(c, columns, window.clone()));
         let third = F32x8::splat(1.0 / 3.0);
         for from in (0..columns).step_by(8) {
-            let mut sums = [F32x8::ZERO; 5];
-            for (c, ([errors, others], rise)) in self.errors.iter().zip(&rises).enumerate() {
+            let mut sums = [F32x8::ZERO; 4];
+            for ([errors, others], rise) in self.errors.iter().zip(&rises) {
                 let (q, other, rise) = (eight(errors, from), eight(others, from), eight(rise, from));
                 let error = q * rise;
                 let unsure = error * (error / (error + UNSURE));
-                let highlight = self.line.inverses(c, from) * (part * part);
-                let all = [error, other * rise, (error * rise - q).abs(), unsure, highlight];
-                for (sum, x) in sums.iter_mut().zip(all) {
+                for (sum, x) in sums.iter_mut().zip([error, other * rise, (error * rise - q).abs(), unsure]) {
                     *sum += x * third;
                 }
             }
-            let [error, other, contrast, unsure, highlight] = sums.map(F32x8::to_array);
+            let [error, other, contrast, unsure] = sums.map(F32x8::to_array);
             let classes: [u8; 8] = self.classes.get(from..).and_then(|c| c.first_chunk()).copied().unwrap_or_default();
             for i in 0..(columns - from).min(8) {
                 show(PixelError {
@@ -221,7 +221,7 @@ impl Row {
                     other: other[i],
                     contrast: contrast[i],
                     unsure: unsure[i],
-                    highlight: highlight[i],
+                    highlight,
                     class: classes[i].into(),
                 });
             }
@@ -287,6 +287,13 @@ fn of_block([x, y]: [Span; 2], pixel: &impl Fn(u32, u32) -> PixelStats) -> OfBlo
     out
 }
 
+/// 1 / D of the mean of a block, mean over channels.
+fn inverse(block: &OfBlock) -> f64 {
+    // what others say of the block's even pixels
+    let [channels, _] = block;
+    channels.iter().map(|[others, _]| relative_denominator(others.mean, 0.0).recip()).sum::<f64>() / 3.0
+}
+
 /// Shows the relative squared errors of the pixels of a block, row by row. `pixel` gives those at a column and row of the
 /// picture; it is asked for each pixel twice, and for those that windows reach.
 pub(super) fn relative_errors(
@@ -298,7 +305,7 @@ pub(super) fn relative_errors(
     let columns = (x.to - x.from) as usize;
     // the same in all pixels, but where an iteration was stopped early
     let weight = pixel(x.from, y.from).weight;
-    let part = if weight > 0.0 { (1.0 / weight) as f32 } else { 0.0 };
+    let highlight = if weight > 0.0 { (inverse(&block) / (weight * weight)) as f32 } else { 0.0 };
     let reached = columns + 2 * REACH as usize;
     // the first column that windows reach is at 0 if the picture has it
     let first = (x.reach().start + REACH - x.from) as usize;
@@ -343,7 +350,7 @@ pub(super) fn relative_errors(
         while next < complete {
             let window = next.saturating_sub(REACH).max(y.from)..(next + REACH + 1).min(y.to);
             let lines = window.map(|r| &known[r as usize % ROWS].line);
-            known[next as usize % ROWS].show((columns, part), lines, &mut show);
+            known[next as usize % ROWS].show((columns, highlight), lines, &mut show);
             next += 1;
         }
     }

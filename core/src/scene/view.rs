@@ -53,7 +53,8 @@ impl<'s> Scene<'s> {
     fn checked(bytes: &'s [u8]) -> Result<(Self, SectionTable), SceneError> {
         let sections = Sections::new(bytes)?;
         let mut records = Self::records(&sections)?;
-        (records.effects, records.highlight) = validate::scene(&records)?;
+        records.effects = validate::scene(&records)?;
+        records.highlight = validate::single::highlight(&records, validate::single::brightest(&records));
         Ok((Self(records), sections.table()))
     }
 

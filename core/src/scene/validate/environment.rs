@@ -6,12 +6,11 @@ use crate::scene::blob::*;
 use crate::scene::error::{Field, SceneError, SectionFault};
 use crate::scene::{Effects, Records};
 
-/// Effects of a sound environment, whether it emits, and the largest values of its map by channel.
+/// Effects of a sound environment, and whether it emits.
 #[derive(Default)]
 pub(super) struct Found {
     pub effects: Effects,
     pub emits: bool,
-    pub brightest: [f32; 3],
 }
 
 /// The environment, if any, and that its sections have the sizes it calls for.
@@ -35,7 +34,7 @@ pub(super) fn environment(scene: &Records<'_>) -> Result<Found, SceneError> {
     }
     at.all_within(Field::Emission, &e.radiance, 0.0, MAX_EMISSION)?;
     if map.is_none() {
-        return Ok(Found { effects, emits: e.radiance != [0.0; 3], brightest: [0.0; 3] });
+        return Ok(Found { effects, emits: e.radiance != [0.0; 3] });
     }
     rotation(at, e)?;
     at.side(Field::Width, e.width, 1)?;
@@ -54,8 +53,7 @@ pub(super) fn environment(scene: &Records<'_>) -> Result<Found, SceneError> {
     if tables != 0 {
         self::tables(scene.env_alias, e)?;
     }
-    let emits = brightest.iter().zip(&e.radiance).any(|(texel, scale)| texel * scale > 0.0);
-    Ok(Found { effects, emits, brightest })
+    Ok(Found { effects, emits: brightest.iter().zip(&e.radiance).any(|(texel, scale)| texel * scale > 0.0) })
 }
 
 /// Another rotation and scale of the environment, where `brightest` are the map's largest values by channel.
@@ -70,6 +68,8 @@ pub(super) fn placement(e: &Environment, brightest: [f32; 3]) -> Result<(), Scen
 }
 
 /// Largest values of the map by channel.
+// once: for the size of modules and firmware
+#[inline(never)]
 pub(super) fn brightest(scene: &Records<'_>) -> [f32; 3] {
     let mut brightest = [0.0f32; 3];
     for texel in scene.env_texels {

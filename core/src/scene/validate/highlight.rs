@@ -24,23 +24,62 @@ pub(super) fn highlight(scene: &Records<'_>, brightest: [f32; 3]) -> f32 {
             [r * x, g * y, b * z]
         }
     });
-    let met = |l: &&Light| LightKind::from_u32(l.kind).is_some_and(|k| k == LightKind::Area || k.has_shape());
-    let lights = scene.lights.iter().filter(met).flat_map(|l| &l.emission);
-    sky.iter().chain(lights).fold(0.0, |all, x| x.max(all))
+    let mut all = 0.0;
+    let lights = scene.lights.iter().filter(|l| has(MET, l.kind)).map(|l| l.emission);
+    for rgb in lights.chain([sky]) {
+        for x in rgb {
+            if x > all {
+                all = x;
+            }
+        }
+    }
+    all
 }
 
 /// Has a material a lobe that is narrow? Textures that make it so count as if they did.
 fn is_narrow(scene: &Records<'_>, m: &Material) -> bool {
-    let Some(kind) = MaterialKind::from_u32(m.kind) else { return false };
-    let has = |p: Parameter| kind.facts().parameters.contains(&p);
-    if has(Parameter::Principled) {
-        let Some([r]) = PrincipledRecord::read::<1>(scene.tables, m.table) else { return false };
-        let textured = r.textures.get(PrincipledTexture::MetalRough as usize).is_some_and(|t| t.texture != NONE);
-        return textured || r.roughness * r.roughness < NARROW || (r.coat > 0.0 && r.coat_alpha < NARROW);
-    }
-    if has(Parameter::Alpha) {
+    if has(WITH_WIDTH, m.kind) {
         return m.alpha < NARROW;
     }
-    // what has no width is smooth; the boundary of a medium, which has no parameter, shows what is behind it
-    has(Parameter::RelativeEta) || has(Parameter::ComplexEta) || kind == MaterialKind::Mirror
+    let record = if has(LAYERED_KINDS, m.kind) { PrincipledRecord::read::<1>(scene.tables, m.table) } else { None };
+    let Some([r]) = record else { return has(SMOOTH, m.kind) };
+    let textured = r.textures.get(PrincipledTexture::MetalRough as usize).is_some_and(|t| t.texture != NONE);
+    textured || r.roughness * r.roughness < NARROW || (r.coat > 0.0 && r.coat_alpha < NARROW)
 }
+
+/// Is a kind in a set of bits?
+fn has(set: u32, kind: u32) -> bool {
+    kind < u32::BITS && set >> kind & 1 != 0
+}
+
+/// Kinds of lights that rays meet, but for the environment.
+const MET: u32 = {
+    let (mut bits, mut rest) = (1 << LightKind::Area as u32, LightKind::ALL);
+    while let [kind, others @ ..] = rest {
+        bits |= (kind.has_shape() as u32) << *kind as u32;
+        rest = others;
+    }
+    bits
+};
+
+/// Kinds of materials with a GGX width, and those with a refractive index.
+const BY_PARAMETERS: [u32; 2] = {
+    let ([mut width, mut index], mut rest) = ([0, 0], MaterialKind::ALL);
+    while let [kind, others @ ..] = rest {
+        let mut parameters = kind.facts().parameters;
+        while let [parameter, more @ ..] = parameters {
+            width |= (matches!(parameter, Parameter::Alpha) as u32) << *kind as u32;
+            index |= (matches!(parameter, Parameter::RelativeEta | Parameter::ComplexEta) as u32) << *kind as u32;
+            parameters = more;
+        }
+        rest = others;
+    }
+    [width, index]
+};
+
+/// Kinds of materials with a GGX width.
+const WITH_WIDTH: u32 = BY_PARAMETERS[0];
+
+/// Kinds of materials that are smooth where they have no width. The boundary of a medium, which has no parameter, shows
+/// what is behind it.
+const SMOOTH: u32 = BY_PARAMETERS[1] | 1 << MaterialKind::Mirror as u32;

@@ -21,9 +21,8 @@ use crate::scene::effects::Effects;
 use crate::scene::records::Records;
 use record::{Record, cross, dot64};
 
-/// Validates all records of a scene whose sections are sound; returns the effects that it calls for, and
-/// [`Records::highlight`].
-pub(super) fn scene(scene: &Records<'_>) -> Result<(Effects, f32), SceneError> {
+/// Validates all records of a scene whose sections are sound; returns the effects that it calls for.
+pub(super) fn scene(scene: &Records<'_>) -> Result<Effects, SceneError> {
     info(scene.info)?;
     let camera = camera(scene.camera)?;
     names(scene)?;
@@ -38,8 +37,7 @@ pub(super) fn scene(scene: &Records<'_>) -> Result<(Effects, f32), SceneError> {
     lights::table(scene, environment.emits)?;
     light_tree::light_tree(scene)?;
     tree::tree(scene)?;
-    let effects = surfaces.with(instances).with(lights).with(environment.effects).with(camera);
-    Ok((effects, highlight::highlight(scene, environment.brightest)))
+    Ok(surfaces.with(instances).with(lights).with(environment.effects).with(camera))
 }
 
 /// Effects that the materials of a validated scene call for, whether or not triangles have them.
