@@ -115,9 +115,10 @@ fn edits_change_it() {
     edit(0.02, 3.0, 1.0, 3.0);
 }
 
-/// A wall of mean 1/2 and something smooth behind it, in a sky of radiance 1: one sample of it in a pixel of n would be an
-/// error of (1/n)^2 / (1/4 + 0.01) there. Killed by: an error of the whole picture in each pixel, n in place of its
-/// square, samples of the last iteration alone, a picture of 40,000 pixels that has worst ones to leave out.
+/// A wall of mean 1/2 with something smooth behind it and a lamp of radiance 3.5: a sample of that in a pixel of n would be
+/// an error of (3/n)^2 / (1/4 + 0.01) there. Killed by: an error of the whole picture in each pixel, n or L in place of their
+/// squares, a highlight that replaces nothing, samples of the last iteration alone, a picture of 40,000 pixels that has
+/// worst ones to leave out.
 #[test]
 fn one_highlight_more_is_told() {
     let of = |size: [u32; 2], iterations: &[u32]| {
@@ -126,19 +127,23 @@ fn one_highlight_more_is_told() {
         add_quad(&mut s, "wall", wall, facing_z(1.0, 0.0, 1.0));
         let mirror = s.add_material("mirror", Model::Mirror { reflectance: WHITE });
         add_quad(&mut s, "mirror", mirror, facing_z(0.1, -1.0, 1.0));
+        // behind the wall, turned away from it
+        let lamp = s.add_material("lamp", grey(0.0));
+        add_quad(&mut s, "lamp", lamp, facing_z(0.1, -2.0, -1.0));
+        s.emitters.push(Emitter::Area { material: lamp, radiance: [3.5; 3] });
         let scene = blob(&s);
         scheduled(&scene, &settings(&scene, "none"), iterations, Schedule::InOrder(1 << 20)).error
     };
     for (size, iterations, n) in [([32, 32], &[16][..], 16.0), ([40, 20], &[4, 12, 16], 32.0)] {
         let e = of(size, iterations);
-        let expected = 1.0 / (n * n * 0.26 * f64::from(size[0] * size[1]));
+        let expected = 9.0 / (n * n * 0.26 * f64::from(size[0] * size[1]));
         assert!((e.highlight / expected - 1.0).abs() < 0.05, "{} for {expected}", e.highlight);
     }
     assert!(of([199, 201], &[2]).highlight > 0.0);
     assert_eq!(of([200, 200], &[2]).highlight, 0.0);
 }
 
-/// A small bright lamp, and something smooth leave the error of a picture open
+/// A small bright lamp and something smooth leave the error of a picture open
 /// until there are enough samples. Without anything smooth they do not. Killed by: a flag that the highlight does not reach.
 #[test]
 fn bright_lamps_in_mirrors_leave_the_error_open() {

@@ -68,7 +68,7 @@ fn film(k: &mut Kernels) -> Outcome {
         ..PixelStats::default()
     };
     (0..8).for_each(|_| sum.add(sample, |_, _| 0.0));
-    for (i, p) in sum.finish().pixels().enumerate() {
+    for (i, p) in sum.finish(0.0).pixels().enumerate() {
         close("mean of a pixel", p.mean()[0], 0.1 * i as f64, 1e-15)?;
         expect(p.samples == 8, "samples of a pixel")?;
     }

@@ -15,6 +15,9 @@ impl SceneEdit<'_> {
     /// A material that goes over to a kind without tables, or without that record, loses the place of those that it had, and cannot
     /// go back.
     ///
+    /// Takes a pass over the materials and, where any is smooth, over the lights
+    /// ([`Records::highlight`](crate::unstable::scene::Records::highlight)).
+    ///
     /// The effects of the scene grow by those of the material and never shrink: a session must have a profile with them.
     ///
     /// # Errors

@@ -28,9 +28,10 @@ pub struct ErrorEstimate {
     /// pixels whose samples are alike and for those that live on few of them apart, and weighted as their errors; 1 while
     /// there are too few.
     pub independence: f64,
-    /// What `rel_mse` would grow by, on average over the pixels, if one more camera sample showed the brightest light of the
-    /// scene in a mirror or another narrow lobe: no light sample finds that, and few camera samples may. 0 without such
-    /// surfaces, and in pictures of 40,000 pixels and more, whose worst pixels are left out.
+    /// What `rel_mse` would grow by, on average over the pixels, if one of the camera samples had shown the brightest light
+    /// of the scene in a mirror or another narrow lobe
+    /// ([`Records::highlight`](crate::unstable::scene::Records::highlight)): no light sample finds that, and few camera samples
+    /// may. 0 without such surfaces, and in pictures of 40,000 pixels and more, whose worst pixels are left out.
     pub highlight: f64,
     /// How many pixels would cause the error if each caused as much: (sum q)^2 / sum q^2 over the pixels' contributions q. Few
     /// if the error is that of few fireflies.
@@ -45,9 +46,9 @@ const HIGHLIGHT: f64 = 0.1;
 impl ErrorEstimate {
     /// Whether the samples tell the error: 64 effective pixels or more, and no single highlight that is not found yet would
     /// make it more than a tenth larger. If fewer pixels cause most of what is found (heavy tails), more of their kind are
-    /// probably not found yet, or one that is found counts for more than it is; and a picture without the sun in a tap does
-    /// not know of the few that have it. Then the error is `at_least` so large, and `low` and `high` mean nothing. Pictures
-    /// of less than some hundred pixels are never resolved.
+    /// probably not found yet, or one that is found counts for more than it is; and a picture in which no sample has found
+    /// the lamp's reflection in a chrome tap knows nothing of it. Then the error is `at_least` so large, and `low` and
+    /// `high` mean nothing. Pictures of less than some hundred pixels are never resolved.
     pub fn is_resolved(&self) -> bool {
         self.effective_pixels >= RESOLVED && self.highlight <= HIGHLIGHT * self.rel_mse
     }
@@ -95,7 +96,7 @@ pub(super) fn relative_denominator(mean: f64, variance: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Killed by: an interval of what is not resolved.
+    /// Killed by: an interval of what is not resolved, for want of pixels or for a highlight.
     #[test]
     fn what_is_not_resolved_has_no_interval() {
         let e =
@@ -103,6 +104,8 @@ mod tests {
         assert_eq!(e.interval(), Some([1.0, 3.0]));
         let few = ErrorEstimate { effective_pixels: RESOLVED - 1.0, ..e };
         assert_eq!(few.interval(), None);
+        let with = |highlight: f64| ErrorEstimate { rel_mse: 1.0, highlight, ..e }.interval();
+        assert_eq!((with(0.11), with(0.09)), (None, Some([1.0, 3.0])));
     }
 
     /// Killed by: all of the variance taken off where a pixel has found its light once.

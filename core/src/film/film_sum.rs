@@ -54,13 +54,13 @@ impl<'m> FilmSum<'m> {
         film.end_merge();
     }
 
-    /// The film, with the estimated error of the picture; highlights that were not found
-    /// ([`ErrorEstimate::highlight`](super::ErrorEstimate::highlight)) are not thought of.
-    pub fn finish(&mut self) -> &Film<'m> {
+    /// The film, with the estimated error of the picture; `highlight` is that of the scene
+    /// ([`Records::highlight`](crate::unstable::scene::Records::highlight)).
+    pub fn finish(&mut self, highlight: f32) -> &Film<'m> {
         let Self { film, largest } = self;
         let mut errors = film.begin_errors();
-        film.show_errors(0, usize::MAX, &mut errors, largest);
-        film.estimate_error(&mut errors, largest, u64::MAX, 0.0);
+        film.show_errors(0, usize::MAX, &mut errors, largest, highlight);
+        film.estimate_error(&mut errors, largest, u64::MAX);
         film
     }
 }

@@ -46,8 +46,8 @@ use independence::{CLASSES, Differences, Independence, class};
 use pixel::PixelWeights;
 use surroundings::{SIDE, Span, UNSURE_SHARE, relative_errors};
 
-/// Pixels with most error that must be left out for single highlights that were not found not to matter: they would be
-/// among them, and where there are many of a kind one was found.
+/// From this many pixels with most error that are left out on, a highlight that was not found does not matter: up to so many
+/// would be among them, and of more one would have been found.
 const FORGIVEN: u64 = 4;
 
 /// What a film holds of each pixel besides its mean and error.
@@ -297,12 +297,20 @@ impl<'m> Film<'m> {
         TrimmedSums::heap_len(Self::outliers(pixels as u64))
     }
 
-    /// Shows the errors of pixels from block `at` on, some `limit` pixels. Blocks and pixels shown.
-    pub(crate) fn show_errors(&self, at: u64, limit: usize, s: &mut TrimmedSums, largest: &mut [u32]) -> [u64; 2] {
+    /// Shows the errors of pixels from block `at` on, some `limit` pixels. `highlight` is that of the scene
+    /// ([`Records::highlight`](crate::unstable::scene::Records::highlight)). Blocks and pixels shown.
+    pub(crate) fn show_errors(
+        &self,
+        at: u64,
+        limit: usize,
+        s: &mut TrimmedSums,
+        largest: &mut [u32],
+        highlight: f32,
+    ) -> [u64; 2] {
         let (mut blocks, mut pixels) = (0, 0);
         while pixels < limit as u64 && at + blocks < self.blocks() {
             let pixel = |x: u32, y: u32| self.pixel(y as usize * self.size[0] as usize + x as usize);
-            relative_errors(self.block(at + blocks), pixel, |e| {
+            relative_errors(self.block(at + blocks), highlight, pixel, |e| {
                 let class = e.class % CLASSES;
                 let ratio = self.scalars.independence[class].ratio as f32;
                 let mut of_classes = [0.0; CLASSES];
@@ -323,26 +331,19 @@ impl<'m> Film<'m> {
     }
 
     /// Estimates the error from the sums that have seen all pixels, without the outliers, in pieces as of
-    /// [`TrimmedSums::end`]. `highlight` is that of the scene
-    /// ([`Records::highlight`](crate::unstable::scene::Records::highlight)). Work, and whether it is estimated.
-    pub(crate) fn estimate_error(
-        &mut self,
-        t: &mut TrimmedSums,
-        largest: &mut [u32],
-        limit: u64,
-        highlight: f32,
-    ) -> (u64, bool) {
+    /// [`TrimmedSums::end`]. Work, and whether it is estimated.
+    pub(crate) fn estimate_error(&mut self, t: &mut TrimmedSums, largest: &mut [u32], limit: u64) -> (u64, bool) {
         let (work, done) = t.end(Self::outliers(self.pixels.len() as u64), limit, largest);
         if done {
-            self.set_error(t, highlight.into());
+            self.set_error(t);
         }
         (work, done)
     }
 
     /// Sets the estimated error from sums without the outliers.
-    fn set_error(&mut self, t: &TrimmedSums, highlight: f64) {
+    fn set_error(&mut self, t: &TrimmedSums) {
         let m = t.count.max(1) as f64;
-        let [mean, other, contrast, unsure, of_highlight, of_classes @ ..] = t.sums.map(|x| x / m);
+        let [mean, other, contrast, unsure, highlight, of_classes @ ..] = t.sums.map(|x| x / m);
         let noise =
             self.scalars.independence.iter().zip(of_classes).map(|(i, x)| i.noise * i.noise * x * x).sum::<f64>();
         let spread = (t.sum_sqr / m - mean * mean).max(0.0) / m + noise;
@@ -359,7 +360,7 @@ impl<'m> Film<'m> {
             rel_mse_all: (t.sums[0] + t.rest) / self.pixels.len().max(1) as f64,
             independence: if known && independent > 0.0 { mean / independent } else { Independence::UNKNOWN.ratio },
             highlight: match Self::outliers(self.pixels.len() as u64) {
-                0..FORGIVEN => highlight * highlight * of_highlight / m,
+                0..FORGIVEN => highlight / m,
                 _ => 0.0,
             },
             effective_pixels: if t.sum_sqr > 0.0 { t.sums[0] * t.sums[0] / t.sum_sqr } else { m },

@@ -11,7 +11,7 @@ pub(super) const DOUBT: f64 = 4.0;
 #[derive(Clone, Copy, Default)]
 pub(super) struct Others {
     pub pixels: f64,
-    pub mean: f64,
+    mean: f64,
     /// Variance among them beyond their noise.
     contrast: f64,
     /// Mean of their variances.

@@ -32,7 +32,6 @@
 //! `intervals`.
 
 use super::contrast::{LARGEST, LONGEST, Line, PADDED, REACH, eight};
-use super::error::relative_denominator;
 use super::independence::class;
 use super::others::{Others, denominators};
 use super::pixel::PixelStats;
@@ -138,8 +137,8 @@ pub(super) struct PixelError {
     pub contrast: f32,
     /// What of it is unsure because of the pixel's own noise.
     pub unsure: f32,
-    /// Error that one sample of radiance 1 in each channel would add to those of the n that have found nothing like it:
-    /// 1 / (n^2 D), with D of the mean of the pixel's block.
+    /// What one more of its n samples would add if it were a highlight of radiance L: (L - m)^2 / (n^2 D), 0 where the mean m
+    /// is above L.
     pub highlight: f32,
     /// Class of the pixel by the spread of its samples.
     pub class: usize,
@@ -150,20 +149,23 @@ pub(super) struct PixelError {
 struct Row {
     /// Variances over D, and over that with the other k, by channel and pixel.
     errors: [[[f32; PADDED]; 2]; 3],
+    /// (L - m)^2 / D, sums over the channels.
+    highlights: [f32; PADDED],
     classes: [u8; PADDED],
     line: Line,
 }
 
 impl Row {
-    const EMPTY: Self = Self { errors: [[[0.0; PADDED]; 2]; 3], classes: [0; PADDED], line: Line::EMPTY };
+    const EMPTY: Self =
+        Self { errors: [[[0.0; PADDED]; 2]; 3], highlights: [0.0; PADDED], classes: [0; PADDED], line: Line::EMPTY };
 
     /// Computes channel `c` of the row's first `columns` pixels. `own` is the row's values; `others` and `all` are the sums
     /// by column over the other rows of the windows and over all of their rows; `pixels` is the number of other pixels in
-    /// each window; `block` is what the block says of even and of odd columns, counted from its first.
+    /// each window; `block` is what the block says of even and of odd columns, counted from its first; `highlight` is L.
     #[inline(always)]
     fn set(
         &mut self,
-        (c, columns): (usize, usize),
+        (c, columns, highlight): (usize, usize, f32),
         own: &Seen,
         [others, all]: [&Sums; 2],
         pixels: &Columns,
@@ -191,13 +193,15 @@ impl Row {
             };
             (to[i], to_other[i]) = (error(d), error(other));
             (line[i], line_left[i]) = (if d < LARGEST { d } else { LARGEST } as f32, left as f32);
+            let above = highlight - m as f32;
+            self.highlights[i] += if above > 0.0 { above * above / line[i] } else { 0.0 };
         }
     }
 
-    /// Shows the errors of `columns` pixels with this `highlight`.
+    /// Shows the errors of `columns` pixels, of whose mean a sample is this part.
     fn show<'a>(
         &self,
-        (columns, highlight): (usize, f32),
+        (columns, part): (usize, f32),
         window: impl Iterator<Item = &'a Line> + Clone,
         mut show: impl FnMut(PixelError),
     ) {
@@ -214,6 +218,7 @@ impl Row {
                 }
             }
             let [error, other, contrast, unsure] = sums.map(F32x8::to_array);
+            let highlight = (eight(&self.highlights, from) * third * (part * part)).to_array();
             let classes: [u8; 8] = self.classes.get(from..).and_then(|c| c.first_chunk()).copied().unwrap_or_default();
             for i in 0..(columns - from).min(8) {
                 show(PixelError {
@@ -221,7 +226,7 @@ impl Row {
                     other: other[i],
                     contrast: contrast[i],
                     unsure: unsure[i],
-                    highlight,
+                    highlight: highlight[i],
                     class: classes[i].into(),
                 });
             }
@@ -287,17 +292,11 @@ fn of_block([x, y]: [Span; 2], pixel: &impl Fn(u32, u32) -> PixelStats) -> OfBlo
     out
 }
 
-/// 1 / D of the mean of a block, mean over channels.
-fn inverse(block: &OfBlock) -> f64 {
-    // what others say of the block's even pixels
-    let [channels, _] = block;
-    channels.iter().map(|[others, _]| relative_denominator(others.mean, 0.0).recip()).sum::<f64>() / 3.0
-}
-
 /// Shows the relative squared errors of the pixels of a block, row by row. `pixel` gives those at a column and row of the
 /// picture; it is asked for each pixel twice, and for those that windows reach.
 pub(super) fn relative_errors(
     [x, y]: [Span; 2],
+    highlight: f32,
     pixel: impl Fn(u32, u32) -> PixelStats,
     mut show: impl FnMut(PixelError),
 ) {
@@ -305,7 +304,7 @@ pub(super) fn relative_errors(
     let columns = (x.to - x.from) as usize;
     // the same in all pixels, but where an iteration was stopped early
     let weight = pixel(x.from, y.from).weight;
-    let highlight = if weight > 0.0 { (inverse(&block) / (weight * weight)) as f32 } else { 0.0 };
+    let part = if weight > 0.0 { (1.0 / weight) as f32 } else { 0.0 };
     let reached = columns + 2 * REACH as usize;
     // the first column that windows reach is at 0 if the picture has it
     let first = (x.reach().start + REACH - x.from) as usize;
@@ -329,6 +328,7 @@ pub(super) fn relative_errors(
         let rows = Span { from: middle, to: middle + 1, size: y.size }.reach();
         let own = &seen[middle as usize % ROWS];
         let into = &mut known[middle as usize % ROWS];
+        into.highlights = [0.0; PADDED];
         for (at, classes) in into.classes.iter_mut().zip(own.classes.iter().skip(REACH as usize)) {
             *at = *classes;
         }
@@ -342,7 +342,7 @@ pub(super) fn relative_errors(
             });
             let mut all = others;
             all.add(&own.mean[c], &own.variance[c], reached);
-            into.set((c, columns), own, [&others, &all], &pixels, block);
+            into.set((c, columns, highlight), own, [&others, &all], &pixels, block);
         }
         into.line.take_logarithms(columns);
         // rows of which all others in the window are known
@@ -350,7 +350,7 @@ pub(super) fn relative_errors(
         while next < complete {
             let window = next.saturating_sub(REACH).max(y.from)..(next + REACH + 1).min(y.to);
             let lines = window.map(|r| &known[r as usize % ROWS].line);
-            known[next as usize % ROWS].show((columns, highlight), lines, &mut show);
+            known[next as usize % ROWS].show((columns, part), lines, &mut show);
             next += 1;
         }
     }
@@ -382,7 +382,7 @@ mod tests {
         let spans = [n.min(16), n.div_ceil(16)].map(|size| Span { from: 0, to: size, size });
         let mut sum = [0.0; 3];
         let one = |x: u32, y: u32| pixels.get((y * 16 + x) as usize).copied().unwrap_or_default();
-        relative_errors(spans, one, |e| {
+        relative_errors(spans, 0.0, one, |e| {
             for (sum, x) in sum.iter_mut().zip([e.error, e.other, e.unsure]) {
                 *sum += f64::from(x)
             }
@@ -508,7 +508,7 @@ mod tests {
             let span = |k: usize, i: usize| Span { from: edges[k][i], to: edges[k][i + 1], size: size[k] };
             let [x, y] = [span(0, column), span(1, row)];
             let mut found = Vec::new();
-            relative_errors([x, y], at, |e| found.push(e));
+            relative_errors([x, y], 12.0, at, |e| found.push(e));
             let inside: Vec<_> = (y.from..y.to).flat_map(|j| (x.from..x.to).map(move |i| (i, j))).collect();
             // D, D with the other k, and t
             let denominators = |c: usize, (i, j): (u32, u32)| {
@@ -532,7 +532,7 @@ mod tests {
             };
             let known = [0, 1, 2].map(|c| inside.iter().map(|p| denominators(c, *p)).collect::<Vec<_>>());
             for (n, ((i, j), found)) in inside.iter().zip(&found).enumerate() {
-                let mut sums = [0.0; 4];
+                let mut sums = [0.0; 5];
                 for (c, known) in known.iter().enumerate() {
                     let [d, other, t] = known[n];
                     let near = |p: &(u32, u32)| p != &(*i, *j) && p.0.abs_diff(*i) < 3 && p.1.abs_diff(*j) < 3;
@@ -541,11 +541,12 @@ mod tests {
                     let root = (0.5 * (t * (d.ln() - sum / count)).clamp(-1.6, 1.6)).exp();
                     let v = at(*i, *j).variance_of_mean()[c];
                     let error = v / d * root;
-                    let values =
-                        [error, v / other * root, (error * root - v / d).abs(), error * error / (error + 0.25)];
+                    let above = (12.0 - at(*i, *j).mean()[c]).max(0.0) / 16.0;
+                    let doubt = (error * root - v / d).abs();
+                    let values = [error, v / other * root, doubt, error * error / (error + 0.25), above * above / d];
                     sums.iter_mut().zip(values).for_each(|(sum, x)| *sum += x / 3.0);
                 }
-                let values = [found.error, found.other, found.contrast, found.unsure].map(f64::from);
+                let values = [found.error, found.other, found.contrast, found.unsure, found.highlight].map(f64::from);
                 let same = |a: f64, b: f64| (a - b).abs() < 1e-4 * b + 1e-5 * sums[0];
                 assert!(values.iter().zip(sums).all(|(a, b)| same(*a, b)), "{i} {j}: {found:?}, not {sums:?}");
                 assert_eq!(found.class, class(&at(*i, *j)));

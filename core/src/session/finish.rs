@@ -370,11 +370,11 @@ impl SessionState<'_> {
         let Finishing { sums, at, .. } = &mut self.finishing;
         if *at < self.film.blocks() {
             let limit = (rays / RAYS_PER_ESTIMATED).clamp(1, 1 << 30) as usize;
-            let [blocks, n] = self.film.show_errors(*at, limit, sums, self.largest);
+            let [blocks, n] = self.film.show_errors(*at, limit, sums, self.largest, self.highlight);
             *at += blocks;
             return 1 + n * RAYS_PER_ESTIMATED;
         }
-        let (work, done) = self.film.estimate_error(sums, self.largest, rays, self.highlight);
+        let (work, done) = self.film.estimate_error(sums, self.largest, rays);
         if done {
             self.next_stage();
         }

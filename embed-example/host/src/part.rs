@@ -32,7 +32,7 @@ use std::{error, fmt};
 pub const MAGIC: [u8; 8] = *b"CRPRPART";
 
 /// Version of the layout of this module.
-const LAYOUT: u32 = 3;
+const LAYOUT: u32 = 4;
 
 /// Most bytes of texts that are read.
 const MAX_TEXT: u64 = 1 << 26;
@@ -66,6 +66,9 @@ struct Head {
     exposure: f32,
     /// Samples per pixel of the whole picture; 0 if the target was another.
     total: u32,
+    /// [`Records::highlight`](croupier::unstable::scene::Records::highlight) of the scene.
+    highlight: f32,
+    reserved: u32,
 }
 
 /// Statistics of a pixel in a file.
@@ -287,6 +290,8 @@ pub fn write(
         bounds: [scene.info.bounds_min, scene.info.bounds_max],
         exposure: exposure.unwrap_or(f32::NAN),
         total: if let Target::Spp(samples) = target { samples } else { 0 },
+        highlight: scene.highlight,
+        reserved: 0,
     };
     head.hash = head_hash(&head, &text, &names);
     let failed = |e| ImageError::Write(path.into(), e);
@@ -519,7 +524,7 @@ fn add(parts: &[Checked], common: Common) -> Result<Merged, MergeError> {
     }
     let stopped: Vec<PathBuf> = parts.iter().filter(|p| p.head.stopped != 0).map(|p| p.path.clone()).collect();
     let saved = cache.as_ref().map(save).transpose().map_err(|_| damaged(&path))?;
-    let film = film.finish();
+    let film = film.finish(parts[0].head.highlight);
     let rendered = Rendered {
         size: film.size(),
         pixels: film.pixels().collect(),

@@ -1,17 +1,17 @@
 //! How bright the light is that camera samples show by chance alone. What a mirror or another narrow lobe shows of an
 //! emitter, seen from a surface that scatters widely, is hardly found by light samples: they would have to find the
-//! surface that shows it. Few samples of a picture find such a highlight, and each is as bright as the emitter. Where no
+//! surface that shows it. Few samples of a picture find such a highlight, and each is about as bright as the emitter. Where no
 //! lobe is narrow, and where rays cannot meet the emitter, light samples find all there is.
 
 use crate::scene::Records;
 use crate::scene::blob::*;
 
-/// GGX width below which a lobe is narrow. A wider one meets a small light with a density so far below that of light samples
-/// that multiple importance sampling leaves little of it.
+/// GGX width below which a lobe is narrow. The samples of a wider one that meet a small light count little, because light
+/// samples are much denser there (multiple importance sampling).
 const NARROW: f32 = 0.05;
 
-/// Largest radiance, of any channel, that narrow lobes may show of the emitters of a validated scene that rays can meet;
-/// 0 without such lobes. `brightest` are the largest values of the environment map by channel.
+/// Largest radiance, of any channel, that narrow lobes may show of the emitters of a validated scene that rays can meet,
+/// hidden ones and materials that no triangle has included; 0 without such lobes. `brightest` are the largest values of the environment map by channel.
 pub(super) fn highlight(scene: &Records<'_>, brightest: [f32; 3]) -> f32 {
     if !scene.materials.iter().any(|m| is_narrow(scene, m)) {
         return 0.0;
@@ -36,7 +36,7 @@ pub(super) fn highlight(scene: &Records<'_>, brightest: [f32; 3]) -> f32 {
     all
 }
 
-/// Has a material a lobe that is narrow? Textures that make it so count as if they did.
+/// Has a material a lobe that is narrow? A texture of its roughness counts as one: the texels are not read.
 fn is_narrow(scene: &Records<'_>, m: &Material) -> bool {
     if has(WITH_WIDTH, m.kind) {
         return m.alpha < NARROW;
@@ -62,24 +62,25 @@ const MET: u32 = {
     bits
 };
 
-/// Kinds of materials with a GGX width, and those with a refractive index.
-const BY_PARAMETERS: [u32; 2] = {
-    let ([mut width, mut index], mut rest) = ([0, 0], MaterialKind::ALL);
+/// Kinds of materials with a GGX width, and those that are smooth where they have none: with delta lobes alone, or with a
+/// refractive index. The boundary of a medium, which has no parameter, shows what is behind it.
+const BY_WIDTH: [u32; 2] = {
+    let ([mut wide, mut smooth], mut rest) = ([0, 0], MaterialKind::ALL);
     while let [kind, others @ ..] = rest {
         let mut parameters = kind.facts().parameters;
         while let [parameter, more @ ..] = parameters {
-            width |= (matches!(parameter, Parameter::Alpha) as u32) << *kind as u32;
-            index |= (matches!(parameter, Parameter::RelativeEta | Parameter::ComplexEta) as u32) << *kind as u32;
+            let index = matches!(parameter, Parameter::RelativeEta | Parameter::ComplexEta);
+            wide |= (matches!(parameter, Parameter::Alpha) as u32) << *kind as u32;
+            smooth |= ((index || kind.facts().delta) as u32) << *kind as u32;
             parameters = more;
         }
         rest = others;
     }
-    [width, index]
+    [wide, smooth]
 };
 
 /// Kinds of materials with a GGX width.
-const WITH_WIDTH: u32 = BY_PARAMETERS[0];
+const WITH_WIDTH: u32 = BY_WIDTH[0];
 
-/// Kinds of materials that are smooth where they have no width. The boundary of a medium, which has no parameter, shows
-/// what is behind it.
-const SMOOTH: u32 = BY_PARAMETERS[1] | 1 << MaterialKind::Mirror as u32;
+/// Kinds of materials that are smooth where they have none.
+const SMOOTH: u32 = BY_WIDTH[1];

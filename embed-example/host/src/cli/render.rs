@@ -328,7 +328,7 @@ fn print(r: &Report<'_>) -> Outcome {
     let error = r.stats.relmse_estimate.map_or(String::new(), |e| {
         match r.stats.relmse_interval {
             Some([a, b]) => format!(", estimated relMSE {e:.3e} ({a:.3e} to {b:.3e})"),
-            // few pixels cause most of it, and more such are not found yet
+            // few pixels cause most of it, or light that is not found yet may
             None => format!(", relMSE unresolved: at least {:.3e}", r.stats.relmse_at_least.unwrap_or(e)),
         }
     });

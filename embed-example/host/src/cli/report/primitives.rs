@@ -323,7 +323,7 @@ fn sums(effort: &Effort, twins: &Twins) -> Result<Vec<Kernel>, Box<dyn Error>> {
         film.add(|_| sample(f64::from(x)), |_, _| 0.0);
     }
     let exact = exact as f64 / 16_777_216.0;
-    let found = film.finish().pixels().next().map_or(f64::NAN, |p| p.sum[0]);
+    let found = film.finish(0.0).pixels().next().map_or(f64::NAN, |p| p.sum[0]);
     let seen = |sum: f64| {
         let mut seen = Seen::default();
         seen.errors.see((sum / exact - 1.0).abs() / (2.0 * U), &[]);
