@@ -924,8 +924,9 @@ typedef struct croupier_error_estimate {
   // sizeof(croupier_error_estimate), set by the program.
   uint32_t struct_size;
   // 1 if the samples tell the error. 0 if few pixels cause most of it: more of their kind are probably not found yet,
-  // or one that is found counts for too much; or if one highlight that is not found yet, a bright light in a mirror,
-  // would make it more than a tenth larger. There is no interval then: the error is low at least.
+  // or one that is found counts for too much; or if, in a picture of less than 40,000 pixels, one sample that shows the
+  // brightest light in a mirror, glass or another narrow lobe would make rel_mse more than a tenth larger. There is no
+  // interval then: the error is low at least.
   uint32_t resolved;
   // Mean over pixels and channels of variance / (expectation^2 + 0.01), without the worst 0.01 % of the pixels, times
   // independence. The expectation is estimated from the pixel and those around it.

@@ -32,6 +32,7 @@
 //! `intervals`.
 
 use super::contrast::{LARGEST, LONGEST, Line, PADDED, REACH, eight};
+use super::error::larger;
 use super::independence::class;
 use super::others::{Others, denominators};
 use super::pixel::PixelStats;
@@ -193,8 +194,8 @@ impl Row {
             };
             (to[i], to_other[i]) = (error(d), error(other));
             (line[i], line_left[i]) = (if d < LARGEST { d } else { LARGEST } as f32, left as f32);
-            let above = highlight - m as f32;
-            self.highlights[i] += if above > 0.0 { above * above / line[i] } else { 0.0 };
+            let above = larger(f64::from(highlight) - m, 0.0);
+            self.highlights[i] += (above * above / d) as f32;
         }
     }
 

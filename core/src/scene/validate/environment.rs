@@ -73,7 +73,11 @@ pub(super) fn placement(e: &Environment, brightest: [f32; 3]) -> Result<(), Scen
 pub(super) fn brightest(scene: &Records<'_>) -> [f32; 3] {
     let mut brightest = [0.0f32; 3];
     for texel in scene.env_texels {
-        brightest.iter_mut().zip(texel).for_each(|(b, x)| *b = b.max(*x));
+        for (b, x) in brightest.iter_mut().zip(texel) {
+            if *x > *b {
+                *b = *x;
+            }
+        }
     }
     brightest
 }

@@ -16,23 +16,20 @@ pub(super) fn highlight(scene: &Records<'_>, brightest: [f32; 3]) -> f32 {
     if !scene.materials.iter().any(|m| is_narrow(scene, m)) {
         return 0.0;
     }
-    let sky = scene.environment.map_or([0.0; 3], |e| match EnvironmentKind::from_u32(e.kind) {
-        Some(EnvironmentKind::Constant) => e.radiance,
-        _ => {
-            let [r, g, b] = brightest;
-            let [x, y, z] = e.radiance;
-            [r * x, g * y, b * z]
-        }
-    });
-    let mut all = 0.0;
-    let lights = scene.lights.iter().filter(|l| has(MET, l.kind)).map(|l| l.emission);
-    for rgb in lights.chain([sky]) {
-        for x in rgb {
-            if x > all {
-                all = x;
+    let mut all = 0.0f32;
+    let mut take = |rgb: [f32; 3], scale: [f32; 3]| {
+        for (x, scale) in rgb.iter().zip(scale) {
+            if x * scale > all {
+                all = x * scale;
             }
         }
+    };
+    if let Some(e) = scene.environment {
+        let constant = e.kind == EnvironmentKind::Constant as u32;
+        take(e.radiance, if constant { [1.0; 3] } else { brightest });
     }
+    let lights = scene.lights.iter().filter(|l| has(MET, l.kind));
+    lights.for_each(|l| take(l.emission, [1.0; 3]));
     all
 }
 
