@@ -10,8 +10,9 @@ use crate::scene::blob::*;
 /// samples are much denser there (multiple importance sampling).
 const NARROW: f32 = 0.05;
 
-/// Largest radiance, of any channel, that narrow lobes may show of the emitters of a validated scene that rays can meet,
-/// hidden ones and materials that no triangle has included; 0 without such lobes. `brightest` are the largest values of the environment map by channel.
+/// Largest radiance, of any channel, that narrow lobes may show of the emitters of a validated scene that rays can meet;
+/// 0 without such lobes. Hidden emitters count, and so do materials that no triangle has. `brightest` are the largest
+/// values of the environment map by channel.
 pub(super) fn highlight(scene: &Records<'_>, brightest: [f32; 3]) -> f32 {
     if !scene.materials.iter().any(|m| is_narrow(scene, m)) {
         return 0.0;
