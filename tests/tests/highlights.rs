@@ -58,7 +58,7 @@ fn narrow_lobes_show_the_lamp() {
     }
 }
 
-/// The brightest of what rays can meet: lamps of triangles and of shapes, constants, maps times their scale by channel;
+/// The brightest of what rays can meet: emitters of triangles and of shapes, constants, maps times their scale by channel;
 /// not points and suns, which no ray meets. Killed by: a maximum over texels of other channels' scale, light that only
 /// light samples find.
 #[test]
@@ -143,8 +143,8 @@ fn one_highlight_more_is_told() {
     assert_eq!(of([200, 200], &[2]).highlight, 0.0);
 }
 
-/// A small bright lamp and something smooth leave the error of a picture open
-/// until there are enough samples. Without anything smooth they do not. Killed by: a flag that the highlight does not reach.
+/// A small bright emitter and something smooth leave the error of a picture open until there are enough samples; without
+/// anything smooth it is told. Killed by: a flag that the highlight does not reach.
 #[test]
 fn bright_lamps_in_mirrors_leave_the_error_open() {
     let of = |model: Model, spp: u32| {

@@ -4,6 +4,7 @@ use croupier::unstable::scene::blob::content_hash;
 use croupier::unstable::{ResumeError, World};
 use croupier::{Budget, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
 use croupier_host::blob::AlignedBytes;
+use croupier_host::description::{Model, Reflectance};
 use croupier_tests::runner::{finish, kinds_of_statistics, memory, shown};
 use croupier_tests::scenes::*;
 use croupier_tests::stats::SplitMix;
@@ -106,13 +107,16 @@ fn a_restarted_session_renders_what_a_new_one_does() {
 }
 
 /// A session that is resumed with another scene begins its picture anew, as a restart with the statistics does. Killed by:
-/// samples of the old scene in the picture of the new one, an iteration of the old one that goes on.
+/// samples of the old scene in the picture of the new one, an iteration of the old one that goes on, the highlight of the
+/// old one.
 #[test]
 fn another_scene_begins_another_picture() {
     let bytes = blob(&cornell([20, 12]));
     let scene = Scene::from_bytes(&bytes).unwrap();
     let mut other = cornell([20, 12]);
     other.camera.origin[0] += 0.125;
+    // has highlights, for a mirror that no triangle has
+    other.add_material("mirror", Model::Mirror { reflectance: Reflectance::Constant([1.0; 3]) });
     let other = blob(&other);
     let other = Scene::from_bytes(&other).unwrap();
     for s in kinds_of_statistics(&bytes, 3) {
@@ -145,6 +149,8 @@ fn another_scene_begins_another_picture() {
         let sums =
             |film: &croupier::Film<'_>| bytemuck::cast_slice::<_, u8>(&film.pixels().collect::<Vec<_>>()).to_vec();
         assert!(sums(resumed.film()) == sums(state.film()), "{}", s.strategy);
+        let highlight = resumed.film().error_estimate().highlight;
+        assert!(highlight > 0.0 && highlight == state.film().error_estimate().highlight);
         assert!(resumed.counters().camera_samples == 20 * 12 * 23);
     }
 }

@@ -47,7 +47,7 @@ impl ErrorEstimate {
     /// Whether the samples tell the error: 64 effective pixels or more, and no single highlight that is not found yet would
     /// make it more than a tenth larger. If fewer pixels cause most of what is found (heavy tails), more of their kind are
     /// probably not found yet, or one that is found counts for more than it is; and a picture in which no sample has found
-    /// the lamp's reflection in a chrome tap knows nothing of it. Then the error is `at_least` so large, and `low` and
+    /// a light's reflection in a chrome tap knows nothing of it. Then the error is `at_least` so large, and `low` and
     /// `high` mean nothing. Pictures of less than some hundred pixels are never resolved.
     pub fn is_resolved(&self) -> bool {
         self.effective_pixels >= RESOLVED && self.highlight <= HIGHLIGHT * self.rel_mse

@@ -359,10 +359,7 @@ impl<'m> Film<'m> {
             at_least: (mean - unsure - contrast).max(0.0),
             rel_mse_all: (t.sums[0] + t.rest) / self.pixels.len().max(1) as f64,
             independence: if known && independent > 0.0 { mean / independent } else { Independence::UNKNOWN.ratio },
-            highlight: match Self::outliers(self.pixels.len() as u64) {
-                0..FORGIVEN => highlight / m,
-                _ => 0.0,
-            },
+            highlight: if Self::outliers(self.pixels.len() as u64) < FORGIVEN { highlight / m } else { 0.0 },
             effective_pixels: if t.sum_sqr > 0.0 { t.sums[0] * t.sums[0] / t.sum_sqr } else { m },
         };
     }

@@ -30,6 +30,9 @@
 //! lamps, in caustics, D is hardly known. Each pixel adds q^2 / (q + [`UNSURE`]), all of q where it is large, next to
 //! nothing where it is small, and [`UNSURE_SHARE`] of the sum counts. Both numbers were found with the benchmark
 //! `intervals`.
+//!
+//! By the same D each pixel tells what it would add if one of its n samples had shown a highlight of radiance L that none
+//! has: (L - m)^2 / (n^2 D), which [`ErrorEstimate::highlight`](super::ErrorEstimate::highlight) sums up.
 
 use super::contrast::{LARGEST, LONGEST, Line, PADDED, REACH, eight};
 use super::error::larger;

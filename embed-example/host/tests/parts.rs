@@ -10,6 +10,7 @@ use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin;
 use croupier_host::checkpoint::Schedule;
+use croupier_host::description::{Model, Reflectance};
 use croupier_host::drive::{DriveError, Options, Part, PartError, Rendered, Target, Unobserved, drive_scene};
 use croupier_host::image::Picture;
 use croupier_host::part::{FileError, MergeError, merge, write};
@@ -19,8 +20,11 @@ use std::path::{Path, PathBuf};
 #[cfg(unix)]
 use std::process::Command;
 
+/// Diffuse blocks in a box, and a mirror that no triangle has, so that there may be highlights.
 fn cornell() -> AlignedBytes {
-    bake(&builtin::cornell_blocks(), &BakeOptions::default(), |_, _| {}).unwrap().bytes
+    let mut scene = builtin::cornell_blocks();
+    scene.add_material("mirror", Model::Mirror { reflectance: Reflectance::Constant([1.0; 3]) });
+    bake(&scene, &BakeOptions::default(), |_, _| {}).unwrap().bytes
 }
 
 fn settings(scene: &Scene<'_>, strategy: &str) -> Settings {
@@ -59,7 +63,7 @@ fn parts(folder: &Path, scene: Scene<'_>, settings: Settings, spp: u32, of: u32)
 
 /// Without roulette, hashed samples do not depend on combs: parts have those of one render, each once. Killed by: ranges with
 /// gaps or samples in common, sums, differences of halves, spreads, rays or auxiliary
-/// values that are lost or added with other weights.
+/// values that are lost or added with other weights, a sum that knows of no highlight.
 #[test]
 fn parts_have_the_samples_of_one_render() {
     let (bytes, folder) = (cornell(), tempfile::tempdir().unwrap());
@@ -86,6 +90,8 @@ fn parts_have_the_samples_of_one_render() {
                 assert!((x - y).abs() <= 1e-4 * (x.abs() + 1e-3), "{aov:?}: {x} {y}");
             }
         }
+        assert!(whole.error.highlight > 0.0);
+        near(whole.error.highlight, merged.error.highlight, 1e-4);
         assert!((merged.error.rel_mse_all / merged.error.independence > 0.0) && merged.error.high > merged.error.low);
     }
 }
