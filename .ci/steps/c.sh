@@ -14,22 +14,24 @@ renders() {
 }
 
 # One picture on several processes: `on_processes N PROGRAM ARGUMENTS...`. Threads of Open MPI are not to be bound to cores.
-on_processes() { mpirun --oversubscribe --allow-run-as-root --bind-to none -n "$1" "${@:2}"; }
+# What takes seconds and is not over after five minutes hangs.
+on_processes() {
+    timeout --kill-after 10 300 mpirun --oversubscribe --allow-run-as-root --bind-to none -n "$1" "${@:2}"
+}
 
-# Three processes of which one gets a signal in the second iteration: `loses SIGNAL RANK HASH PROGRAM ARGUMENTS...`
+# Three processes of which one gets a signal in the second iteration draw the picture with this hash:
+# `loses SIGNAL RANK HASH PROGRAM SCENE ARGUMENTS...`. They write into files of their own accord: what mpirun passes on may be
+# lost when the job ends.
 loses() {
-    local signal=$1 rank=$2 wanted=$3 out=$target/cluster.out err=$target/cluster.err mpirun pid
-    : >"$err"
-    on_processes 3 --enable-recovery "${@:4}" >"$out" 2>"$err" &
-    mpirun=$!
-    until grep -q 'iteration 1' "$err"; do kill -0 $mpirun; sleep 0.02; done
-    for pid in $(pgrep -f "^$4 "); do
-        if grep -qzx "OMPI_COMM_WORLD_RANK=$rank" "/proc/$pid/environ"; then kill -"$signal" "$pid"; fi
-    done
-    wait $mpirun
-    echo "SIG$signal to rank $rank: $(tail -1 "$out") $(grep -c 'its shards go to others' "$err") times given up"
-    grep -q "rank $rank .*: its shards go to others" "$err"
-    [ "$(tail -1 "$out")" = "$wanted" ]
+    local said=$target/cluster.said picture=$target/lost.ppm
+    rm -f "$picture" "$said"*
+    # shellcheck disable=SC2016
+    LOST=$2 LOST_SIGNAL=$(kill -l "$1") on_processes 3 --enable-recovery sh -c 'exec "$@" >>"$0.out" 2>>"$0.err"' \
+        "$said" "$4" "$5" "$picture" "${@:6}" || { tail "$said.err"; return 1; }
+    echo "SIG$1 to rank $2: $(tail -1 "$said.out") $(grep -c 'its shards go to others' "$said.err") times given up"
+    grep -q "rank $2 .*: its shards go to others" "$said.err" || { tail "$said.err"; return 1; }
+    [ "$(tail -1 "$said.out")" = "$3" ]
+    [ -s "$picture" ]
 }
 
 # A program fails and says why: `refuses TEXT program arguments...`
@@ -75,8 +77,9 @@ check_cluster() {
 # Many machines: processes that MPI connects over the C interface have the hash of one, and so have those that are left when
 # one of them dies or hangs. Before that, how the C library is installed.
 step_cluster() {
-    packages gcc libc6-dev pkg-config procps openmpi-bin libopenmpi-dev
-    local prefix=$target/installed-c cluster=$target/cluster box=$PWD/embed-example/box.crp n flags wanted
+    packages gcc libc6-dev pkg-config openmpi-bin libopenmpi-dev
+    local prefix=$target/installed-c cluster=$target/cluster lost=$target/cluster-lost n flags wanted
+    local box=$PWD/embed-example/box.crp picture=$target/cluster.ppm
     rm -rf "$prefix"
     .ci/install-c "$prefix"
     check_staged "$prefix"
@@ -84,12 +87,15 @@ step_cluster() {
     # shellcheck disable=SC2086
     mpicc -std=c99 -O2 -Wall -Wextra -pedantic -Werror embed-example/cluster/cluster.c $flags -o "$cluster"
     export LD_LIBRARY_PATH=$prefix/lib
-    for n in 1 2 3 8; do renders B on_processes $n "$cluster" "$box" "$target/cluster.ppm"; done
+    for n in 1 2 3 8; do renders B on_processes $n "$cluster" "$box" "$picture"; done
     check_cluster "$cluster" "$box" "$flags"
-    wanted=$(on_processes 1 "$cluster" "$box" "$target/cluster.ppm" 5 50 400 2>/dev/null)
-    loses KILL 1 "$wanted" "$cluster" "$box" "$target/cluster.ppm" 5 50 400
-    loses KILL 0 "$wanted" "$cluster" "$box" "$target/cluster.ppm" 5 50 400
-    loses STOP 2 "$wanted" "$cluster" "$box" "$target/cluster.ppm" 5 50 400
+    # shellcheck disable=SC2086
+    mpicc -std=c99 -O2 -Wall -Wextra -pedantic -Werror embed-example/cluster/cluster.c embed-example/cluster/lost.c \
+        $flags -o "$lost"
+    wanted=$(on_processes 1 "$cluster" "$box" "$picture" 5 4 8 2>/dev/null)
+    loses KILL 1 "$wanted" "$lost" "$box" 5 4 8
+    loses KILL 0 "$wanted" "$lost" "$box" 5 4 8
+    loses STOP 2 "$wanted" "$lost" "$box" 5 4 8
 }
 
 # Instructions within functions and what they call: `instructions PATTERN program arguments...`
