@@ -3,6 +3,7 @@
 mod error;
 mod finish;
 mod next;
+mod statistics;
 
 pub use error::SessionError;
 
@@ -501,8 +502,8 @@ impl<'m> SessionState<'m> {
         self.learned.statistics()
     }
 
-    /// The statistics of the scene, if the strategy learns them (`bolin-meyer` learns of the picture): to be saved, or
-    /// loaded before the first iteration.
+    /// The statistics of the scene, if the strategy learns them (`bolin-meyer` learns of the picture).
+    /// [`Self::save_statistics`] saves them with the guide.
     pub fn cache(&self) -> Option<&Cache<'m>> {
         self.learned.cache()
     }

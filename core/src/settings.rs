@@ -106,8 +106,8 @@ impl Settings {
         CacheSize::within(given, self.shards).map(Some).ok_or(SettingsError::Cache { needed, given })
     }
 
-    /// Room for path guiding, if it is on; [`Self::check`] has seen that it fits.
-    pub(crate) fn guide_size(&self) -> Option<GuideSize> {
+    /// Room for path guiding, if it is on and compiled in.
+    pub fn guide_size(&self) -> Option<GuideSize> {
         (COMPILED && self.guides()).then(|| GuideSize::within(self.learning.guide_bytes, self.shards)).flatten()
     }
 

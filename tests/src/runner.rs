@@ -144,6 +144,15 @@ pub trait Learned {
     /// Loads saved statistics.
     fn load(&mut self, bytes: &[u8]) -> Result<(), CacheError>;
 
+    /// All that was learned of the scene as bytes, if there is anything.
+    fn saved_statistics(&self) -> Option<Vec<u8>>;
+
+    /// Loads all that was saved.
+    fn load_statistics(&mut self, bytes: &[u8]) -> Result<(), CacheError>;
+
+    /// Adds what was saved.
+    fn merge_statistics(&mut self, bytes: &[u8]) -> Result<(), CacheError>;
+
     /// The distributions of path guiding as bytes, the mean share of guided samples, and the directions that logs had
     /// no room for; `None` if it is off.
     fn guide(&self) -> Option<(Vec<u8>, f64, u64)>;
@@ -184,6 +193,21 @@ impl<P: Profile, I: Intersector> Learned for Session<'_, '_, P, I> {
 
     fn load(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
         self.cache_mut().expect("a cache").load(bytes)
+    }
+
+    fn saved_statistics(&self) -> Option<Vec<u8>> {
+        let mut bytes = vec![0; self.saved_statistics_len()];
+        let saved = self.save_statistics(&mut bytes);
+        assert_eq!(saved, if bytes.is_empty() { Err(CacheError::Absent) } else { Ok(bytes.len()) });
+        Some(bytes).filter(|b| !b.is_empty())
+    }
+
+    fn load_statistics(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
+        SessionState::load_statistics(self, bytes)
+    }
+
+    fn merge_statistics(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
+        SessionState::merge_statistics(self, bytes)
     }
 
     fn guide(&self) -> Option<(Vec<u8>, f64, u64)> {

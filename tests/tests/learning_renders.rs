@@ -3,7 +3,7 @@
 use croupier::unstable::cost::COST_SHADOW;
 use croupier::unstable::denoise::{Planes, scratch_len};
 use croupier::unstable::learn::cache::CacheSize;
-use croupier::unstable::learn::{ControlVariate, Learning, Objective};
+use croupier::unstable::learn::{ControlVariate, Guiding, Learning, Objective};
 use croupier::unstable::rrs::Norm;
 use croupier::{Scene, Settings, Strategy};
 use croupier_host::bake::{BakeOptions, bake};
@@ -116,7 +116,12 @@ fn wrong_statistics_are_errors() {
     // bolin-meyer learns, but from the picture
     for strategy in ["classic", "none", "bolin-meyer"] {
         for o in [begun(&good), RenderOptions { save_cache: true, ..options(strategy, 2) }] {
-            let e = refused(scene(), &with(o, |s| s.strategy = Strategy::parse(strategy).unwrap()));
+            // a guide would be saved alone
+            let learns_nothing = |s: &mut Settings| {
+                s.strategy = Strategy::parse(strategy).unwrap();
+                s.learning.guiding = Guiding::Off;
+            };
+            let e = refused(scene(), &with(o, learns_nothing));
             assert!(matches!(e, DriveError::NoCache(_)) && e.to_string().contains(strategy), "{e}");
         }
     }

@@ -1490,7 +1490,8 @@ croupier_status croupier_session_statistics_size(const struct croupier_session *
                                                  struct croupier_message *message);
 
 // Writes what was learned of the scene, for another run, another machine, another scene of the same bounds. The bytes
-// are the same on every machine. CROUPIER_SIZE if there is too little room.
+// are the same on every machine. CROUPIER_SIZE if there is too little room, CROUPIER_ABSENT if the strategy learns
+// nothing of the scene.
 croupier_status croupier_session_save_statistics(const struct croupier_session *session,
                                                  void *bytes,
                                                  size_t size,
@@ -1498,8 +1499,8 @@ croupier_status croupier_session_save_statistics(const struct croupier_session *
 
 // Replaces (merge is 0) what was learned of the scene by saved bytes, or adds them. Whatever is loaded changes
 // efficiency only. The bytes are checked first; CROUPIER_SAVED, with the reason in the message, if they are damaged
-// or of another scene or objective, CROUPIER_ABSENT while an iteration runs or if the strategy learns nothing of the
-// scene.
+// or of another scene or objective, CROUPIER_ABSENT while an iteration runs or if they hold nothing that the session
+// learns.
 croupier_status croupier_session_load_statistics(struct croupier_session *session,
                                                  const void *bytes,
                                                  size_t size,

@@ -12,6 +12,7 @@ impl CoreError for CacheError {
     fn status(&self) -> croupier_status {
         match self {
             Self::Length { .. } | Self::Full { .. } => CROUPIER_SIZE,
+            Self::Absent => CROUPIER_ABSENT,
             _ => CROUPIER_SAVED,
         }
     }
@@ -30,13 +31,15 @@ pub unsafe extern "C" fn croupier_session_statistics_size(
     answer!(message, Fault, {
         let data = promised!(session_at(session))?.read()?;
         let mut to = promised!(output(bytes, "bytes"))?;
-        to.set(data.state()?.cache().ok_or(Fault::new(CROUPIER_ABSENT, STATISTICS))?.saved_len());
+        let len = Some(data.state()?.saved_statistics_len()).filter(|len| *len > 0);
+        to.set(len.ok_or(Fault::new(CROUPIER_ABSENT, STATISTICS))?);
         Ok(())
     })
 }
 
 /// Writes what was learned of the scene, for another run, another machine, another scene of the same bounds. The bytes
-/// are the same on every machine. CROUPIER_SIZE if there is too little room.
+/// are the same on every machine. CROUPIER_SIZE if there is too little room, CROUPIER_ABSENT if the strategy learns
+/// nothing of the scene.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_save_statistics(
     session: *const croupier_session,
@@ -48,15 +51,15 @@ pub unsafe extern "C" fn croupier_session_save_statistics(
         let data = promised!(session_at(session))?.read()?;
         apart(bytes.cast::<u8>(), size, &[data.place], "bytes")?;
         let to = promised!(array_mut(bytes.cast::<u8>(), size, "bytes"))?;
-        data.state()?.cache().ok_or(Fault::new(CROUPIER_ABSENT, STATISTICS))?.save(to)?;
+        data.state()?.save_statistics(to)?;
         Ok(())
     })
 }
 
 /// Replaces (merge is 0) what was learned of the scene by saved bytes, or adds them. Whatever is loaded changes
 /// efficiency only. The bytes are checked first; CROUPIER_SAVED, with the reason in the message, if they are damaged
-/// or of another scene or objective, CROUPIER_ABSENT while an iteration runs or if the strategy learns nothing of the
-/// scene.
+/// or of another scene or objective, CROUPIER_ABSENT while an iteration runs or if they hold nothing that the session
+/// learns.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_load_statistics(
     session: *mut croupier_session,
@@ -69,11 +72,11 @@ pub unsafe extern "C" fn croupier_session_load_statistics(
         let mut data = promised!(session_at(session))?.write()?;
         apart(bytes.cast::<u8>(), size, &[data.place], "bytes")?;
         let bytes = promised!(array(bytes.cast::<u8>(), size, "bytes"))?;
-        let cache = data.state_mut()?.cache_mut().ok_or(Fault::new(CROUPIER_ABSENT, STATISTICS))?;
+        let session = data.state_mut()?;
         if merge == 0 {
-            cache.load(bytes)?
+            session.load_statistics(bytes)?
         } else {
-            cache.merge(bytes)?
+            session.merge_statistics(bytes)?
         }
         Ok(())
     })

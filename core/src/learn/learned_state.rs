@@ -3,7 +3,7 @@
 use super::adaptive::{AllocationScalars, SampleAllocation};
 use super::cache::{BINS, Cache, CacheScalars, NO_BIN, Training, VertexKind8};
 use super::estimate::{EstimateScalars, PixelEstimates};
-use super::guiding::{COMPILED, Guide, GuideLog, GuideScalars, GuideUse, LEARNED, Promise, TrialShares, Watch};
+use super::guiding::{COMPILED, ENOUGH, Guide, GuideLog, GuideScalars, GuideUse, LEARNED, Promise, TrialShares, Watch};
 use super::needs::Needs;
 use super::picture::{Picture, PictureStatistics, error_of, outliers};
 use super::settings::{Guiding, Learning, Objective};
@@ -143,7 +143,7 @@ impl<'m> LearnedState<'m> {
     }
 
     pub(crate) fn cache_mut(&mut self) -> Option<&mut Cache<'m>> {
-        self.cache.as_mut().filter(|c| !c.is_flat())
+        self.of_scene_mut().0
     }
 
     /// Distributions of path guiding, if it is on.
@@ -153,7 +153,13 @@ impl<'m> LearnedState<'m> {
     }
 
     pub(crate) fn guide_mut(&mut self) -> Option<&mut Guide<'m>> {
-        self.guide.as_mut().filter(|_| COMPILED)
+        self.of_scene_mut().1
+    }
+
+    /// Cache and guide, to be changed.
+    pub(crate) fn of_scene_mut(&mut self) -> (Option<&mut Cache<'m>>, Option<&mut Guide<'m>>) {
+        let cache = self.cache.as_mut().filter(|c| !c.is_flat());
+        (cache, self.guide.as_mut().filter(|_| COMPILED))
     }
 
     /// Is the guide watched, whether it pays?
@@ -168,10 +174,25 @@ impl<'m> LearnedState<'m> {
         !self.watches() || self.watch.enabled()
     }
 
-    /// Are samples of the pixel in column and row `at` guided in iteration `iteration`, and learned from?
+    /// Does the guide learn from the samples of all pixels with a record, guided or not?
+    #[inline(always)]
+    pub(crate) fn learns_from_all(&self) -> bool {
+        self.watches() && self.trial.all_teach && self.watch.is_open()
+    }
+
+    /// Are samples of the pixel in column and row `at` guided in iteration `iteration`?
     #[inline(always)]
     pub(crate) fn is_guided(&self, iteration: u64, at: [u32; 2]) -> bool {
         !self.watches() || self.watch.is_guided(iteration, at, self.trial)
+    }
+
+    /// Part of the samples that the guide learns from that are guided, in an iteration of so many samples per pixel.
+    #[inline(always)]
+    pub(crate) fn guided_part(&self, samples: u32) -> f32 {
+        if !self.learns_from_all() {
+            return 1.0;
+        }
+        self.trial.guided_part([true, false].map(|guided| self.learned_samples(guided).min(samples)))
     }
 
     /// How many samples of a pixel are learned from in an iteration.
@@ -208,9 +229,11 @@ impl<'m> LearnedState<'m> {
         self.guide().is_some_and(Guide::is_first_replay)
     }
 
-    /// Replays a log from entry `at` on, `limit` at most; their number, and `true` after the last.
-    pub(crate) fn replay(&mut self, log: &GuideLog<'_>, at: usize, limit: usize) -> (usize, bool) {
-        self.guide_mut().map_or((0, true), |g| g.replay(log, at, limit))
+    /// Replays a log of an iteration of `samples` samples per pixel from entry `at` on, `limit` at most; their number, and
+    /// `true` after the last.
+    pub(crate) fn replay(&mut self, log: &GuideLog<'_>, at: usize, limit: usize, samples: u32) -> (usize, bool) {
+        let guided = self.guided_part(samples);
+        self.guide_mut().map_or((0, true), |g| g.replay(log, at, limit, guided))
     }
 
     /// All logs were replayed.
@@ -225,7 +248,8 @@ impl<'m> LearnedState<'m> {
         let Some(guide) = self.guide_mut() else { return (0, true) };
         let (work, done) = guide.learn_some();
         if done && self.watches() {
-            self.watch.decide(self.learning.decay.into());
+            let enough = self.guide().is_some_and(|g| g.has_learned_from(ENOUGH));
+            self.watch.decide(self.learning.decay.into(), enough);
         }
         (work, done)
     }

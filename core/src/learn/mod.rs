@@ -13,6 +13,7 @@ pub mod guiding;
 mod learned_state;
 mod needs;
 mod picture;
+pub mod saved;
 mod settings;
 
 pub(crate) use learned_state::LearnedScalars;

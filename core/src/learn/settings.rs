@@ -118,7 +118,7 @@ settings! {
         ledger: u32 = 2048 =>
             "ledger", "Samples in flight per shard that can be learned from, of 68 bytes each",
             SettingRange::Integers { min: 1, max: 1 << 24 };
-        /// More make statistics better and iterations slower. Path guiding takes 16 at least.
+        /// More make statistics better and iterations slower. Path guiding takes 32 at least of pixels that it guides.
         samples: u32 = 8 =>
             "learn-samples", "Camera samples per pixel that are learned from in each iteration, the first ones",
             SettingRange::Integers { min: 1, max: u32::MAX as u64 };

@@ -360,7 +360,8 @@ impl SessionState<'_> {
             self.learned.add_promise(promise);
         }
         let limit = rays.saturating_mul(REPLAYED_PER_RAY) as usize;
-        let (n, done) = s.guide_log().map_or((0, true), |log| self.learned.replay(log, f.at as usize, limit));
+        let samples = self.iteration.samples;
+        let (n, done) = s.guide_log().map_or((0, true), |log| self.learned.replay(log, f.at as usize, limit, samples));
         f.advance(n, done);
         1 + n as u64 / REPLAYED_PER_RAY
     }

@@ -15,16 +15,18 @@ pub(crate) struct GuideNote8 {
     pub lanes: Mask8,
     /// Leaves of the guide; [`NO_LEAF`] where there is none to learn from.
     pub leaf: U32x8,
-    /// Lanes whose leaves have learned anything.
-    pub known: Mask8,
+    /// Lanes whose samples were guided, in leaves that have learned anything: they tell what guiding promises.
+    pub promised: Mask8,
     /// Second moment of the bounce without the guide over what it has.
     pub unguided: F32x8,
     /// Share of the guide's density, see [`GuideLog::add`].
     pub share: U32x8,
     /// Points of the square, [`quantised`](crate::learn::guiding::sphere::quantised).
     pub point: U32x8,
-    /// Density of the direction, 1/sr.
+    /// Density of the direction, 1/sr, as if all samples that are learned from had been drawn from one mixture.
     pub pdf: F32x8,
+    /// The density that it was drawn with, over that.
+    pub ratio: F32x8,
 }
 
 impl GuideNote8 {
@@ -32,11 +34,12 @@ impl GuideNote8 {
     pub(crate) const NONE: Self = Self {
         lanes: Mask8::NONE,
         leaf: U32x8::splat(NO_LEAF),
-        known: Mask8::NONE,
+        promised: Mask8::NONE,
         unguided: F32x8::ONE,
         share: U32x8::splat(0),
         point: U32x8::splat(0),
         pdf: F32x8::ZERO,
+        ratio: F32x8::ONE,
     };
 }
 
@@ -47,7 +50,8 @@ struct GuideNote {
     /// Leaf, and below it in 8 bits the share; [`NO_LEAF`] if there is nothing to learn from.
     leaf: u32,
     point: u32,
-    pdf: f32,
+    /// Upper halves of two floats: [`GuideNote8::ratio`], and below it [`GuideNote8::pdf`], of which a log keeps no more.
+    densities: u32,
     /// What next event estimation gave the sample, mean of rgb.
     nee: f32,
     /// What the square of the sample's estimate counts in the error of the picture; 0 if the guide promises nothing.
@@ -126,9 +130,10 @@ impl<'m> GuideNotes<'m> {
             *note = GuideNote {
                 leaf: if leaf == NO_LEAF { NO_LEAF } else { leaf << 8 | n.share.lane(i) & 0xff },
                 point: n.point.lane(i),
-                pdf: n.pdf.lane(i),
+                // the ratio rounded, because its square counts
+                densities: n.ratio.lane(i).to_bits().wrapping_add(0x8000) & 0xffff_0000 | n.pdf.lane(i).to_bits() >> 16,
                 nee: mean(nee),
-                importance: if n.known.lane(i) { importance } else { 0.0 },
+                importance: if n.promised.lane(i) { importance } else { 0.0 },
                 unguided: n.unguided.lane(i),
             };
         }
@@ -150,6 +155,57 @@ impl<'m> GuideNotes<'m> {
         if n.leaf == NO_LEAF {
             return;
         }
-        log.add(n.leaf >> 8, n.leaf & 0xff, n.point, bounce * bounce, n.pdf);
+        let [ratio, pdf] = [n.densities & 0xffff_0000, n.densities << 16].map(f32::from_bits);
+        let contribution = bounce * ratio;
+        log.add(n.leaf >> 8, n.leaf & 0xff, n.point, contribution * contribution, pdf);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+    use crate::learn::guiding::GuideSize;
+
+    /// What the bounce gave, by the ratio of densities and squared, and the density, within the 2^-7 of the log; the promise
+    /// is that of samples that were guided, as they were drawn. Killed by: halves exchanged, a ratio that is left out, the
+    /// light sample counted, a promise by the ratio.
+    #[test]
+    fn contributions_count_by_the_ratio_of_densities() {
+        let size = GuideSize::within(1 << 16, 1).expect("a size");
+        let layout = GuideLog::layout(size).expect("a layout");
+        let mut block = std::vec![0u8; layout.size + layout.align];
+        let at = block.as_ptr().align_offset(layout.align);
+        let mut log = GuideLog::new(size, &mut block[at..at + layout.size]).expect("a log");
+        log.clear();
+        let (mut notes, mut promise) = ([GuideNote::zeroed(); 2], [Promise::default()]);
+        let mut all = GuideNotes { notes: &mut notes, log: Some(log), promise: &mut promise };
+        let note = GuideNote8 {
+            lanes: Mask8::first(2),
+            leaf: U32x8::splat(3),
+            promised: Mask8::first(1),
+            unguided: F32x8::splat(2.0),
+            share: U32x8::splat(77),
+            point: U32x8::splat(5),
+            pdf: F32x8::from_fn(|i| [0.3, 7.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0][i]),
+            ratio: F32x8::from_fn(|i| [0.2, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0][i]),
+        };
+        let nee = [1.0; 3];
+        (0..2).for_each(|i| all.note(i as u32, &note, i, nee, 10.0));
+        (0..2).for_each(|slot| all.close(slot, [4.0; 3]));
+        let bytes = all.log.as_ref().map(GuideLog::bytes).expect("a log");
+        for (entry, [ratio, pdf]) in bytes.chunks_exact(12).zip([[0.2_f32, 0.3_f32], [1.0, 7.0]]) {
+            let word = |i: usize| u32::from_le_bytes([entry[i], entry[i + 1], entry[i + 2], entry[i + 3]]);
+            assert_eq!([word(0), word(4)], [3 << 8 | 77, 5]);
+            let [square, density] = [word(8) & 0xffff_0000, word(8) << 16].map(f32::from_bits);
+            let want = (3.0 * ratio).powi(2);
+            assert!((square / want - 1.0).abs() < 0.02, "{square} for {want}");
+            assert!((density / pdf - 1.0).abs() < 0.008, "{density} for {pdf}");
+        }
+        assert_eq!(bytes.len(), 24);
+        let mut want = Promise::default();
+        want.add(10.0 * (16.0 + 9.0), 10.0 * 16.0);
+        assert_eq!(promise[0], want, "of the guided sample alone");
     }
 }

@@ -37,9 +37,15 @@ pub(super) struct Guided8<'a, 'm> {
     pdf: F32x8,
     /// Lanes that are learned from.
     recorded: Mask8,
+    /// Share of the guide in the one mixture that all samples count as in what is learned: that of guided samples, times
+    /// the part of the samples that are guided.
+    overall: F32x8,
+    /// Lanes that may be guided.
+    guided: Mask8,
 }
 
-/// Draws from the guide for a packet of one surface class; `None` if guiding is off or of no use.
+/// Draws from the guide for a packet of one surface class; `None` if guiding is off or of no use. Lanes that are learned
+/// from and not guided have a leaf and no direction.
 #[inline(never)]
 pub(super) fn draw<'a, 'm: 'a, W: World>(
     guide: &'a Guide<'m>,
@@ -47,8 +53,9 @@ pub(super) fn draw<'a, 'm: 'a, W: World>(
     samples: &Samples8,
 ) -> Option<Guided8<'a, 'm>> {
     let ClassKernel::Surface(kind) = samples.class.kernel() else { return None };
-    let recorded = samples.guided.and_not(samples.path.record.eq(U32x8::splat(NO_RECORD)));
-    let asked = samples.continues & samples.guided;
+    let learned = if world.learned().learns_from_all() { samples.active } else { samples.guided };
+    let recorded = learned.and_not(samples.path.record.eq(U32x8::splat(NO_RECORD)));
+    let asked = samples.continues & (samples.guided | recorded);
     if samples.class.is_delta() || asked.none() {
         return None;
     }
@@ -64,7 +71,8 @@ pub(super) fn draw<'a, 'm: 'a, W: World>(
     }
     // by the vertex's key: if the leaf went with the light sample's numbers, the weights of MIS would be biased
     let at = guide.at(v.p, v.ns, v.key.cache_jitter(world.sampler()), lanes);
-    let recorded = lanes & recorded;
+    let overall = at.fraction * world.learned().guided_part(world.iteration().samples);
+    let (at, recorded) = (at.only(samples.guided), lanes & recorded);
     if recorded.none() && !at.fraction.gt(F32x8::ZERO).any() {
         return None;
     }
@@ -75,7 +83,7 @@ pub(super) fn draw<'a, 'm: 'a, W: World>(
         let (d, q) = guide.sample(&at, words, chosen);
         (dir, pdf) = (Vec3x8::select(chosen, d, v.ns), chosen.zero_unless(q));
     }
-    Some(Guided8 { guide, at, chosen, dir, pdf, recorded })
+    Some(Guided8 { guide, at, chosen, dir, pdf, recorded, overall, guided: samples.guided })
 }
 
 /// One class's kernel on a packet, with the BSDF in the guide's directions.
@@ -146,6 +154,17 @@ pub(super) struct Mixed8 {
     pub(super) note: GuideNote8,
 }
 
+/// Samples of guided pixels and of others count in what is learned as if all had been drawn from one mixture, with the share
+/// `overall` of the guide's (Veach's balance heuristic for many samples): its densities, and those that they were drawn with
+/// over them. `[p, q]` are the densities of the BSDF and of the guide, and of `delta` lanes, which no guide can find, the
+/// probabilities count alone. The share is that of the whole picture: leaves that mostly guided paths reach learn as if the
+/// others had reached them too, which costs efficiency, never the mean.
+#[inline(always)]
+fn as_one_mixture(overall: F32x8, drawn: F32x8, [p, q]: [F32x8; 2], delta: Mask8) -> [F32x8; 2] {
+    let all = (1.0 - overall) * delta.select(F32x8::ONE, p) + (!delta).zero_unless(overall * q);
+    [all, drawn / all]
+}
+
 /// Mixes both samples.
 #[inline(never)]
 pub(super) fn mix(g: &Guided8<'_, '_>, both: &Both8, nee_direction: Option<Vec3x8>) -> Mixed8 {
@@ -167,17 +186,54 @@ pub(super) fn mix(g: &Guided8<'_, '_>, both: &Both8, nee_direction: Option<Vec3x
     let weight = Vec3x8::select(chosen, both.guided.f / pdf, s.weight * ratio);
     let valid = (chosen & both.guided.f.any_positive() & possible) | (s.valid & (delta | possible)).and_not(chosen);
     let learned = g.recorded & valid & (g.at.known | !delta);
+    let [all, ratio] = as_one_mixture(g.overall, delta.select(own, pdf), [p, q], delta);
     let known = g.at.known.select(q / (q + p) * 254.99, F32x8::splat(UNKNOWN_SHARE as f32));
     let unguided = delta.select(own, pdf / p).min(F32x8::splat(MOST));
+    let promised = g.at.known & g.guided;
     let note = GuideNote8 {
         lanes: g.recorded,
         leaf: U32x8::select(learned, g.at.leaf, U32x8::splat(NO_LEAF)),
-        known: g.at.known,
-        unguided: (g.at.known & learned).select(unguided, F32x8::ONE),
+        promised,
+        unguided: (promised & learned).select(unguided, F32x8::ONE),
         share: (!delta).zero_unless(known).to_i32().to_u32(),
         point: if learned.any() { sphere::quantised(wi) } else { U32x8::splat(0) },
-        pdf: (!delta).zero_unless(pdf),
+        pdf: (!delta).zero_unless(g.at.known.select(all, pdf)),
+        ratio: g.at.known.select(ratio, F32x8::ONE),
     };
     let sample = Sample8 { wi: s.wi, weight: weight.zero_unless(valid), pdf, delta: delta & valid, valid };
     Mixed8 { nee, wi, sample, note }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tenth of the samples are guided, with share 0.4: what both kinds draw has one density together, the mean of theirs,
+    /// so that a direction counts the same whichever kind found it; against f64. Killed by: densities exchanged, the guided
+    /// samples' own mixture for all of them, a share of delta lobes that is not theirs.
+    #[test]
+    fn samples_of_two_kinds_count_as_one_mixture() {
+        let (part, share) = (0.1_f32, 0.4_f32);
+        let (p, q) = ([0.0, 0.01, 0.3, 0.3, 2.0, 9.0, 0.5, 0.5], [4.0, 30.0, 0.0, 0.3, 0.01, 0.0, 7.0, 0.0]);
+        let delta = Mask8::from_bits(0b1100_0000);
+        let all = |g: f32, i: usize| {
+            let (p, q) = if i >= 6 { (1.0, 0.0) } else { (p[i], q[i]) };
+            (1.0 - f64::from(g)) * p + f64::from(g) * q
+        };
+        for g in [share, 0.0] {
+            let drawn = F32x8::from_fn(|i| all(g, i) as f32);
+            let [one, ratio] = as_one_mixture(
+                F32x8::splat(part * share),
+                drawn,
+                [p, q].map(|x| F32x8::from_fn(|i| x[i] as f32)),
+                delta,
+            );
+            for i in 0..8 {
+                let want = 0.1 * all(share, i) + 0.9 * all(0.0, i);
+                assert!((f64::from(one.lane(i)) / want - 1.0).abs() < 1e-6, "lane {i}: {} for {want}", one.lane(i));
+                let want = all(g, i) / want;
+                assert!((f64::from(ratio.lane(i)) - want).abs() < 1e-6 * (1.0 + want), "lane {i}: {}", ratio.lane(i));
+            }
+        }
+    }
 }

@@ -23,6 +23,8 @@ use croupier::unstable::accel::WideBvh;
 use croupier::unstable::extension::Extension;
 use croupier::unstable::film::Aov;
 use croupier::unstable::learn::cache::{Cache, CacheError};
+use croupier::unstable::learn::guiding::Guide;
+use croupier::unstable::learn::saved;
 use croupier::unstable::light::TreeSelector;
 use croupier::unstable::profile::{AnyProfile, Profile, ProfileVisitor};
 use croupier::unstable::rrs::Space;
@@ -53,9 +55,9 @@ pub struct Options<'a> {
     /// Pixel estimate that strategies which learn use instead of the denoised picture, rgb, row by row: efficiency
     /// depends on it, the expectation does not.
     pub pixel_estimate: Option<&'a [[f32; 3]]>,
-    /// Saved cache to begin with. Needs a strategy that learns from the scene.
+    /// Saved statistics to begin with. Needs a strategy that learns from the scene, or path guiding.
     pub cache: Option<&'a [u8]>,
-    /// Return of the cache in the end. Needs a strategy that learns from the scene.
+    /// Return of the statistics in the end. Needs a strategy that learns from the scene, or path guiding.
     pub save_cache: bool,
     /// Measurement, in the end, of look-ups and of recording samples.
     pub calibrate: bool,
@@ -153,8 +155,8 @@ pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
     if let Some(rgb) = options.pixel_estimate {
         session.give_estimate(rgb)?;
     }
-    if let Some((bytes, cache)) = options.cache.zip(session.cache_mut()) {
-        cache.load(bytes)?;
+    if let Some(bytes) = options.cache {
+        session.load_statistics(bytes)?;
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads(options.threads, shards.len())).build()?;
 
@@ -244,7 +246,7 @@ pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
             share: g.mean_fraction(),
             watched: session.guide_use(),
         }),
-        cache: used.filter(|_| options.save_cache).map(save).transpose()?,
+        cache: options.save_cache.then(|| save(session.cache(), session.guide())).transpose()?,
         calibration: used.filter(|_| options.calibrate).and_then(|c| calibrate::calibrate(c, &scene)),
     })
 }
@@ -293,10 +295,11 @@ pub(crate) fn planes(film: &Film<'_>) -> Vec<(Aov, Vec<Vec<f32>>)> {
     Aov::ALL.into_iter().filter_map(of).collect()
 }
 
-/// Fails unless the settings keep statistics of the scene, which a cache holds.
+/// Fails unless something is learned of the scene, by the strategy or for path guiding.
 pub(crate) fn needs_cache(settings: &Settings) -> Result<(), DriveError> {
     let strategy = settings.strategy;
-    if strategy.space() == Some(Space::Scene) { Ok(()) } else { Err(DriveError::NoCache(strategy.name())) }
+    let learns = strategy.space() == Some(Space::Scene) || settings.guide_size().is_some();
+    if learns { Ok(()) } else { Err(DriveError::NoCache(strategy.name())) }
 }
 
 /// Checkpoints of a render.
@@ -331,9 +334,10 @@ impl Saver<'_> {
     }
 }
 
-pub(crate) fn save(cache: &Cache<'_>) -> Result<Vec<u8>, CacheError> {
-    let mut bytes = vec![0; cache.saved_len()];
-    cache.save(&mut bytes)?;
+/// What was learned of the scene as bytes.
+pub(crate) fn save(cache: Option<&Cache<'_>>, guide: Option<&Guide<'_>>) -> Result<Vec<u8>, CacheError> {
+    let mut bytes = vec![0; saved::saved_len(cache, guide)];
+    saved::save(cache, guide, &mut bytes)?;
     Ok(bytes)
 }
 

@@ -6,7 +6,7 @@
 //! names      of materials and objects, if coverage by index is among the layers
 //! pixels     56 bytes each, row by row
 //! planes     of auxiliary values, 4 bytes a pixel each
-//! cache      statistics of the scene, as `--cache-out` writes them
+//! cache      what was learned of the scene, as `--cache-out` writes it
 //! ```
 //!
 //! Every camera sample counts alike ([`FilmSum`]). Parts are added in the order of their numbers, so that the order in
@@ -21,6 +21,9 @@ use crate::text;
 use bytemuck::{Pod, Zeroable};
 use croupier::unstable::film::{Aov, AovSet, FilmSum, PixelStats};
 use croupier::unstable::learn::cache::{Cache, CacheSize};
+use croupier::unstable::learn::guiding::Guide;
+use croupier::unstable::learn::saved;
+use croupier::unstable::rrs::Space;
 use croupier::unstable::scene::blob::content_hash;
 use croupier::{Counters, Plan, Scene, Settings};
 use std::fs::{self, File};
@@ -301,7 +304,7 @@ pub fn write(
     })
 }
 
-/// Pixels, planes and statistics of the scene.
+/// Pixels, planes and what was learned of the scene.
 type Body = (Vec<SavedPixel>, Vec<f32>, Vec<u8>);
 
 /// A file whose head and texts were read and checked. It is closed: there may be more parts than files may be open.
@@ -496,34 +499,33 @@ fn add(parts: &[Checked], common: Common) -> Result<Merged, MergeError> {
     let bytes = plan.film_sum().size;
     let mut block = AlignedBytes::try_zeroed(bytes).ok_or(MergeError::Memory)?;
     let mut film = FilmSum::new(&plan, block.as_mut()).map_err(|_| damaged(&path))?;
-    let size = CacheSize::within(settings.learning.cache_bytes, settings.shards);
-    let with_cache = size.filter(|_| parts.iter().all(|p| p.head.cache_bytes > 0));
-    let mut memory = match with_cache.and_then(Cache::layout) {
-        Some(layout) => Some(AlignedBytes::try_zeroed(layout.size).ok_or(MergeError::Memory)?),
-        None => None,
-    };
-    let mut cache = match memory.as_mut().zip(with_cache) {
-        Some((memory, size)) => {
-            let objective = settings.learning.objective;
-            let made = Cache::new(size, parts[0].head.bounds, objective, memory.as_mut());
-            Some(made.map_err(|_| damaged(&path))?)
-        }
-        None => None,
-    };
+    let with_statistics = parts.iter().all(|p| p.head.cache_bytes > 0);
+    let (bounds, memory) = (parts[0].head.bounds, |bytes| AlignedBytes::try_zeroed(bytes).ok_or(MergeError::Memory));
+    let learns = with_statistics && settings.strategy.space() == Some(Space::Scene);
+    let size = CacheSize::within(settings.learning.cache_bytes, settings.shards).filter(|_| learns);
+    let mut of_cache = size.and_then(Cache::layout).map(|layout| memory(layout.size)).transpose()?;
+    let objective = settings.learning.objective;
+    let made = of_cache.as_mut().zip(size).map(|(memory, size)| Cache::new(size, bounds, objective, memory.as_mut()));
+    let mut cache = made.transpose().map_err(|_| damaged(&path))?;
+    let size = settings.guide_size().filter(|_| with_statistics);
+    let mut of_guide = size.and_then(Guide::layout).map(|layout| memory(layout.size)).transpose()?;
+    let made = of_guide.as_mut().zip(size).map(|(memory, size)| Guide::new(size, bounds, memory.as_mut()));
+    let mut guide = made.transpose().map_err(|_| damaged(&path))?;
     let (mut counters, mut seconds, mut spp) = (Counters::default(), 0.0, 0u32);
     for part in parts {
-        let (pixels, planes, saved) = part.body().map_err(|e| MergeError::File(part.path.clone(), e))?;
+        let (pixels, planes, learned) = part.body().map_err(|e| MergeError::File(part.path.clone(), e))?;
         let plane = |n: usize, pixel: usize| planes.get(n * pixels.len() + pixel).copied().unwrap_or(0.0);
         film.add(|i| pixels[i].stats(), plane);
-        if let Some(cache) = &mut cache {
-            cache.merge(&saved).map_err(|_| damaged(&part.path))?;
+        if cache.is_some() || guide.is_some() {
+            saved::merge(cache.as_mut(), guide.as_mut(), &learned).map_err(|_| damaged(&part.path))?;
         }
         let h = &part.head;
         counters.merge(&h.counters);
         (seconds, spp) = (seconds + h.seconds, spp.saturating_add(h.samples[1]));
     }
     let stopped: Vec<PathBuf> = parts.iter().filter(|p| p.head.stopped != 0).map(|p| p.path.clone()).collect();
-    let saved = cache.as_ref().map(save).transpose().map_err(|_| damaged(&path))?;
+    let learned = cache.is_some() || guide.is_some();
+    let saved = learned.then(|| save(cache.as_ref(), guide.as_ref())).transpose().map_err(|_| damaged(&path))?;
     let film = film.finish(parts[0].head.highlight);
     let rendered = Rendered {
         size: film.size(),

@@ -207,8 +207,8 @@ fn wrong_files_are_named_before_rendering() {
     fails(&["-o", &long], &["cannot write ...xxx", "too long"]);
     ears(&["-o", "d.exr", "--cache-out", "d.png"], &["cannot write d.png", "share"]);
     beside.iter().for_each(|name| std::fs::remove_dir(name).unwrap());
-    fails(&["--rrs", "classic", "--cache-out", "x.cache"], &["`classic`", "no cache"]);
-    fails(&["--rrs", "bolin-meyer", "--cache-in", "words.cache"], &["`bolin-meyer`", "no cache"]);
+    fails(&["--rrs", "classic", "--cache-out", "x.cache"], &["`classic`", "no statistics"]);
+    fails(&["--rrs", "bolin-meyer", "--cache-in", "words.cache"], &["`bolin-meyer`", "no statistics"]);
     fails(&["--rrs", "classic", "--control-variate", "cached"], &["control variate", "ears"]);
 
     // of a scene with other bounds: a triangle
@@ -300,7 +300,8 @@ fn every_flag_changes_the_picture() {
         &["--ring", "16"],
         &["--split-budget", "0"],
         &["--ledger", "16"],
-        &["--learn-samples", "1"],
+        // what is guided is learned from more often
+        &["--learn-samples", "1", "--guiding", "off"],
         &["--subdivide-count", "1000"],
         &["--decay", "0"],
         &["--factors", "1:1"],

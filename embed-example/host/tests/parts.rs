@@ -274,7 +274,7 @@ fn damaged_parts_are_refused() {
 }
 
 /// The program: any order gives the same bytes, statistics of all parts can be gone on with. Killed by: an order that
-/// matters, a cache that is not that of the scene, files that are overwritten.
+/// matters, a cache that is not that of the scene, guides that are left out, files that are overwritten.
 #[test]
 fn the_program_renders_and_merges_parts() {
     let folder = tempfile::tempdir().unwrap();
@@ -300,6 +300,8 @@ fn the_program_renders_and_merges_parts() {
     assert!(samples.iter().all(|n| *n == 6.0) && picture.layer("CryptoObject00").is_some());
     // names of objects come from the parts
     assert!(String::from_utf8_lossy(&bytes("x.exr")).contains("glass sphere"));
+    // the parts' guides became one, behind the cache
+    assert_eq!(bytes("all.cache").windows(8).filter(|w| w == b"CRPGUIDE").count(), 1);
     let done = run(&["render", "cornell", "--size", "24x16", "--spp", "1", "--cache-in", "all.cache"]);
     assert!(done.status.success(), "{}", text(&done.stderr));
 

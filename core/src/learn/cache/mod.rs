@@ -38,6 +38,7 @@ pub use bins::{BIN_LIMIT, MAX_VALUE, NO_BIN};
 pub use kind::{VertexKind, VertexKind8};
 pub use save::CacheError;
 pub(super) use save::check_shape;
+pub(in crate::learn) use save::{not_saved, saved_length};
 pub use shared::Cache;
 pub(super) use shared::CacheScalars;
 pub use size::CacheSize;

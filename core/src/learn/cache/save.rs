@@ -117,6 +117,8 @@ pub enum CacheError {
         /// Value of the sum.
         found: f64,
     },
+    /// Nothing is learned here, or nothing of what was saved, or an iteration runs.
+    Absent,
     /// More leaves than there is room for.
     Full {
         /// Leaves needed.
@@ -150,6 +152,7 @@ impl fmt::Display for CacheError {
             Self::Sum { leaf, bin, field, found } => {
                 write!(f, "leaf {leaf} bin {bin} field {field} of the saved cache is {found}, need 0 to {MAX_SUM:e}")
             }
+            Self::Absent => f.write_str("nothing is learned here that could be saved or loaded, or an iteration runs"),
             Self::Full { needed, room } => write!(f, "saved cache has {needed} leaves, there is room for {room}"),
         }
     }
@@ -171,6 +174,21 @@ fn padded(nodes: u32) -> usize {
 /// Length of a saved cache, bytes.
 fn length(nodes: u32, leaves: u32) -> usize {
     (leaves as usize).saturating_mul(LEAF_BYTES).saturating_add(HEADER).saturating_add(padded(nodes))
+}
+
+/// Length of the saved cache that bytes begin with, by its header; `None` if they begin with something else.
+pub(in crate::learn) fn saved_length(bytes: &[u8]) -> Option<usize> {
+    let (header, _) = bytes.split_at_checked(HEADER)?;
+    let h = words_to_native(bytemuck::pod_read_unaligned(header));
+    (h.magic == MAGIC).then(|| if h.version == VERSION { length(h.nodes, h.leaves) } else { bytes.len() })
+}
+
+/// Why bytes are nothing that was saved.
+pub(in crate::learn) fn not_saved(bytes: &[u8]) -> CacheError {
+    match bytes.split_at_checked(HEADER) {
+        Some((header, _)) => CacheError::Magic(words_to_native(bytemuck::pod_read_unaligned(header)).magic),
+        None => CacheError::Length { needed: HEADER, given: bytes.len() },
+    }
 }
 
 fn read_sums(bytes: &[u8]) -> BinSums {

@@ -5,7 +5,8 @@
 //! integral of F^2 / m_k  =  E[ X^2 m / m_k ],      X = F / m,      m_k = g_k q + (1 - g_k) p
 //! ```
 //!
-//! for each of eight shares g_k, one vector of eight lanes. q is that of an earlier iteration, so what it promises is
+//! for each of eight shares g_k, one vector of eight lanes. Where pixels that are not guided teach too, m is the one mixture
+//! that all samples count as (`tracer/guided.rs`, `as_one_mixture`). q is that of an earlier iteration, so what it promises is
 //! not what it was fitted to. The share with the least moment is taken. Where few samples tell (by their effective
 //! number, (sum X^2)^2 / sum X^4) the moments are shrunk towards those of a useless guide, 1 / (1 - g_k) of that
 //! without it: little knowledge means BSDF sampling.
@@ -64,6 +65,17 @@ impl LeafSums {
     pub(super) fn discount(&mut self, keep: f32) {
         self.hits *= keep;
         self.scale_moments(keep * keep);
+    }
+
+    /// Adds a share of what another leaf has learned.
+    pub(super) fn merge(&mut self, o: &Self, share: f32) {
+        let mut part = *o;
+        part.scale_moments(share);
+        let add = |a: &mut f32, b: f32| *a = (*a + b).min(f32::MAX);
+        add(&mut self.hits, o.hits * share);
+        add(&mut self.square, part.square);
+        add(&mut self.fourth, part.fourth);
+        self.moments.iter_mut().zip(part.moments).for_each(|(a, b)| add(a, b));
     }
 
     /// The part of one of eight children.

@@ -25,6 +25,7 @@
 //! | `shared` | [`Guide`]: what all shards sample |
 //! | `rebuild` | from logs to what is sampled |
 //! | `save` | the guide as bytes |
+//! | `merge` | guides that were learned apart |
 //! | `watch` | is it worth its cost? |
 
 /// The crate's feature `guiding`. Without it there is no guide, and compilers remove what would serve one.
@@ -32,6 +33,7 @@ pub(crate) const COMPILED: bool = cfg!(feature = "guiding");
 
 mod fraction;
 mod log;
+mod merge;
 mod node;
 mod rebuild;
 mod save;
@@ -43,8 +45,9 @@ mod tests;
 mod watch;
 
 pub use log::{GuideLog, NO_LEAF, UNKNOWN_SHARE};
+pub(in crate::learn) use save::saved_length;
 pub(crate) use shared::GuideScalars;
 pub use shared::{Guide, Guide8};
 pub use size::GuideSize;
+pub(crate) use watch::{ENOUGH, LEARNED, Promise, TrialShares, Watch};
 pub use watch::{GuideGain, GuideUse};
-pub(crate) use watch::{LEARNED, Promise, TrialShares, Watch};

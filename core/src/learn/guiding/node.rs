@@ -148,6 +148,13 @@ impl NodeSums {
         *hits = hits.saturating_add(1);
     }
 
+    /// Adds to a cell what others have learned of it.
+    pub(super) fn merge(&mut self, cell: usize, moment: f32, hits: f32) {
+        let (sum, all) = (&mut self.moment[cell & (CELLS - 1)], &mut self.hits[cell & (CELLS - 1)]);
+        *sum = (*sum + moment).min(f32::MAX);
+        *all = (f32::from(*all) + hits) as u16;
+    }
+
     /// Multiplies what was learned by `keep`, 0 to 1.
     pub(super) fn scale(&mut self, keep: f32) {
         for (m, h) in self.moment.iter_mut().zip(&mut self.hits) {

@@ -46,7 +46,7 @@ impl Guide<'_> {
         loop {
             if self.wants_logs() {
                 logs.clone().for_each(|log| {
-                    let _ = self.replay(log, 0, usize::MAX);
+                    let _ = self.replay(log, 0, usize::MAX, 1.0);
                 });
                 self.end_replay();
             }
@@ -72,17 +72,19 @@ impl Guide<'_> {
         self.scalars.rebuild.round == 0
     }
 
-    /// Replays a log from entry `at` on, `limit` at most; their number, and `true` after the last.
-    pub(crate) fn replay(&mut self, log: &GuideLog<'_>, at: usize, limit: usize) -> (usize, bool) {
+    /// Replays a log from entry `at` on, `limit` at most; their number, and `true` after the last. The part `guided` of its
+    /// samples was guided.
+    pub(crate) fn replay(&mut self, log: &GuideLog<'_>, at: usize, limit: usize, guided: f32) -> (usize, bool) {
         let hits = log.hits();
         let end = at.saturating_add(limit).min(hits.len());
-        let (weight, first) = (log.weight(), self.scalars.rebuild.round == 0);
+        let weight = log.weight();
         let some = hits.get(at..end).unwrap_or(&[]);
+        let first = self.is_first_replay().then_some(guided);
         for hit in some {
             self.add(hit, weight, first);
         }
         let done = end >= hits.len();
-        if done && first {
+        if done && first.is_some() {
             self.scalars.thinned = self.scalars.thinned.saturating_add(log.thinned().into());
         }
         (some.len(), done)
@@ -150,17 +152,18 @@ impl Guide<'_> {
         (work, r.pass == 0)
     }
 
-    /// Adds a contribution that counts `weight` times; after the `first` round to nodes that are new only.
-    fn add(&mut self, hit: &GuideHit, weight: f32, first: bool) {
+    /// Adds a contribution that counts `weight` times; after the first round, which has the part of samples that were
+    /// guided, to nodes that are new only.
+    fn add(&mut self, hit: &GuideHit, weight: f32, first: Option<f32>) {
         let leaf = hit.leaf() as usize;
         if leaf >= self.tree.leaves() as usize {
             return;
         }
         let [square, pdf] = hit.square_and_pdf();
-        if first {
+        if let Some(guided) = first {
             let FrozenLeaf { root, .. } = self.frozen[leaf];
-            let share = self.frozen[leaf].share();
-            self.leaves[leaf].add(square, hit.share(), f32::from(share) / 65_536.0, weight);
+            let share = f32::from(self.frozen[leaf].share()) / 65_536.0;
+            self.leaves[leaf].add(square, hit.share(), share * guided, weight);
             if root == UNIFORM && pdf > 0.0 {
                 let Some(root) = self.take_node() else { return };
                 self.frozen[leaf].root = root;
@@ -175,7 +178,7 @@ impl Guide<'_> {
             let Some((n, sums)) = self.nodes.get(node as usize).zip(self.sums.get_mut(node as usize)) else { return };
             let child = n.child[cell];
             if child == UNIFORM {
-                if first || sums.fresh != 0 {
+                if first.is_some() || sums.fresh != 0 {
                     sums.add(cell, square * pdf * weight);
                 }
                 return;
@@ -219,11 +222,12 @@ impl Guide<'_> {
     }
 
     /// Sum of the moments below a node.
-    fn moment(&self, index: u16, level: usize) -> f32 {
+    pub(super) fn moment(&self, index: u16, level: usize) -> f32 {
         let Some((n, s)) = self.nodes.get(index as usize).zip(self.sums.get(index as usize)) else { return 0.0 };
         let below = level + 1 < LEVELS;
         let one = |(c, m): (&u16, &f32)| if below && *c != UNIFORM { self.moment(*c, level + 1) } else { *m };
-        n.child.iter().zip(&s.moment).map(one).sum()
+        // sums of numbers that were loaded may overflow
+        n.child.iter().zip(&s.moment).map(one).sum::<f32>().min(f32::MAX)
     }
 
     /// Masses of the cells of a node on level `level`, those of nodes below included.
@@ -364,13 +368,18 @@ impl Guide<'_> {
         }
     }
 
-    /// Subdivides the leaf at a node of the octrees if it has many contributions: its children begin with an eighth
-    /// each. `false` if it has not, or there is no room.
+    /// Subdivides the leaf at a node of the octrees if it has many contributions. `false` if it has not, or there is no
+    /// room.
     fn subdivide(&mut self, index: u32) -> bool {
         let OctreeNode::Leaf { number, .. } = self.tree.node(index) else { return false };
-        let Some(leaf) = self.leaves.get(number as usize).copied().filter(|l| l.hits > SUBDIVIDE_HITS) else {
-            return false;
-        };
+        let many = self.leaves.get(number as usize).is_some_and(|l| l.hits > SUBDIVIDE_HITS);
+        many && self.divide(index)
+    }
+
+    /// Subdivides the leaf at a node of the octrees: its children begin with an eighth each. `false` if there is no room.
+    pub(super) fn divide(&mut self, index: u32) -> bool {
+        let OctreeNode::Leaf { number, .. } = self.tree.node(index) else { return false };
+        let Some(leaf) = self.leaves.get(number as usize).copied() else { return false };
         let room = self.size.nodes - self.scalars.used + self.scalars.free_nodes >= 7;
         let first = if room { self.tree.subdivide(index) } else { None };
         let Some(first) = first else {

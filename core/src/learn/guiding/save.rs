@@ -48,7 +48,7 @@ struct Header {
 /// Words of a leaf: bits of its sums, share, is there a tree.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-struct SavedLeaf {
+pub(super) struct SavedLeaf {
     sums: [u32; 12],
     fraction: u32,
     tree: u32,
@@ -57,7 +57,7 @@ struct SavedLeaf {
 /// A node: cells that are nodes, bits of the moments, contributions.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-struct SavedNode {
+pub(super) struct SavedNode {
     inner: u32,
     moment: [u32; CELLS],
     hits: [u16; CELLS],
@@ -69,8 +69,34 @@ impl SavedNode {
         Self { inner: inner.to_le(), moment: moment.map(u32::to_le), hits: hits.map(u16::to_le) }
     }
 
-    fn sums(&self) -> NodeSums {
+    /// What it has learned.
+    pub(super) fn sums(&self) -> NodeSums {
         NodeSums { moment: self.moment.map(f32::from_bits), hits: self.hits, fresh: 0 }
+    }
+
+    /// The next one of a tree.
+    pub(super) fn next(saved: &mut &[u8]) -> Option<Self> {
+        take::<Self>(saved).map(Self::to_little_endian)
+    }
+
+    /// Is the cell a node?
+    pub(super) fn is_inner(&self, cell: usize) -> bool {
+        self.inner >> cell & 1 == 1
+    }
+
+    /// Steps over the next node and those below it: what they have learned together.
+    pub(super) fn total(saved: &mut &[u8]) -> (f32, f32) {
+        let Some(node) = Self::next(saved) else { return (0.0, 0.0) };
+        let (mut moment, mut hits) = (0.0, 0.0);
+        for cell in 0..CELLS {
+            let (m, h) = if node.is_inner(cell) {
+                Self::total(saved)
+            } else {
+                (f32::from_bits(node.moment[cell]), node.hits[cell].into())
+            };
+            (moment, hits) = (moment + m, hits + h);
+        }
+        (moment, hits)
     }
 }
 
@@ -80,16 +106,26 @@ impl SavedLeaf {
         Self { sums: sums.map(u32::to_le), fraction: fraction.to_le(), tree: tree.to_le() }
     }
 
-    fn sums(&self) -> LeafSums {
+    /// What it has learned.
+    pub(super) fn sums(&self) -> LeafSums {
         bytemuck::cast(self.sums)
     }
 }
 
 /// Parts of a saved guide, checked.
-struct SavedGuide<'b> {
+pub(super) struct SavedGuide<'b> {
     shape: &'b [u8],
     leaves: &'b [u8],
     trees: &'b [u8],
+    /// Numbers of leaves and of nodes of all trees.
+    counts: [u32; 2],
+}
+
+/// Length of the saved guide that bytes begin with, by its header; `None` if they begin with something else.
+pub(in crate::learn) fn saved_length(bytes: &[u8]) -> Option<usize> {
+    let (header, _) = bytes.split_at_checked(HEADER)?;
+    let h = native(bytemuck::pod_read_unaligned(header));
+    (h.magic == MAGIC).then(|| if h.version == VERSION { length(h.nodes, h.leaves, h.trees) } else { bytes.len() })
 }
 
 fn padded(nodes: u32) -> usize {
@@ -125,7 +161,7 @@ fn take<T: Pod>(rest: &mut &[u8]) -> Option<T> {
 
 /// Steps over the next saved node and those below it; the number of nodes, `None` if one is missing or too deep.
 fn check_node(rest: &mut &[u8], level: usize) -> Option<Result<u32, f32>> {
-    let node: SavedNode = take::<SavedNode>(rest)?.to_little_endian();
+    let node = SavedNode::next(rest)?;
     if let Some(bad) = node.sums().moment.into_iter().find(|m| !(0.0..=f32::MAX).contains(m)) {
         return Some(Err(bad));
     }
@@ -144,7 +180,7 @@ fn check_node(rest: &mut &[u8], level: usize) -> Option<Result<u32, f32>> {
 }
 
 impl<'b> SavedGuide<'b> {
-    fn check(bytes: &'b [u8], guide: &Guide<'_>) -> Result<Self, CacheError> {
+    pub(super) fn check(bytes: &'b [u8], guide: &Guide<'_>) -> Result<Self, CacheError> {
         let given = bytes.len();
         let (header, body) = bytes.split_at_checked(HEADER).ok_or(CacheError::Length { needed: HEADER, given })?;
         let h = native(bytemuck::pod_read_unaligned(header));
@@ -193,12 +229,25 @@ impl<'b> SavedGuide<'b> {
         if nodes != h.trees {
             return Err(CacheError::Shape { expected: [h.trees, h.leaves], found: [nodes, h.leaves] });
         }
-        for (needed, room) in [(h.leaves, guide.frozen.len() as u32), (h.trees.saturating_add(1), guide.size.nodes)] {
-            if needed > room {
-                return Err(CacheError::Full { needed, room });
-            }
+        Ok(Self { shape, leaves, trees, counts: [h.leaves, h.trees] })
+    }
+
+    /// Is the next node of the octrees an inner one? Steps over it; `None` after the last.
+    pub(super) fn next_is_inner(&mut self) -> Option<bool> {
+        let (first, rest) = self.shape.split_first()?;
+        self.shape = rest;
+        Some(*first == 1)
+    }
+
+    /// Steps over the next leaf and the nodes of its tree; none if it has no tree.
+    pub(super) fn next_leaf(&mut self) -> Option<(SavedLeaf, &'b [u8])> {
+        let leaf = take::<SavedLeaf>(&mut self.leaves)?.to_little_endian();
+        let (all, mut rest) = (self.trees, self.trees);
+        if leaf.tree == 1 {
+            SavedNode::total(&mut rest);
         }
-        Ok(Self { shape, leaves, trees })
+        self.trees = rest;
+        Some((leaf, all.get(..all.len() - rest.len()).unwrap_or(&[])))
     }
 }
 
@@ -280,33 +329,46 @@ impl Guide<'_> {
     /// # Errors
     /// Those of a saved cache, whose shape a guide has; a sum's `bin` and `field` mean nothing here.
     pub fn load(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
-        let saved = SavedGuide::check(bytes, self)?;
-        self.reset();
-        let (mut shape, mut leaves, mut trees) = (saved.shape.iter(), saved.leaves, saved.trees);
-        for root in 0..ROOTS {
-            self.load_leaf(root, &mut shape, &mut leaves, &mut trees);
+        let mut saved = SavedGuide::check(bytes, self)?;
+        let [leaves, nodes] = saved.counts;
+        for (needed, room) in [(leaves, self.frozen.len() as u32), (nodes.saturating_add(1), self.size.nodes)] {
+            if needed > room {
+                return Err(CacheError::Full { needed, room });
+            }
         }
+        self.reset();
+        (0..ROOTS).for_each(|root| self.load_octree(root, &mut saved));
+        self.refresh();
+        Ok(())
+    }
+
+    /// Fills the octrees' tables.
+    pub(super) fn refresh(&mut self) {
         let (mut at, step) = (0, 1 << 10);
         while let Some(next) = self.tree.refresh(at, step) {
             at = next;
         }
-        Ok(())
+    }
+
+    /// Checks bytes that are to be loaded or merged, whatever room there is.
+    pub(in crate::learn) fn check(&self, bytes: &[u8]) -> Result<(), CacheError> {
+        SavedGuide::check(bytes, self).map(|_| ())
     }
 
     /// Takes the next node of the octrees and all below it. Recursion ends at the depth limit.
-    fn load_leaf(&mut self, index: u32, shape: &mut core::slice::Iter<'_, u8>, leaves: &mut &[u8], trees: &mut &[u8]) {
-        if shape.next() == Some(&1) {
+    fn load_octree(&mut self, index: u32, saved: &mut SavedGuide<'_>) {
+        if saved.next_is_inner() == Some(true) {
             let _ = self.tree.subdivide(index);
             if let OctreeNode::Inner { child } = self.tree.node(index) {
-                (child..child + 8).for_each(|c| self.load_leaf(c, shape, leaves, trees));
+                (child..child + 8).for_each(|c| self.load_octree(c, saved));
             }
             return;
         }
-        let (OctreeNode::Leaf { number, .. }, Some(leaf)) = (self.tree.node(index), take::<SavedLeaf>(leaves)) else {
+        let (OctreeNode::Leaf { number, .. }, Some((leaf, mut nodes))) = (self.tree.node(index), saved.next_leaf())
+        else {
             return;
         };
-        let leaf = leaf.to_little_endian();
-        let root = if leaf.tree == 1 { self.load_node(trees) } else { UNIFORM };
+        let root = if nodes.is_empty() { UNIFORM } else { self.load_node(&mut nodes) };
         let at = number as usize;
         if let (Some(f), Some(s)) = (self.frozen.get_mut(at), self.leaves.get_mut(at)) {
             *f = FrozenLeaf { root, fraction: 0 };
@@ -318,12 +380,11 @@ impl Guide<'_> {
 
     /// Takes the next node and those below it, no deeper than the check has seen.
     fn load_node(&mut self, trees: &mut &[u8]) -> u16 {
-        let (Some(saved), Some(index)) = (take::<SavedNode>(trees), self.take_node()) else { return UNIFORM };
-        let saved = saved.to_little_endian();
+        let (Some(saved), Some(index)) = (SavedNode::next(trees), self.take_node()) else { return UNIFORM };
         if let Some(s) = self.sums.get_mut(index as usize) {
             *s = saved.sums();
         }
-        for cell in (0..CELLS).filter(|c| saved.inner >> c & 1 == 1) {
+        for cell in (0..CELLS).filter(|c| saved.is_inner(*c)) {
             let child = self.load_node(trees);
             if let Some(n) = self.nodes.get_mut(index as usize) {
                 n.child[cell] = child;

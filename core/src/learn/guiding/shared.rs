@@ -278,6 +278,16 @@ impl<'m> Guide<'m> {
         self.scalars.thinned
     }
 
+    /// Has it learned from so many contributions, older ones discounted?
+    pub(crate) fn has_learned_from(&self, contributions: f32) -> bool {
+        let mut hits = 0.0;
+        let used = self.leaves.iter().take(self.tree.leaves() as usize);
+        used.map(|l| l.hits).any(|n| {
+            hits += n;
+            hits >= contributions
+        })
+    }
+
     /// Mean share of guided samples, over the contributions that were learned from.
     pub fn mean_fraction(&self) -> f64 {
         let used = self.tree.leaves() as usize;
@@ -294,6 +304,12 @@ impl Guide8 {
     /// Nothing to sample.
     pub const NONE: Self =
         Self { leaf: U32x8::splat(NO_LEAF), fraction: F32x8::ZERO, known: Mask8::NONE, root: [UNIFORM; 8] };
+
+    /// The same, but samples outside of `lanes` are not guided.
+    #[inline(always)]
+    pub(crate) fn only(self, lanes: Mask8) -> Self {
+        Self { fraction: lanes.zero_unless(self.fraction), ..self }
+    }
 
     /// Lanes whose sample is guided, by the random words of [`Guide::sample`].
     #[inline(always)]

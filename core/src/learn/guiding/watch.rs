@@ -1,6 +1,5 @@
-//! Is path guiding worth its cost? Predicted from the samples that are guided and learned from: with p the density of the
-//! BSDF and m that of the mixture that was sampled, a sample whose bounce gave X, and its light sample Z, has the second
-//! moment
+//! Is path guiding worth its cost? Predicted from the samples that are guided: with p the density of the BSDF and m that
+//! of the mixture that was sampled, a sample whose bounce gave X, and its light sample Z, has the second moment
 //!
 //! ```text
 //! w (X + Z)^2                      as it is
@@ -10,12 +9,13 @@
 //! on average (`fraction.rs`). w is what a squared error of the vertex counts in the error of the picture: the squared
 //! weight of the path so far, times the error weight of its pixel. The gain is the sum of the latter over that of the
 //! former. Both are of the same samples, so what is rare and large is in both, and their ratio is known much better than
-//! either: errors of guided samples and of others would need far more. And samples that are not guided would
-//! not find what a guide would.
+//! either: errors of guided samples and of others would need far more. Samples that are not guided are not asked for
+//! the gain: they would not find what a guide would.
 //!
-//! The guide is disabled while no gain is proven: then the pixels of some blocks are guided and learned from, others in
-//! each iteration. Packets without any of their samples cost what they cost without guiding. It is enabled while the gain
-//! lasts.
+//! The guide is disabled while no gain is proven: then the pixels of some blocks are guided, others in each iteration. In
+//! small pictures all pixels teach it meanwhile, so that it finds the sooner what it can gain; in others, and once a gain is
+//! out of the question, those of the blocks alone do, and packets without any of their samples cost what they cost without
+//! guiding. It is enabled while the gain lasts.
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing)]
 
 use crate::film::SqrtNewton;
@@ -36,17 +36,25 @@ const DISABLED_BELOW: f64 = 1.06;
 /// and [`LEAST`]. A guided pixel costs some of what Sobol' points gain, because its samples have a sequence of their own
 /// in each iteration; what they tell of the gain depends on their number, not on the size of the picture.
 const WANTED: [u64; 2] = [4096, 1024];
+/// Most pixels of a small picture: all of them teach the guide while nothing is decided, and half as many are guided. In
+/// larger ones they would crowd out of the logs what guided pixels find, of which each contribution tells more. By hand:
+/// `pool` at 960x540, 12 samples per pixel, has a quarter more error then.
+const SMALL: u64 = 65_536;
 /// Largest shares of the pixels that those may be, in 65536ths.
 const MOST: [u32; 2] = [65_536 / 2, 65_536 / 32];
 /// Least share: light that is rare in the picture must be met somewhere.
 const LEAST: u32 = 65_536 / 256;
 /// Binary logarithm of the edge of a block.
 const BLOCK_BITS: u32 = 3;
+/// Contributions, older ones discounted, that a guide has learned from before its gain is out of the question: some sixteen
+/// leaves have been subdivided. Where light is found often that takes an iteration or two, where it is rare many, and there
+/// guides gain most.
+pub(crate) const ENOUGH: f32 = 65_536.0;
 /// Samples before which nothing is decided.
 const FEWEST: f64 = 256.0;
-/// Samples of a guided pixel that are learned from in each iteration, at least: a choice. 8 learn too little where light
-/// is hard to find, 64 cost more.
-pub(crate) const LEARNED: u32 = 16;
+/// Samples of a guided pixel that are learned from in each iteration, at least: a choice. 8 and 16 learn too little where
+/// light is hard to find; more than 32 cost more and gain nothing.
+pub(crate) const LEARNED: u32 = 32;
 
 /// Whether path guiding pays, as [`Guiding::Auto`](crate::unstable::learn::Guiding::Auto) predicts it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -144,15 +152,30 @@ pub(crate) struct Watch {
 
 /// Shares of the blocks of pixels that are guided while the guide is disabled, in 65536ths: see [`WANTED`].
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct TrialShares([u32; 2]);
+pub(crate) struct TrialShares {
+    shares: [u32; 2],
+    /// Do all pixels teach the guide while nothing is decided?
+    pub(crate) all_teach: bool,
+}
 
 impl TrialShares {
     /// Those of a picture of this size.
     pub(crate) fn of(size: [u32; 2]) -> Self {
         let pixels = (u64::from(size[0]) * u64::from(size[1])).max(1);
         let share = |wanted: u64, most| (wanted * 65_536 / pixels).min(u64::from(most)) as u32;
-        let [undecided, unpromising] = WANTED;
-        Self([share(undecided, MOST[0]), share(unpromising, MOST[1])].map(|x| x.max(LEAST)))
+        let ([undecided, unpromising], all_teach) = (WANTED, pixels <= SMALL);
+        let undecided = if all_teach { undecided / 2 } else { undecided };
+        let shares = [share(undecided, MOST[0]), share(unpromising, MOST[1])].map(|x| x.max(LEAST));
+        Self { shares, all_teach }
+    }
+
+    /// Part of the samples learned from that are guided while nothing is decided, if so many of a guided pixel, and of
+    /// another, are learned from.
+    #[inline]
+    pub(crate) fn guided_part(self, [guided, other]: [u32; 2]) -> f32 {
+        let pixels = self.shares[0] as f32 / 65_536.0;
+        let (guided, other) = (pixels * guided as f32, (1.0 - pixels) * other as f32);
+        guided / (guided + other).max(f32::MIN_POSITIVE)
     }
 }
 
@@ -163,12 +186,18 @@ impl Watch {
         self.enabled != 0
     }
 
-    /// Is the pixel in this column and row guided in iteration `iteration`, and learned from? Blocks, because samples of a
+    /// Is it open whether the guide pays?
+    #[inline(always)]
+    pub(crate) fn is_open(&self) -> bool {
+        self.enabled == 0 && self.unpromising == 0
+    }
+
+    /// Is the pixel in this column and row guided in iteration `iteration`? Blocks, because samples of a
     /// packet are neighbours.
     #[inline]
     pub(crate) fn is_guided(&self, iteration: u64, [x, y]: [u32; 2], shares: TrialShares) -> bool {
         let block = u64::from(y >> BLOCK_BITS) << 32 | u64::from(x >> BLOCK_BITS);
-        let [undecided, unpromising] = shares.0;
+        let [undecided, unpromising] = shares.shares;
         let share = if self.unpromising != 0 { unpromising } else { undecided };
         self.enabled() || (mix(mix(block) ^ mix(iteration)) >> 48) < u64::from(share)
     }
@@ -183,12 +212,12 @@ impl Watch {
         self.promise.gain()
     }
 
-    /// Decides about the next iteration.
-    pub(crate) fn decide(&mut self, decay: f64) {
+    /// Decides about the next iteration. A gain is not out of the question before the guide has learned `enough`.
+    pub(crate) fn decide(&mut self, decay: f64, enough: bool) {
         if let Some(GuideGain { gain, error }) = self.gain() {
             let least = if self.enabled() { DISABLED_BELOW } else { ENABLED_ABOVE };
             self.enabled = (gain * (1.0 - DOUBT * error) > least).into();
-            self.unpromising = (gain * (1.0 + 2.0 * error) < DISABLED_BELOW).into();
+            self.unpromising = (enough && gain * (1.0 + 2.0 * error) < DISABLED_BELOW).into();
         }
         self.promise = self.promise.times(decay);
     }
@@ -208,8 +237,19 @@ mod tests {
     fn decided(start: Watch, p: &Promise) -> Watch {
         let mut watch = start;
         watch.add(p);
-        watch.decide(0.75);
+        watch.decide(0.75, true);
         watch
+    }
+
+    /// Killed by: a gain that is ruled out before anything is known.
+    #[test]
+    fn a_guide_that_knows_little_is_not_rejected() {
+        let mut watch = Watch::default();
+        for (enough, open) in [(false, true), (true, false), (true, false), (false, true)] {
+            watch.add(&promise(100_000, 2.0));
+            watch.decide(0.75, enough);
+            assert_eq!((watch.enabled(), watch.is_open()), (false, open));
+        }
     }
 
     /// Killed by: a gain upside down, a decision from too few samples, one that pays no heed to the standard error.
@@ -251,7 +291,7 @@ mod tests {
         let open = decided(Watch::default(), &Promise::default());
         for size in [[128, 128], [320, 200], [1024, 1024]] {
             let shares = TrialShares::of(size);
-            let [undecided, unpromising] = shares.0.map(|x| f64::from(x) / 65_536.0);
+            let [undecided, unpromising] = shares.shares.map(|x| f64::from(x) / 65_536.0);
             for (watch, share) in [(enabled, 1.0), (rejected, unpromising), (open, undecided)] {
                 let tried = (0..1u32 << 20).filter(|i| watch.is_guided(7, [i % 1024, i / 1024], shares)).count();
                 let tried = tried as f64 / f64::from(1 << 20);
@@ -266,12 +306,16 @@ mod tests {
     #[test]
     fn as_many_pixels_are_tried_in_pictures_of_most_sizes() {
         let pixels =
-            |size: [u32; 2]| TrialShares::of(size).0.map(|x| u64::from(x) * u64::from(size[0] * size[1]) / 65_536);
+            |size: [u32; 2]| TrialShares::of(size).shares.map(|x| u64::from(x) * u64::from(size[0] * size[1]) / 65_536);
         assert_eq!(pixels([512, 256]), [4096, 1024]);
+        assert_eq!(pixels([256, 256]), [2048, 1024], "all pixels teach the guide");
         assert_eq!(pixels([64, 64]), [2048, 128], "no more than a half, a thirty-second");
         assert_eq!(pixels([2048, 1024]), [8192, 8192], "no less than one in 256");
+        // one pixel in 32, of which four times as many samples are learned from
+        let part = |learned| TrialShares::of([256, 256]).guided_part(learned);
+        assert_eq!([part([32, 8]), part([1, 1]), part([0, 0])], [1.0 / 8.75, 1.0 / 32.0, 0.0]);
         for size in [[0, 0], [1, 1], [u32::MAX; 2]] {
-            assert!(TrialShares::of(size).0.iter().all(|x| (256..=32_768).contains(x)), "{size:?}");
+            assert!(TrialShares::of(size).shares.iter().all(|x| (256..=32_768).contains(x)), "{size:?}");
         }
     }
 }

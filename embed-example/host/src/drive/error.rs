@@ -21,7 +21,7 @@ pub enum DriveError {
     Shard(ShardError),
     /// The saved cache cannot be loaded, or the cache not be saved.
     Cache(CacheError),
-    /// A cache is to be loaded or saved, but this strategy learns nothing from the scene.
+    /// Statistics are to be loaded or saved, but this strategy learns nothing from the scene, and no path is guided.
     NoCache(&'static str),
     /// A checkpoint is to be resumed together with something that it holds itself: this.
     Resumed(&'static str),
@@ -66,7 +66,8 @@ impl fmt::Display for DriveError {
             Self::NoCache(strategy) => {
                 write!(
                     f,
-                    "roulette strategy `{strategy}` learns nothing from the scene: there is no cache to load or save"
+                    "roulette strategy `{strategy}` learns nothing from the scene, and no path is guided: there are no \
+                     statistics to load or save"
                 )
             }
             Self::Resumed(what) => write!(f, "a checkpoint has its own {what}: give one or the other"),
