@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 #[test]
 fn rays_c_compiles_and_needs_a_library() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    let (program, source) = (folder.join("rays"), concat!(env!("CARGO_MANIFEST_DIR"), "/embree/rays.c"));
+    let (program, source) = (folder.join("rays"), concat!(env!("CARGO_MANIFEST_DIR"), "/../embree/rays.c"));
     let mut compiler = Command::new(std::env::var_os("CC").unwrap_or_else(|| "cc".into()));
     compiler.args(["-std=c11", "-Wall", "-Wextra", "-pedantic", "-Werror", source, "-o"]).arg(&program).arg("-ldl");
     assert!(compiler.status().unwrap().success());

@@ -104,7 +104,7 @@ fn figures_that_do_not_agree_are_found() {
 /// figures.
 #[test]
 fn documents_cite_the_newest_results() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap();
     let in_folder = |name: &str| -> Vec<PathBuf> {
         std::fs::read_dir(root.join(name)).unwrap().map(|e| e.unwrap().path()).collect()
     };
@@ -125,7 +125,7 @@ fn documents_cite_the_newest_results() {
 /// was edited so that it is not read as it is written.
 #[test]
 fn committed_results_state_their_provenance() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("results");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../results");
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.is_dir() {
