@@ -13,10 +13,10 @@ need_debian_rust() {
 # All three variables: cargo would find the other toolchain's programs.
 debian_cargo() { RUSTC_BOOTSTRAP=1 RUSTC=/usr/bin/rustc RUSTDOC=/usr/bin/rustdoc /usr/bin/cargo "$@"; }
 
-# What this machine computes in place of the firmware, without building the tests.
+# What this machine computes in place of the firmware, without building the tests; with the flags of RUSTFLAGS, if any.
 numbers() {
-    CARGO_TARGET_DIR=$target/numbers cargo run --quiet --locked --manifest-path embed-example/firmware/Cargo.toml \
-        --example firmware_probe -- "$@"
+    CARGO_TARGET_DIR=$target/numbers${RUSTFLAGS:+-flags} cargo run --quiet --locked \
+        --manifest-path embed-example/firmware/Cargo.toml --example firmware_probe -- "$@"
 }
 
 # Path of an emulator of a whole Cortex-M7 machine; fails if there is none. The release's package is unpacked where it
