@@ -122,7 +122,7 @@ fn damage_is_named() {
         loaded
     };
     assert!(matches!(try_load(&|b| b[0] = 0, true), CacheError::Magic(_)));
-    assert!(matches!(try_load(&|b| b[16] = 9, true), CacheError::Version(9)));
+    assert!(matches!(try_load(&|b| b[16] = 9, true), CacheError::Version { found: 9, known: 5 }));
     assert!(matches!(try_load(&|b| b[sums + 3] ^= 1, false), CacheError::Hash { .. }));
     assert!(matches!(try_load(&|b| b.push(0), true), CacheError::Length { .. }));
     assert!(matches!(try_load(&|b| b.truncate(40), false), CacheError::Length { needed: 64, given: 40 }));
@@ -148,7 +148,7 @@ fn damage_is_named() {
             |b: &mut Vec<u8>| b[sums + 8 * (16 * FIELDS + FIELDS + 2)..][..8].copy_from_slice(&f64::to_le_bytes(x));
         let e = try_load(&edit, true);
         assert!(matches!(e, CacheError::Sum { leaf: 1, bin: 1, field: 2, found } if found.to_bits() == x.to_bits()));
-        assert!(format!("{e}").starts_with("leaf 1 bin 1 field 2 of the saved cache is "), "{e}");
+        assert!(format!("{e}").starts_with("leaf 1 bin 1 field 2 of the saved statistics is "), "{e}");
     }
 }
 

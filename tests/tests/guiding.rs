@@ -341,6 +341,10 @@ fn damaged_statistics_change_nothing() {
         }
         assert_eq!(l.load_statistics(&[7; 100]), Err(CacheError::Magic(0x0707_0707_0707_0707)));
         assert_eq!(l.load_statistics(b"CRP"), Err(CacheError::Length { needed: 64, given: 3 }));
+        let mut newer = bytes.clone();
+        newer[cache.len() + 16] = 9;
+        let e = l.load_statistics(&newer).unwrap_err();
+        assert!(e.to_string().ends_with("version 9, only 1 is known"), "{e}");
         assert!(l.saved_statistics() == before);
     });
 }

@@ -99,9 +99,9 @@ fn wrong_statistics_are_errors() {
     let mut flipped = good.clone();
     flipped[1000] ^= 1;
     for (bytes, said) in [
-        (&b""[..], "has 64 bytes, 0 given"),
-        (b"no cache", "has 64 bytes, 8 given"),
-        (scene(), "not a saved cache"),
+        (&b""[..], "have 64 bytes, 0 given"),
+        (b"no cache", "have 64 bytes, 8 given"),
+        (scene(), "no saved statistics"),
         (&good[..good.len() - 1], "bytes"),
         (&flipped, "hash"),
     ] {

@@ -194,7 +194,7 @@ fn wrong_files_are_named_before_rendering() {
     .unwrap();
     std::fs::create_dir(dir.join("folder")).unwrap();
     ears(&["--cache-in", "missing.cache"], &["cannot read missing.cache", "No such file"]);
-    ears(&["--cache-in", "words.cache"], &["words.cache: not a saved cache"]);
+    ears(&["--cache-in", "words.cache"], &["words.cache: no saved statistics"]);
     ears(&["--cache-out", "no/where.cache"], &["cannot write no/where.cache", "not a folder"]);
     ears(&["--cache-out", "folder"], &["cannot write folder", "it is a folder"]);
     ears(&["--cache-bytes", "1KiB"], &["cache of 1024 bytes"]);
@@ -257,7 +257,7 @@ fn everything_at_once() {
     let refused = render(dir, &begun);
     let error = text(&refused.stderr);
     assert_eq!(refused.status.code(), Some(1), "{error}");
-    assert!(error.contains("a.cache: saved cache has values for the objective absolute, need relative"), "{error}");
+    assert!(error.contains("a.cache: saved statistics have values for the objective absolute, need relative"), "{error}");
     let plain = json(&render(dir, &[&begun[..], &["--objective", "absolute"]].concat()));
     assert!(["iterations", "time", "false_color", "cache_out"].iter().all(|k| plain.get(*k).is_none()), "{plain}");
     assert!(Picture::read_exr(&dir.join("b.exr")).unwrap().layer("denoised").is_none());

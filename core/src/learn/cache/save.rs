@@ -63,10 +63,15 @@ pub enum CacheError {
         /// Bytes given.
         given: usize,
     },
-    /// Not a saved cache; the first eight bytes.
+    /// Neither a saved cache nor a saved guide; the first eight bytes.
     Magic(u64),
     /// A version of the format that is not known.
-    Version(u32),
+    Version {
+        /// Version of the bytes.
+        found: u32,
+        /// The one that can be loaded.
+        known: u32,
+    },
     /// The hash of the contents is not the one stored.
     Hash {
         /// Hash in the header.
@@ -131,29 +136,31 @@ pub enum CacheError {
 impl fmt::Display for CacheError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Length { needed, given } => write!(f, "saved cache has {needed} bytes, {given} given"),
-            Self::Magic(m) => write!(f, "not a saved cache: starts with {m:#018x}"),
-            Self::Version(v) => write!(f, "saved cache of version {v}, only {VERSION} is known"),
-            Self::Hash { stored, found } => write!(f, "saved cache has hash {found:#018x}, header says {stored:#018x}"),
-            Self::Bounds { index: 3, expected, found } => write!(f, "saved cache has edge {found}, need {expected}"),
+            Self::Length { needed, given } => write!(f, "saved statistics have {needed} bytes, {given} given"),
+            Self::Magic(m) => write!(f, "no saved statistics: the first bytes are {m:#018x}"),
+            Self::Version { found, known } => {
+                write!(f, "saved statistics of version {found}, only {known} is known")
+            }
+            Self::Hash { stored, found } => write!(f, "saved statistics have hash {found:#018x}, header says {stored:#018x}"),
+            Self::Bounds { index: 3, expected, found } => write!(f, "saved statistics have edge {found}, need {expected}"),
             Self::Bounds { index, expected, found } => {
-                write!(f, "saved cache starts at {found} on axis {index}, need {expected}")
+                write!(f, "saved statistics start at {found} on axis {index}, need {expected}")
             }
             Self::Objective { expected, found } => match Objective::from_u32(*found) {
-                Some(o) => write!(f, "saved cache has values for the objective {o}, need {expected}"),
-                None => write!(f, "saved cache has values for an unknown objective, {found}, need {expected}"),
+                Some(o) => write!(f, "saved statistics have values for the objective {o}, need {expected}"),
+                None => write!(f, "saved statistics have values for an unknown objective, {found}, need {expected}"),
             },
             Self::OctreeNode { index, found, depth } => {
-                write!(f, "node {index} of the saved cache is {found} at depth {depth}")
+                write!(f, "node {index} of the saved statistics is {found} at depth {depth}")
             }
             Self::Shape { expected: [n, l], found: [m, k] } => {
-                write!(f, "saved cache has {m} nodes and {k} leaves, header says {n} and {l}")
+                write!(f, "saved statistics have {m} nodes and {k} leaves, header says {n} and {l}")
             }
             Self::Sum { leaf, bin, field, found } => {
-                write!(f, "leaf {leaf} bin {bin} field {field} of the saved cache is {found}, need 0 to {MAX_SUM:e}")
+                write!(f, "leaf {leaf} bin {bin} field {field} of the saved statistics is {found}, need 0 to {MAX_SUM:e}")
             }
             Self::Absent => f.write_str("nothing is learned here that could be saved or loaded, or an iteration runs"),
-            Self::Full { needed, room } => write!(f, "saved cache has {needed} leaves, there is room for {room}"),
+            Self::Full { needed, room } => write!(f, "saved statistics have {needed} leaves, there is room for {room}"),
         }
     }
 }
@@ -208,7 +215,7 @@ impl<'b> SavedCache<'b> {
             return Err(CacheError::Magic(header.magic));
         }
         if header.version != VERSION {
-            return Err(CacheError::Version(header.version));
+            return Err(CacheError::Version { found: header.version, known: VERSION });
         }
         let needed = length(header.nodes, header.leaves);
         if given != needed {

@@ -188,7 +188,7 @@ impl<'b> SavedGuide<'b> {
             return Err(CacheError::Magic(h.magic));
         }
         if h.version != VERSION {
-            return Err(CacheError::Version(h.version));
+            return Err(CacheError::Version { found: h.version, known: VERSION });
         }
         let needed = length(h.nodes, h.leaves, h.trees);
         if given != needed {
