@@ -257,7 +257,10 @@ fn everything_at_once() {
     let refused = render(dir, &begun);
     let error = text(&refused.stderr);
     assert_eq!(refused.status.code(), Some(1), "{error}");
-    assert!(error.contains("a.cache: saved statistics have values for the objective absolute, need relative"), "{error}");
+    assert!(
+        error.contains("a.cache: saved statistics have values for the objective absolute, need relative"),
+        "{error}"
+    );
     let plain = json(&render(dir, &[&begun[..], &["--objective", "absolute"]].concat()));
     assert!(["iterations", "time", "false_color", "cache_out"].iter().all(|k| plain.get(*k).is_none()), "{plain}");
     assert!(Picture::read_exr(&dir.join("b.exr")).unwrap().layer("denoised").is_none());

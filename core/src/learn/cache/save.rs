@@ -141,8 +141,12 @@ impl fmt::Display for CacheError {
             Self::Version { found, known } => {
                 write!(f, "saved statistics of version {found}, only {known} is known")
             }
-            Self::Hash { stored, found } => write!(f, "saved statistics have hash {found:#018x}, header says {stored:#018x}"),
-            Self::Bounds { index: 3, expected, found } => write!(f, "saved statistics have edge {found}, need {expected}"),
+            Self::Hash { stored, found } => {
+                write!(f, "saved statistics have hash {found:#018x}, header says {stored:#018x}")
+            }
+            Self::Bounds { index: 3, expected, found } => {
+                write!(f, "saved statistics have edge {found}, need {expected}")
+            }
             Self::Bounds { index, expected, found } => {
                 write!(f, "saved statistics start at {found} on axis {index}, need {expected}")
             }
@@ -157,7 +161,10 @@ impl fmt::Display for CacheError {
                 write!(f, "saved statistics have {m} nodes and {k} leaves, header says {n} and {l}")
             }
             Self::Sum { leaf, bin, field, found } => {
-                write!(f, "leaf {leaf} bin {bin} field {field} of the saved statistics is {found}, need 0 to {MAX_SUM:e}")
+                write!(
+                    f,
+                    "leaf {leaf} bin {bin} field {field} of the saved statistics is {found}, need 0 to {MAX_SUM:e}"
+                )
             }
             Self::Absent => f.write_str("nothing is learned here that could be saved or loaded, or an iteration runs"),
             Self::Full { needed, room } => write!(f, "saved statistics have {needed} leaves, there is room for {room}"),
