@@ -87,7 +87,8 @@ fn check(name: &str) {
         (format.run)(&mut bench, &std::fs::read(file).unwrap());
     }
     let more = std::env::var("CROUPIER_FUZZED").ok().map(|n| n.parse::<usize>().unwrap());
-    let inputs = more.unwrap_or(if matches!(name, "blob" | "cache" | "checkpoint") { SESSIONS } else { INPUTS });
+    let inputs =
+        more.unwrap_or(if matches!(name, "blob" | "cache" | "guide" | "checkpoint") { SESSIONS } else { INPUTS });
     let mut rng = SplitMix(name.bytes().map(u64::from).sum::<u64>() + more.unwrap_or(0) as u64);
     let mut accepted = 0;
     for i in 0..inputs {
@@ -123,4 +124,4 @@ macro_rules! formats {
         }
     };
 }
-formats!(obj, mtl, gltf, glb, ply, stl, json, png, jpeg, exr, hdr, blob, cache, checkpoint);
+formats!(obj, mtl, gltf, glb, ply, stl, json, png, jpeg, exr, hdr, blob, cache, guide, checkpoint);

@@ -2,6 +2,7 @@
 //! `tests/tests/fuzzed.rs`. A format that is added gets a row in [`FORMATS`], a function and seeds; a fuzz target of its
 //! name goes into `targets/` and `Cargo.toml`.
 
+use croupier::unstable::profile::{Full, Guided, Profile};
 use croupier::unstable::scene::blob::{Header, content_hash};
 use croupier::{Budget, Plan, Scene, Session, Settings, Shard, StepResult};
 use croupier_host::bake::{BakeOptions, bake};
@@ -170,6 +171,7 @@ pub const FORMATS: &[Format] = &[
     },
     Format { name: "blob", run: Workbench::blob, seeds: || vec![small_blob().to_vec()], words: &[] },
     Format { name: "cache", run: Workbench::cache, seeds: cache_seeds, words: &[] },
+    Format { name: "guide", run: Workbench::guide, seeds: guide_seeds, words: &[] },
     Format { name: "checkpoint", run: Workbench::checkpoint, seeds: checkpoint_seeds, words: &["ears", "=", "\n"] },
 ];
 
@@ -276,12 +278,22 @@ impl Workbench {
 
     /// A saved cache whose hash is made right.
     fn cache(&mut self, data: &[u8]) -> bool {
-        let mut bytes = data.to_vec();
-        if let Some((head, rest)) = bytes.split_at_mut_checked(16) {
-            head[8..].copy_from_slice(&content_hash(rest).to_le_bytes());
-        }
+        let bytes = with_hash(data);
         let scene = Scene::from_bytes(&self.scene).expect("a valid scene");
         render(&scene, |session| session.cache_mut().is_some_and(|c| c.load(&bytes).is_ok()))
+    }
+
+    /// A saved guide whose hash is made right, loaded, then added to itself.
+    fn guide(&mut self, data: &[u8]) -> bool {
+        let bytes = with_hash(data);
+        let scene = Scene::from_bytes(&self.scene).expect("a valid scene");
+        render_with::<Guided<Full>>(&scene, &guided_settings(&scene), |session| {
+            let loaded = session.load_statistics(&bytes);
+            if let Err(e) = &loaded {
+                assert_message(&e.to_string(), Path::new("none"));
+            }
+            loaded.is_ok() && session.merge_statistics(&bytes).is_ok()
+        })
     }
 
     /// A checkpoint whose hashes are made right.
@@ -308,6 +320,24 @@ fn assert_message(text: &str, folder: &Path) {
     assert!(text.chars().all(|c| !c.is_control()), "{text:?}");
 }
 
+/// Saved statistics whose hash is made right: that of everything after it.
+fn with_hash(data: &[u8]) -> Vec<u8> {
+    let mut bytes = data.to_vec();
+    if let Some((head, rest)) = bytes.split_at_mut_checked(16) {
+        head[8..].copy_from_slice(&content_hash(rest).to_le_bytes());
+    }
+    bytes
+}
+
+/// A guide and no cache: its bytes are all that is saved.
+fn guided_settings(scene: &Scene<'_>) -> Settings {
+    let mut s = settings(scene);
+    for (name, value) in [("rrs", "classic"), ("guiding", "on"), ("guide-bytes", "96KiB")] {
+        s.set(name, value).expect("a setting");
+    }
+    s
+}
+
 fn settings(scene: &Scene<'_>) -> Settings {
     let mut s = Settings { size: [4, 3], shards: 1, aovs: true.into(), ..Settings::for_scene(scene) };
     for (name, value) in [("rrs", "ears"), ("cache-bytes", "96KiB"), ("ring", "32"), ("ledger", "64")] {
@@ -318,9 +348,19 @@ fn settings(scene: &Scene<'_>) -> Settings {
 
 /// A few rays of the scene, after a change of the session; whether the change succeeded.
 fn render(scene: &Scene<'_>, change: impl FnOnce(&mut Session<'_, '_>) -> bool) -> bool {
-    let plan = Plan::new(&settings(scene)).expect("valid settings");
+    render_with::<Full>(scene, &settings(scene), change)
+}
+
+/// [`render`] with a profile and settings.
+fn render_with<P: Profile>(
+    scene: &Scene<'_>,
+    settings: &Settings,
+    change: impl FnOnce(&mut Session<'_, '_, P>) -> bool,
+) -> bool {
+    let plan = Plan::new(settings).expect("valid settings");
     let mut block = AlignedBytes::zeroed(plan.session().size);
-    let Ok(mut session) = Session::new(*scene, &plan, block.as_mut()) else { return false };
+    let built = Session::builder(*scene).profile::<P>().build(&plan, block.as_mut());
+    let Ok(mut session) = built else { return false };
     let changed = change(&mut session);
     if changed {
         iterate(&mut session, &plan);
@@ -329,7 +369,7 @@ fn render(scene: &Scene<'_>, change: impl FnOnce(&mut Session<'_, '_>) -> bool) 
 }
 
 /// Two iterations, of a bounded number of rays.
-fn iterate(session: &mut Session<'_, '_>, plan: &Plan) {
+fn iterate<P: Profile>(session: &mut Session<'_, '_, P>, plan: &Plan) {
     let mut own = AlignedBytes::zeroed(plan.shard().size);
     let mut shard = Shard::new(plan, 0, own.as_mut()).expect("memory of the plan");
     for _ in 0..2 {
@@ -352,9 +392,10 @@ fn iterate(session: &mut Session<'_, '_>, plan: &Plan) {
 /// The smallest scene with all kinds of records: a floor, a lamp, a constant environment.
 fn small_blob() -> AlignedBytes {
     let mut scene = SceneDescription { camera: Camera { size: [4, 3], ..Camera::default() }, ..Default::default() };
-    for (name, z, y) in [("floor", 0.5, [0.2; 3]), ("lamp", 0.9, [0.0; 3])] {
+    // the floor is seen around the light, so that there is something to learn
+    for (name, side, z, y) in [("floor", 1.0, 0.5, [0.2; 3]), ("lamp", 0.3, 0.9, [0.0; 3])] {
         let material = scene.add_material(name, Model::Diffuse { reflectance: Reflectance::Constant(y) });
-        let corners = [[-1.0, -1.0, z], [1.0, -1.0, z], [1.0, 1.0, z], [-1.0, 1.0, z]];
+        let corners = [[-side, -side, z], [side, -side, z], [side, side, z], [-side, side, z]];
         let corners = corners.map(|position| Vertex { position, ..Vertex::default() });
         scene.add_mesh(name, material, &corners, &[[0, 1, 2], [0, 2, 3]], false);
     }
@@ -442,6 +483,32 @@ fn cache_seeds() -> Vec<Vec<u8>> {
     let mut saved = vec![0; cache.saved_len()];
     cache.save(&mut saved).expect("memory of that length");
     vec![saved]
+}
+
+/// A guide that has learned nothing, and one of several leaves.
+fn guide_seeds() -> Vec<Vec<u8>> {
+    let blob = small_blob();
+    let scene = Scene::from_bytes(&blob).expect("a valid scene");
+    let settings = Settings { size: [64, 48], ..guided_settings(&scene) };
+    let plan = Plan::new(&settings).expect("valid settings");
+    let mut block = AlignedBytes::zeroed(plan.session().size);
+    let built = Session::builder(scene).profile::<Guided<Full>>().build(&plan, block.as_mut());
+    let mut session = built.expect("memory of the plan");
+    let mut own = AlignedBytes::zeroed(plan.shard().size);
+    let mut shard = Shard::new(&plan, 0, own.as_mut()).expect("memory of the plan");
+    let mut seeds = Vec::new();
+    for samples in [0, 1, 2, 4, 8] {
+        if samples > 0 {
+            session.begin_iteration(samples);
+            while shard.step(&session, Budget { rays: 1 << 16 }) != StepResult::Done {}
+            session.end_iteration(std::slice::from_ref(&shard)).expect("a finished shard");
+        }
+        let mut saved = vec![0; session.saved_statistics_len()];
+        session.save_statistics(&mut saved).expect("memory of that length");
+        seeds.push(saved);
+    }
+    assert!(seeds[4].len() > 4 * seeds[0].len(), "{:?}", seeds.iter().map(Vec::len).collect::<Vec<_>>());
+    vec![seeds.swap_remove(4), seeds.swap_remove(0)]
 }
 
 fn checkpoint_seeds() -> Vec<Vec<u8>> {

@@ -1,0 +1,3 @@
+#![no_main]
+
+croupier_fuzz::target!("guide");
