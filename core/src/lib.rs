@@ -139,7 +139,7 @@ pub mod unstable {
     pub use crate::memory::Layout;
     pub use crate::plan::STACK_BYTES;
     pub use crate::record::ResumeError;
-    pub use crate::sampler::Sampler;
+    pub use crate::sampler::{Numbers8, Sampler};
     pub use crate::scene::Effects;
     pub use crate::session::Phase;
     pub use crate::setting::{SettingInfo, SettingRange, SettingValue};

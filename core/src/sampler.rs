@@ -38,6 +38,22 @@ pub enum Sampler {
 
 names!(Sampler: Hashed = "hashed", Sobol = "sobol");
 
+/// A key, and where its numbers come from.
+#[derive(Clone, Copy, Debug)]
+pub struct Numbers8 {
+    /// The sampler that the key was made with.
+    pub sampler: Sampler,
+    /// The key.
+    pub key: Key8,
+}
+
+impl Numbers8 {
+    /// Independent numbers.
+    pub const fn hashed(key: Key8) -> Self {
+        Self { sampler: Sampler::Hashed, key }
+    }
+}
+
 /// Vertices of a path whose samples may belong to sequences: beyond, numbers are hashed.
 const SOBOL_DEPTH: u32 = 4;
 
@@ -179,11 +195,20 @@ impl Key8 {
         }
     }
 
-    /// Steps 2 `pair` and 2 `pair` + 1 of a flight through a medium: each the words of an optical depth and of a
-    /// choice.
+    /// Key of the stretch of a sample's shadow ray behind so many surfaces.
     #[inline(always)]
-    pub(crate) fn flight_steps(self, pair: u32) -> [[U32x8; 2]; 2] {
-        let [a, b, c, d] = self.words(FLIGHT_BLOCK + pair);
+    pub(crate) fn shadow_stretch(self, sampler: Sampler, passed: u32) -> Self {
+        let n = U32x8::splat(!passed);
+        match sampler {
+            Sampler::Hashed => self.child(n),
+            Sampler::Sobol => self.descend(n, Mask8::all_lanes()),
+        }
+    }
+
+    /// Steps 2 `pair` and 2 `pair` + 1 of a flight through a medium: each the words of an optical depth and of a choice.
+    #[inline(always)]
+    pub(crate) fn flight_steps(self, sampler: Sampler, pair: u32) -> [[U32x8; 2]; 2] {
+        let [a, b, c, d] = self.first_block(sampler, FLIGHT_BLOCK, pair);
         [[a, b], [c, d]]
     }
 
@@ -196,8 +221,8 @@ impl Key8 {
 
     /// Words of the optical depths of steps 4 `four` to 4 `four` + 3 of a transmittance.
     #[inline(always)]
-    pub(crate) fn transmittance_steps(self, four: u32) -> [U32x8; 4] {
-        self.words(TRANSMITTANCE_BLOCK + four)
+    pub(crate) fn transmittance_steps(self, sampler: Sampler, four: u32) -> [U32x8; 4] {
+        self.first_block(sampler, TRANSMITTANCE_BLOCK, four)
     }
 
     /// Roulette after a step of a transmittance.
@@ -232,6 +257,12 @@ impl Key8 {
             Sampler::Hashed => self.words(block),
             Sampler::Sobol => self.sobol(block),
         }
+    }
+
+    /// Block `first + n`. Of those after the first, which few paths draw, numbers are hashed.
+    #[inline(always)]
+    fn first_block(self, sampler: Sampler, first: u32, n: u32) -> [U32x8; 4] {
+        if n == 0 { self.block(sampler, first) } else { self.words(first + n) }
     }
 
     /// [`Self::block`] of keys of which some belong to sequences.
@@ -395,6 +426,51 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// First steps through media belong to sequences as samples of vertices do: flights to vertices 1 to 4, and shadow rays
+    /// from there, behind however many surfaces; later steps do not. With hashed numbers all are words of the key.
+    /// Killed by: a block of steps that is hashed, a stretch whose key leaves the sequence or is that of another.
+    #[test]
+    fn first_steps_through_media_are_stratified() {
+        let intervals = |words: &dyn Fn(Key8) -> U32x8, sampler, depth: u32| {
+            let mut found = std::collections::HashSet::new();
+            for first in (0..64).step_by(8) {
+                let mut key = vertex(sampler, 1, U32x8::splat(5), U32x8::from_fn(|i| first + i as u32));
+                for d in 2..=depth {
+                    key = key.sample(sampler, ZERO).next_vertex(sampler, U32x8::splat(d));
+                }
+                found.extend(words(key).to_array().map(|w| w >> 26));
+            }
+            found.len()
+        };
+        for sampler in [Sampler::Sobol, Sampler::Hashed] {
+            for depth in 1..=SOBOL_DEPTH + 1 {
+                for n in 0..2 {
+                    let spread = sampler == Sampler::Sobol && depth <= SOBOL_DEPTH && n == 0;
+                    let check = |found: usize, what: &str| {
+                        let expected = if spread { found == 64 } else { (30..52).contains(&found) };
+                        assert!(expected, "{sampler:?}, depth {depth}, block {n}, {what}: {found} of 64");
+                    };
+                    for word in 0..4 {
+                        let flight = |key: Key8| key.flight_steps(sampler, n)[word / 2][word % 2];
+                        check(intervals(&flight, sampler, depth), "flight");
+                        for passed in [0, 1, 9] {
+                            let through = |key: Key8| {
+                                let stretch = key.sample(sampler, ZERO).shadow_stretch(sampler, passed);
+                                stretch.transmittance_steps(sampler, n)[word]
+                            };
+                            check(intervals(&through, sampler, depth), "transmittance");
+                        }
+                    }
+                }
+            }
+        }
+        let key = vertex(Sampler::Hashed, 1, ZERO, ZERO);
+        let [a, b] = [0, 1].map(|passed| key.shadow_stretch(Sampler::Hashed, passed));
+        assert_ne!((a.lo, a.hi), (b.lo, b.hi));
+        assert_eq!(key.flight_steps(Sampler::Hashed, 0).concat(), key.words(FLIGHT_BLOCK));
+        assert_eq!(a.transmittance_steps(Sampler::Hashed, 0), a.words(TRANSMITTANCE_BLOCK));
     }
 
     /// Siblings, depths, blocks, pixels and iterations: no two draw alike. Over 512 pixels the correlation of what the

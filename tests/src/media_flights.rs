@@ -4,6 +4,7 @@
 use crate::media_oracle::{MediaScene, V};
 use crate::stats::{Mean, SplitMix};
 use croupier::Scene;
+use croupier::unstable::Numbers8;
 use croupier::unstable::media::{Segment8, fly, transmittance};
 use croupier::unstable::rng::Key8;
 use croupier::unstable::scene::Effects;
@@ -66,7 +67,7 @@ pub fn flights(scene: &Scene<'_>, m: u32, s: &Segment8, beta: V, seed: u64, n: u
         let (mut before, mut weight, mut emitted) = (F32x8::ZERO, Vec3x8::ONE, Vec3x8::ZERO);
         let mut key = key(seed, packet);
         while active.any() {
-            let flight = fly(ALL, scene, U32x8::splat(m), &now, splat(beta) * weight, key, active);
+            let flight = fly(ALL, scene, U32x8::splat(m), &now, splat(beta) * weight, Numbers8::hashed(key), active);
             work.steps += u64::from(flight.steps);
             work.roulettes += u64::from(flight.roulettes);
             work.calls += 1;
@@ -197,7 +198,8 @@ pub fn thickness(scene: &MediaScene, m: usize, (o, d, tmax): (V, V, f64)) -> f64
 pub fn mean_transmittance(scene: &Scene<'_>, m: u32, s: &Segment8, seed: u64, n: u32) -> ([Mean; 3], Work) {
     let (mut means, mut work) = ([Mean::default(); 3], Work::default());
     for packet in 0..n / 8 {
-        let got = transmittance(ALL, scene, U32x8::splat(m), s, key(seed, packet), Mask8::all_lanes());
+        let got =
+            transmittance(ALL, scene, U32x8::splat(m), s, Numbers8::hashed(key(seed, packet)), Mask8::all_lanes());
         work.steps += u64::from(got.steps);
         work.roulettes += u64::from(got.roulettes);
         for i in 0..8 {

@@ -3,6 +3,7 @@
 //! Every z-test allows 5 standard errors: one false alarm in 1.7e6 comparisons, of which there are a few hundred. With
 //! 2^18 samples a test of a mean of 0.3 by a variable in 0..=1 sees errors of 1.5 % of it, five errors of 0.3 %.
 
+use croupier::unstable::Numbers8;
 use croupier::unstable::media::*;
 use croupier::unstable::rng::Key8;
 use croupier::unstable::scene::Effects;
@@ -55,7 +56,7 @@ fn homogeneous_media_over_all_exponents() {
             let scene = MediaScene::default().with(medium);
             let scene = scene.scene();
             let s = segment([0.0; 3], [0.0, 0.0, -0.5], 2.0);
-            let got = transmittance(ALL, &scene, U32x8::splat(0), &s, key(5, 0), Mask8::first(7));
+            let got = transmittance(ALL, &scene, U32x8::splat(0), &s, Numbers8::hashed(key(5, 0)), Mask8::first(7));
             let want = (-f64::from(sigma)).exp();
             for c in 0..2 {
                 let t = f64::from(got.transmittance.lane(3)[c]);
@@ -67,7 +68,8 @@ fn homogeneous_media_over_all_exponents() {
             means.check(&format!("sigma {sigma}"), 1 << 14, &medium, [f64::from(sigma), f64::from(sigma), 0.0]);
             assert!(work.steps <= 3 << 14 && work.roulettes == 0);
             let endless = Segment8 { tmax: F32x8::INFINITY, ..s };
-            let got = transmittance(ALL, &scene, U32x8::splat(0), &endless, key(5, 0), Mask8::all_lanes());
+            let got =
+                transmittance(ALL, &scene, U32x8::splat(0), &endless, Numbers8::hashed(key(5, 0)), Mask8::all_lanes());
             assert_eq!(got.transmittance.lane(0), [0.0, 0.0, 1.0]);
         }
     }
@@ -154,9 +156,13 @@ fn splitting_a_segment_changes_nothing() {
         let (mut product, mut flown) = (Mean::default(), Mean::default());
         for packet in 0..SAMPLES / 8 {
             let (a, b) = (key(300 + k as u64, packet), key(400 + k as u64, packet));
-            let of = |s: &Segment8, key| transmittance(ALL, &scene, U32x8::splat(0), s, key, Mask8::all_lanes());
+            let of = |s: &Segment8, key| {
+                transmittance(ALL, &scene, U32x8::splat(0), s, Numbers8::hashed(key), Mask8::all_lanes())
+            };
             let both = of(&first, a).transmittance.x * of(&second, b).transmittance.x;
-            let fly = |s: &Segment8, key| fly(ALL, &scene, U32x8::splat(0), s, Vec3x8::ONE, key, Mask8::all_lanes());
+            let fly = |s: &Segment8, key| {
+                fly(ALL, &scene, U32x8::splat(0), s, Vec3x8::ONE, Numbers8::hashed(key), Mask8::all_lanes())
+            };
             let (f, g) = (fly(&first, a), fly(&second, b));
             assert!(f.unfinished.none() && g.unfinished.none());
             let passed = (f.passed & g.passed).zero_unless(f.weight.x * g.weight.x);
@@ -294,7 +300,8 @@ fn work_is_bounded_at_any_thickness() {
     let s = segment([-1.0, 0.1, 0.1], [1.0, 0.0, 0.0], f64::INFINITY);
     let (scene, mut left) = (all.scene(), Mean::default());
     for packet in 0..1 << 11 {
-        let f = fly(ALL, &scene, U32x8::splat(0), &s, Vec3x8::ONE, key(55, packet), Mask8::all_lanes());
+        let f =
+            fly(ALL, &scene, U32x8::splat(0), &s, Vec3x8::ONE, Numbers8::hashed(key(55, packet)), Mask8::all_lanes());
         assert_eq!((f.steps, f.roulettes, f.collided.bits(), f.passed.bits()), (512, 8, 0, 0));
         for i in 0..8 {
             assert!(f.weight.lane(i) == if f.unfinished.lane(i) { [2.0; 3] } else { [0.0; 3] });
@@ -370,7 +377,10 @@ fn lanes_are_independent_and_survive_anything() {
         let medium = U32x8::from_fn(|_| rng.word() % if strange { 5 } else { 3 });
         let active = Mask8::from_bits(rng.word() & 0xff);
         let k = Key8::camera(round, U32x8::from_fn(|i| i as u32), U32x8::splat(3));
-        let (f, t) = (fly(ALL, &scene, medium, &s, beta, k, active), transmittance(ALL, &scene, medium, &s, k, active));
+        let (f, t) = (
+            fly(ALL, &scene, medium, &s, beta, Numbers8::hashed(k), active),
+            transmittance(ALL, &scene, medium, &s, Numbers8::hashed(k), active),
+        );
         assert!(f.weight.is_finite().all() && f.emitted.is_finite().all() && f.albedo.is_finite().all());
         assert!((f.collided | f.passed | f.unfinished).and_not(active).none());
         assert!((f.collided | f.unfinished).and_not(f.t.is_finite()).none());
@@ -389,11 +399,14 @@ fn lanes_are_independent_and_survive_anything() {
                 let colours = [f.weight, f.albedo, f.emitted, t.transmittance].map(|c| c.lane(i).map(f32::to_bits));
                 (masks, colours, f.t.lane(i).to_bits())
             };
-            let alone = (fly(ALL, &scene, medium, &s, beta, k, one), transmittance(ALL, &scene, medium, &s, k, one));
+            let alone = (
+                fly(ALL, &scene, medium, &s, beta, Numbers8::hashed(k), one),
+                transmittance(ALL, &scene, medium, &s, Numbers8::hashed(k), one),
+            );
             assert_eq!(bits(&f, &t), bits(&alone.0, &alone.1), "lane {i}");
             if medium.lane(i) != 0 {
-                let even = fly(EVEN_ONLY, &scene, medium, &s, beta, k, one);
-                let t = transmittance(EVEN_ONLY, &scene, medium, &s, k, one);
+                let even = fly(EVEN_ONLY, &scene, medium, &s, beta, Numbers8::hashed(k), one);
+                let t = transmittance(EVEN_ONLY, &scene, medium, &s, Numbers8::hashed(k), one);
                 assert_eq!(bits(&even, &t), bits(&alone.0, &alone.1), "lane {i}");
             }
         }

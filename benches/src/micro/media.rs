@@ -1,6 +1,7 @@
 //! Flights through media and what passes.
 
 use super::{Kernels, Outcome, PACKETS, close, leak, mean_lanes};
+use croupier::unstable::Numbers8;
 use croupier::unstable::media::{Segment8, fly, transmittance};
 use croupier::unstable::scene::Effects;
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -41,9 +42,12 @@ fn rows(
         d: Vec3x8::from_fn(|i| of(lines[i].1)),
         tmax: F32x8::from_fn(|i| lines[i].2 as f32),
     };
-    let flight = move |n: u32| fly(ALL, &scene, U32x8::splat(0), &segment, Vec3x8::ONE, key(6, n), Mask8::all_lanes());
+    let flight = move |n: u32| {
+        fly(ALL, &scene, U32x8::splat(0), &segment, Vec3x8::ONE, Numbers8::hashed(key(6, n)), Mask8::all_lanes())
+    };
     let passing = move |n: u32| {
-        transmittance(ALL, &scene, U32x8::splat(0), &segment, key(7, n), Mask8::all_lanes()).transmittance
+        transmittance(ALL, &scene, U32x8::splat(0), &segment, Numbers8::hashed(key(7, n)), Mask8::all_lanes())
+            .transmittance
     };
     let (mut flown, mut passed) = ([Mean::default(); 8], [Mean::default(); 8]);
     for n in 0..2048 {

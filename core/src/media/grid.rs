@@ -26,8 +26,7 @@ use super::collision::{Weights8, albedo};
 use super::density::Grids8;
 use super::majorants::BrickWalk8;
 use super::segment::{Flight8, Passage8, Segment8, Span8};
-use crate::rng::Key8;
-use crate::sampler::{MAX_FLIGHT_STEPS, MAX_TRANSMITTANCE_STEPS};
+use crate::sampler::{MAX_FLIGHT_STEPS, MAX_TRANSMITTANCE_STEPS, Numbers8};
 use crate::scene::Scene;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
@@ -135,7 +134,7 @@ pub(super) fn fly(
     medium: U32x8,
     segment: &Segment8,
     beta: Vec3x8,
-    key: Key8,
+    Numbers8 { sampler, key }: Numbers8,
     active: Mask8,
 ) -> Flight8 {
     let path = Span8::new(segment, active);
@@ -147,7 +146,7 @@ pub(super) fn fly(
         if tracker.live.none() {
             break;
         }
-        for [depth, pick] in key.flight_steps(pair) {
+        for [depth, pick] in key.flight_steps(sampler, pair) {
             let (collides, fraction) = tracker.step(depth, weights.sigma);
             if collides.any() {
                 let scatters = weights.collide(media, fraction, choice(pick), collides);
@@ -190,7 +189,7 @@ pub(super) fn transmittance(
     media: &Media8,
     medium: U32x8,
     segment: &Segment8,
-    key: Key8,
+    Numbers8 { sampler, key }: Numbers8,
     active: Mask8,
 ) -> Passage8 {
     let path = Span8::new(segment, active);
@@ -202,7 +201,7 @@ pub(super) fn transmittance(
         if tracker.live.none() {
             break;
         }
-        for (word, k) in key.transmittance_steps(four).into_iter().zip(0..) {
+        for (word, k) in key.transmittance_steps(sampler, four).into_iter().zip(0..) {
             let (collides, fraction) = tracker.step(word, sigma);
             if collides.any() {
                 let scale = fraction / sigma;

@@ -4,7 +4,7 @@ use super::coefficients::Media8;
 use super::collision::{Weights8, albedo};
 use super::grid::{self, choice, optical_depth};
 use super::segment::{Flight8, Passage8, Segment8, Span8};
-use crate::rng::Key8;
+use crate::sampler::Numbers8;
 use crate::scene::{Effects, Scene};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
@@ -20,7 +20,7 @@ const CHANNELS: u32 = 3;
 /// in each channel in which `beta` is not 0. `unfinished` lanes are part of that: the caller goes on from
 /// `o + t d` with another key, and multiplies.
 ///
-/// Draws blocks of `key` that no other stage uses. `effects` must be a constant: without [`Effects::GRID_MEDIA`] no code
+/// Draws blocks of the key that no other stage uses. `effects` must be a constant: without [`Effects::GRID_MEDIA`] no code
 /// for grids is compiled in. Segments that are not numbers end with 0.
 #[inline(always)]
 pub fn fly(
@@ -29,30 +29,30 @@ pub fn fly(
     medium: U32x8,
     segment: &Segment8,
     beta: Vec3x8,
-    key: Key8,
+    numbers: Numbers8,
     active: Mask8,
 ) -> Flight8 {
     let media = Media8::gather(scene, medium, active);
     if !effects.contains(Effects::GRID_MEDIA) {
-        return fly_homogeneous(&media, segment, beta, key, active);
+        return fly_homogeneous(&media, segment, beta, numbers, active);
     }
     let even = active.and_not(media.grid);
-    let mut flight = if even.any() { fly_homogeneous(&media, segment, beta, key, even) } else { Flight8::ENDED };
+    let mut flight = if even.any() { fly_homogeneous(&media, segment, beta, numbers, even) } else { Flight8::ENDED };
     if media.grid.any() {
-        flight = flight.or(grid::fly(scene, &media, medium, segment, beta, key, media.grid));
+        flight = flight.or(grid::fly(scene, &media, medium, segment, beta, numbers, media.grid));
     }
     flight
 }
 
 /// Share of the light that passes along segments, per channel: in closed form in homogeneous media, an estimate by ratio
-/// tracking in grids, whose mean is the transmittance. `effects` and `key` as for [`fly`], the blocks drawn are others.
+/// tracking in grids, whose mean is the transmittance. `effects` and `numbers` as for [`fly`], the blocks drawn are others.
 #[inline(always)]
 pub fn transmittance(
     effects: Effects,
     scene: &Scene<'_>,
     medium: U32x8,
     segment: &Segment8,
-    key: Key8,
+    numbers: Numbers8,
     active: Mask8,
 ) -> Passage8 {
     let media = Media8::gather(scene, medium, active);
@@ -65,7 +65,7 @@ pub fn transmittance(
     if media.grid.none() {
         return Passage8 { transmittance: passes, steps: 0, roulettes: 0 };
     }
-    let grids = grid::transmittance(scene, &media, medium, segment, key, media.grid);
+    let grids = grid::transmittance(scene, &media, medium, segment, numbers, media.grid);
     Passage8 { transmittance: passes + grids.transmittance, ..grids }
 }
 
@@ -84,7 +84,7 @@ fn absorbed(x: F32x8) -> F32x8 {
 
 /// [`fly`] through homogeneous media.
 #[inline(always)]
-fn fly_homogeneous(media: &Media8, segment: &Segment8, beta: Vec3x8, key: Key8, active: Mask8) -> Flight8 {
+fn fly_homogeneous(media: &Media8, segment: &Segment8, beta: Vec3x8, numbers: Numbers8, active: Mask8) -> Flight8 {
     let path = Span8::new(segment, active);
     let mut weights = Weights8::new(media, beta);
     let usable = path.usable & weights.alive();
@@ -105,7 +105,7 @@ fn fly_homogeneous(media: &Media8, segment: &Segment8, beta: Vec3x8, key: Key8, 
         if live.none() {
             break;
         }
-        for [depth, pick] in key.flight_steps(pair) {
+        for [depth, pick] in numbers.key.flight_steps(numbers.sampler, pair) {
             let event = s + optical_depth(depth) / weights.sigma;
             steps += live.count();
             // not so without extinction, where 0 / 0 may be (NUMERICS MED-2)

@@ -9,6 +9,7 @@ use super::ring::Ring;
 use super::shading::Arrival8;
 use crate::geometry::Hit8;
 use crate::media::{self, Segment8};
+use crate::sampler::Numbers8;
 use crate::world::World;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
@@ -51,7 +52,8 @@ pub(crate) fn cross_media<W: World>(
     let stops = light.lt(rays.travelled + end);
     let tmax = stops.select(F32x8::ZERO.max(light - rays.travelled), end);
     let segment = Segment8 { o: rays.ray.o, d: rays.ray.d, tmax };
-    let flight = media::fly(W::EFFECTS, world.scene(), medium, &segment, rays.beta, rays.key, inside);
+    let numbers = Numbers8 { sampler: world.sampler(), key: rays.key };
+    let flight = media::fly(W::EFFECTS, world.scene(), medium, &segment, rays.beta, numbers, inside);
     book.charge_medium(inside, &rays.path, flight.steps, flight.roulettes);
     let found = Contribution8 { pixel: rays.beta * flight.emitted, local: rays.weight * flight.emitted };
     book.accumulate(inside, &rays.path, &found, Beyond::Ray);

@@ -10,6 +10,7 @@ use crate::bsdf;
 use crate::cost::COST_SHADOW;
 use crate::geometry::{self, Hit8, NO_INSTANCE, Ray8, SurfaceHit8};
 use crate::media::{self, Segment8};
+use crate::sampler::Numbers8;
 use crate::scene::blob::{MATERIAL_CUTOUT, Material, NONE};
 use crate::scene::{Effects, Scene};
 use crate::world::World;
@@ -90,8 +91,9 @@ fn walk<W: World>(world: &W, book: &mut Bookkeeping<'_>, samples: &Samples8, s: 
             let inside = active & media.inside() & transmittance.any_positive();
             if inside.any() {
                 let segment = Segment8 { o: ray.o, d: ray.d, tmax: hit.hit.select(hit.t, ray.tmax) };
-                let key = samples.key.child(U32x8::splat(!passed));
-                let through = media::transmittance(W::EFFECTS, scene, media.met(), &segment, key, inside);
+                let sampler = world.sampler();
+                let numbers = Numbers8 { sampler, key: samples.key.shadow_stretch(sampler, passed) };
+                let through = media::transmittance(W::EFFECTS, scene, media.met(), &segment, numbers, inside);
                 transmittance = Vec3x8::select(inside, transmittance * through.transmittance, transmittance);
                 book.charge_medium(inside, &s.path, through.steps, through.roulettes);
             }

@@ -8,6 +8,7 @@ use super::ledger::{Component, Spread};
 use super::sums::quantile;
 use super::timing::nanoseconds;
 use super::twins::Twins;
+use croupier::unstable::Numbers8;
 use croupier::unstable::bsdf::{Bsdf, HenyeyGreenstein, Inputs8, Visitor, dispatch};
 use croupier::unstable::light::{PowerSelector, ShapeRays8, environment_pdf, meet_shapes, sample_of};
 use croupier::unstable::media::{Segment8, fly, transmittance};
@@ -285,10 +286,13 @@ fn media(effort: &Effort, twins: &Twins) -> Result<Vec<Component>, Box<dyn Error
         let all = Mask8::all_lanes();
         let beta = Vec3x8::splat(1.0, 1.0, 1.0);
         let row = |operation: &str, ns| component(twins, [&format!("medium {operation}"), name], operation, ns);
-        let flight = nanoseconds(&segments, effort.repeats, |(s, key)| fly(effects, &scene, which, &s, beta, key, all));
+        let flight = nanoseconds(&segments, effort.repeats, |(s, key)| {
+            fly(effects, &scene, which, &s, beta, Numbers8::hashed(key), all)
+        });
         rows.push(row("flight", flight));
-        let passed =
-            nanoseconds(&segments, effort.repeats, |(s, key)| transmittance(effects, &scene, which, &s, key, all));
+        let passed = nanoseconds(&segments, effort.repeats, |(s, key)| {
+            transmittance(effects, &scene, which, &s, Numbers8::hashed(key), all)
+        });
         rows.push(row("transmittance", passed));
     }
     Ok(rows)
