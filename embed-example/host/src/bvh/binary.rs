@@ -1,6 +1,6 @@
 //! Builder of the binary tree: what obvhs is asked for.
 
-use super::coincident::Groups;
+use super::groups::Groups;
 use super::node::BinaryTree;
 use super::parts::copy;
 use obvhs::BvhBuildParams;
@@ -23,14 +23,19 @@ pub enum Effort {
     Slow,
 }
 
-/// Nodes that look for a better place in trees where that is quick.
-const REINSERTED: f32 = 50_000.0;
+/// Nodes that look for a better place in trees where that is quick, and in those of [`MANY`] triangles.
+const REINSERTED: [f32; 2] = [50_000.0, 12_000.0];
+
+/// Triangles from which on time is worth more than the last per cent of the tree: pairs are merged before, and fewer nodes
+/// look for a better place.
+const MANY: usize = 1 << 16;
 
 /// Builds the tree. It does not depend on the number of threads.
 pub(super) fn build(triangles: &[[[f32; 3]; 3]], effort: Effort) -> BinaryTree {
-    let groups = Groups::of(triangles);
+    let many = effort == Effort::Medium && triangles.len() >= MANY;
+    let groups = Groups::of(triangles, many);
     if groups.boxes.len() < 2 {
-        return copy(None, &groups);
+        return copy(None, groups);
     }
     let boxes: Vec<Aabb> = groups.boxes.par_iter().map(|b| Aabb { min: b.min.into(), max: b.max.into() }).collect();
     // merging by the full search distance on all levels, not the lowest two alone, leaves rays fewer nodes to visit than
@@ -44,7 +49,7 @@ pub(super) fn build(triangles: &[[[f32; 3]; 3]], effort: Effort) -> BinaryTree {
     };
     let p = match effort {
         Effort::Fast => BvhBuildParams::very_fast_build(),
-        Effort::Medium => thorough((REINSERTED / boxes.len() as f32).clamp(0.02, 1.0)),
+        Effort::Medium => thorough((REINSERTED[usize::from(many)] / boxes.len() as f32).clamp(0.02, 1.0)),
         Effort::Slow => thorough(1.0),
     };
     // triangles are not split: a box always holds all of its triangles' vertices
@@ -59,7 +64,7 @@ pub(super) fn build(triangles: &[[[f32; 3]; 3]], effort: Effort) -> BinaryTree {
     if ratio * boxes.len() as f32 >= 1.0 {
         ReinsertionOptimizer::default().run(&mut bvh, ratio, None);
     }
-    copy(Some(&bvh), &groups)
+    copy(Some(&bvh), groups)
 }
 
 /// Share of the nodes that may look for a better place. Each looks at about as many nodes as a random ray would visit,

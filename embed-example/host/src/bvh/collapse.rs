@@ -49,8 +49,8 @@ struct Plan {
 impl Plan {
     /// The plan for `node`, whose half area is `area` of the root's; `children` are those of its children.
     fn new(node: &Binary, area: f32, children: [&Self; 2]) -> Self {
-        let mut p = Self { leaf: true, triangles: 1, ..Self::zeroed() };
-        if node.leaf {
+        let mut p = Self { leaf: true, triangles: node.triangles, ..Self::zeroed() };
+        if node.is_leaf() {
             p.cost = [area * LEAF_COST; WIDTH - 1];
             return p;
         }
@@ -91,17 +91,24 @@ pub(super) fn widen(tree: &BinaryTree, triangles: &[[[f32; 3]; 3]]) -> Tree {
         return Tree::default();
     }
     let plans = plan(tree);
-    let mut w = Writer { tree: &tree.nodes, plans: &plans, triangles, out: Tree::default(), leaves: Vec::new() };
+    let mut w = Writer {
+        tree: &tree.nodes,
+        order: &tree.triangles,
+        plans: &plans,
+        triangles,
+        out: Tree::default(),
+        leaves: Vec::new(),
+    };
     w.node(Source::Binary(0), 1);
     w.out.leaves = w.leaves.par_iter().map(|source| w.leaf(source)).collect();
     w.out
 }
 
-fn plan(BinaryTree { nodes, parts }: &BinaryTree) -> Vec<Plan> {
+fn plan(BinaryTree { nodes, parts, .. }: &BinaryTree) -> Vec<Plan> {
     let root = nodes[0].bounds.half_area().max(f64::MIN_POSITIVE);
     let of = |i: usize, start: usize, plans: &[Plan]| {
         let n = &nodes[i];
-        let first = if n.leaf { 0 } else { n.index as usize - start };
+        let first = if n.is_leaf() { 0 } else { n.index as usize - start };
         // not read of leaves
         let children = [first, first + 1].map(|c| plans.get(c).unwrap_or(&plans[0]));
         Plan::new(n, (n.bounds.half_area() / root) as f32, children)
@@ -126,7 +133,7 @@ fn wide_children(tree: &[Binary], plans: &[Plan], i: usize, out: &mut Vec<usize>
     let mut todo = vec![(i, WIDTH)];
     while let Some((i, mut j)) = todo.pop() {
         let p = &plans[i];
-        while j > 1 && (tree[i].leaf || p.split[j] == 0) {
+        while j > 1 && (tree[i].is_leaf() || p.split[j] == 0) {
             j -= 1;
         }
         if j == 1 {
@@ -149,6 +156,8 @@ enum Source {
 
 struct Writer<'a> {
     tree: &'a [Binary],
+    /// See [`BinaryTree::triangles`].
+    order: &'a [u32],
     plans: &'a [Plan],
     triangles: &'a [[[f32; 3]; 3]],
     /// Nodes, and no leaves.
@@ -215,14 +224,33 @@ impl Writer<'_> {
         let (mut ids, mut todo) = (Vec::new(), vec![i]);
         while let Some(i) = todo.pop() {
             let n = &self.tree[i];
-            if n.leaf {
-                ids.push(n.index);
+            if n.is_leaf() {
+                ids.extend(self.of_leaf(n));
             } else {
                 todo.push(n.index as usize + 1);
                 todo.push(n.index as usize);
             }
         }
         ids
+    }
+
+    /// Writes the triangles below binary node `i`, which are few, from slot `n` on; the next free slot.
+    fn fill(&self, i: usize, slots: &mut [u32; WIDTH], n: usize) -> usize {
+        let node = &self.tree[i];
+        if !node.is_leaf() {
+            let n = self.fill(node.index as usize, slots, n);
+            return self.fill(node.index as usize + 1, slots, n);
+        }
+        let ids = self.of_leaf(node);
+        for (slot, id) in slots.iter_mut().skip(n).zip(ids) {
+            *slot = *id;
+        }
+        n + ids.len()
+    }
+
+    /// Triangles of a leaf of the binary tree.
+    fn of_leaf(&self, leaf: &Binary) -> &[u32] {
+        &self.order[leaf.index as usize..][..leaf.triangles as usize]
     }
 
     fn bounds(&self, ids: &[u32]) -> Bounds {
@@ -268,14 +296,17 @@ impl Writer<'_> {
     }
 
     fn leaf(&self, source: &Source) -> Leaf {
-        let mut ids = match source {
-            Source::Binary(i) => self.gather(*i),
-            Source::Median(ids) => ids.clone(),
-        };
-        ids.sort_unstable();
         let mut leaf = Leaf { p: [[0.0; 8]; 9], triangle: [NONE; 8] };
-        for (slot, &id) in ids.iter().enumerate().take(WIDTH) {
-            leaf.triangle[slot] = id;
+        match source {
+            Source::Binary(i) => self.fill(*i, &mut leaf.triangle, 0),
+            Source::Median(ids) => {
+                let n = ids.len().min(WIDTH);
+                leaf.triangle[..n].copy_from_slice(&ids[..n]);
+                n
+            }
+        };
+        leaf.triangle.sort_unstable();
+        for (slot, id) in leaf.triangle.into_iter().enumerate().take_while(|(_, id)| *id != NONE) {
             for (row, x) in self.triangles[id as usize].as_flattened().iter().enumerate() {
                 leaf.p[row][slot] = *x;
             }

@@ -41,15 +41,22 @@ impl Bounds {
     }
 }
 
-/// A node: two children that follow each other, or one triangle.
+/// A node: two children that follow each other, or triangles.
 #[derive(Clone, Copy, Debug, Zeroable)]
 #[repr(C)]
 pub(super) struct Binary {
     pub(super) bounds: Bounds,
-    /// First child, or the triangle.
+    /// First child, or the place of the first triangle in [`BinaryTree::triangles`].
     pub(super) index: u32,
-    /// Is it a triangle?
-    pub(super) leaf: bool,
+    /// Number of triangles: one, or two that stay together; 0 of nodes with children.
+    pub(super) triangles: u32,
+}
+
+impl Binary {
+    /// Is it a leaf?
+    pub(super) fn is_leaf(&self) -> bool {
+        self.triangles > 0
+    }
 }
 
 /// A binary tree over the finite triangles.
@@ -59,4 +66,6 @@ pub(super) struct BinaryTree {
     /// Parts of `nodes`, one after another: the top of the tree, and subtrees without their roots. So children of a
     /// part's nodes are in the same part, but for the first; threads work at parts.
     pub(super) parts: Vec<Range<usize>>,
+    /// The triangles in the order in which leaves refer to them.
+    pub(super) triangles: Vec<u32>,
 }

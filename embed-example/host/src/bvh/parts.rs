@@ -1,9 +1,10 @@
 //! Copy of obvhs's tree, by parts that threads write side by side.
 
-use super::coincident::Groups;
+use super::groups::Groups;
 use super::node::{Binary, BinaryTree, Bounds};
 use bytemuck::Zeroable;
 use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::node::Bvh2Node;
 use rayon::prelude::*;
 use std::collections::BinaryHeap;
 use std::ops::Range;
@@ -12,90 +13,99 @@ use std::ops::Range;
 const PARTS: usize = 256;
 
 /// What is below a node of the copy.
-#[derive(Clone, Copy)]
-enum Subtree<'a> {
+#[derive(Clone)]
+enum Subtree {
     /// The subtree of this node of obvhs's tree.
     Node(usize),
-    /// A balanced tree over triangles that all have this box.
-    Equal(Bounds, &'a [u32]),
+    /// Triangles that stay together, by their places, and their box.
+    Leaf(Bounds, Range<u32>),
+    /// A balanced tree over triangles that all have this box, by their places.
+    Equal(Bounds, Range<u32>),
 }
 
-impl<'a> Subtree<'a> {
-    fn of(bvh: &Bvh2, groups: &'a Groups, node: usize) -> Self {
+impl Subtree {
+    fn of(bvh: &Bvh2, groups: &Groups, node: usize) -> Self {
         let n = &bvh.nodes[node];
         if !n.is_leaf() {
             return Self::Node(node);
         }
-        let group = bvh.primitive_indices[n.first_index as usize] as usize;
-        let bounds = Bounds { min: n.aabb().min.to_array(), max: n.aabb().max.to_array() };
-        Self::Equal(bounds, groups.ids(group))
+        Self::of_group(bounds(n), groups.places(bvh.primitive_indices[n.first_index as usize] as usize))
     }
 
-    /// The two below it; `None` for a single triangle.
-    fn children(&self, bvh: Option<&Bvh2>, groups: &'a Groups) -> Option<[Self; 2]> {
-        match *self {
-            Self::Equal(_, [_]) => None,
-            Self::Equal(bounds, ids) => {
-                let (left, right) = ids.split_at(ids.len() / 2);
-                Some([left, right].map(|ids| Self::Equal(bounds, ids)))
+    /// All triangles of a group.
+    fn of_group(bounds: Bounds, (places, together): (Range<u32>, bool)) -> Self {
+        if together { Self::Leaf(bounds, places) } else { Self::Equal(bounds, places) }
+    }
+
+    /// The two below it; `None` for a leaf.
+    fn children(&self, bvh: Option<&Bvh2>, groups: &Groups) -> Option<[Self; 2]> {
+        match self {
+            Self::Leaf(..) => None,
+            Self::Equal(_, places) if places.len() == 1 => None,
+            Self::Equal(bounds, places) => {
+                let middle = places.start + places.len() as u32 / 2;
+                Some([places.start..middle, middle..places.end].map(|places| Self::Equal(*bounds, places)))
             }
             Self::Node(n) => bvh.map(|bvh| {
-                let first = bvh.nodes[n].first_index as usize;
+                let first = bvh.nodes[*n].first_index as usize;
                 [first, first + 1].map(|n| Self::of(bvh, groups, n))
             }),
         }
     }
 
-    fn triangles(&self, bvh: Option<&Bvh2>, groups: &'a Groups) -> usize {
-        let (mut count, mut todo) = (0, vec![*self]);
+    /// Number of leaves.
+    fn leaves(&self, bvh: Option<&Bvh2>, groups: &Groups) -> usize {
+        let (mut count, mut todo) = (0, vec![self.clone()]);
         while let Some(subtree) = todo.pop() {
             match subtree {
-                Subtree::Equal(_, ids) => count += ids.len(),
-                Subtree::Node(_) => todo.extend(subtree.children(bvh, groups).into_iter().flatten()),
+                Self::Leaf(..) => count += 1,
+                Self::Equal(_, places) => count += places.len(),
+                Self::Node(_) => todo.extend(subtree.children(bvh, groups).into_iter().flatten()),
             }
         }
         count
     }
 
     /// Writes all nodes but the root, which it returns, to `out`, whose first node has the number `start`.
-    fn write(&self, bvh: Option<&Bvh2>, groups: &'a Groups, start: usize, out: &mut [Binary]) -> Binary {
-        let (mut root, mut used, mut todo) = (Binary::zeroed(), 0, vec![(*self, None)]);
+    fn write(&self, bvh: Option<&Bvh2>, groups: &Groups, start: usize, out: &mut [Binary]) -> Binary {
+        let (mut root, mut used, mut todo) = (Binary::zeroed(), 0, vec![(self.clone(), None)]);
         while let Some((subtree, to)) = todo.pop() {
-            let node = match subtree {
-                Subtree::Equal(bounds, [id]) => Binary { bounds, index: *id, leaf: true },
-                _ => Binary { index: (start + used) as u32, ..Binary::zeroed() },
+            let children = subtree.children(bvh, groups);
+            let box_of_node = |n: usize| bvh.map_or(Bounds::EMPTY, |bvh| bounds(&bvh.nodes[n]));
+            let (bounds, places) = match subtree {
+                Self::Node(n) => (box_of_node(n), 0..0),
+                Self::Leaf(bounds, places) | Self::Equal(bounds, places) => (bounds, places),
             };
-            if let Some([left, right]) = subtree.children(bvh, groups) {
+            let node = match children {
+                None => Binary { bounds, index: places.start, triangles: places.len() as u32 },
+                Some(_) => Binary { bounds, index: (start + used) as u32, triangles: 0 },
+            };
+            if let Some([left, right]) = children {
                 todo.extend([(left, Some(used)), (right, Some(used + 1))]);
                 used += 2;
             }
             *to.map_or(&mut root, |i| &mut out[i]) = node;
         }
-        for i in (0..used).rev() {
-            out[i] = with_bounds(out[i], start, out);
-        }
-        with_bounds(root, start, out)
+        root
     }
 }
 
-/// `node` with the box of its children, which are in `nodes`, whose first has the number `start`.
-fn with_bounds(node: Binary, start: usize, nodes: &[Binary]) -> Binary {
-    if node.leaf {
-        return node;
-    }
-    let first = node.index as usize - start;
-    Binary { bounds: nodes[first].bounds.with(&nodes[first + 1].bounds), ..node }
+/// The box of a node of obvhs's tree.
+fn bounds(node: &Bvh2Node) -> Bounds {
+    Bounds { min: node.aabb().min.to_array(), max: node.aabb().max.to_array() }
 }
 
 /// The nodes of obvhs's tree in an order with children after parents, and in parts. Without a tree there is at most one
 /// group.
-pub(super) fn copy(bvh: Option<&Bvh2>, groups: &Groups) -> BinaryTree {
-    let Some(bounds) = groups.boxes.first() else { return BinaryTree { nodes: Vec::new(), parts: Vec::new() } };
-    let (top, below) = match bvh {
-        Some(bvh) => largest(bvh, groups),
-        None => (vec![Binary::zeroed()], vec![(0, Subtree::Equal(*bounds, groups.ids(0)))]),
+pub(super) fn copy(bvh: Option<&Bvh2>, groups: Groups) -> BinaryTree {
+    let Some(first) = groups.boxes.first() else {
+        return BinaryTree { nodes: Vec::new(), parts: Vec::new(), triangles: Vec::new() };
     };
-    let sizes: Vec<usize> = below.par_iter().map(|(_, subtree)| 2 * subtree.triangles(bvh, groups) - 2).collect();
+    let (top, below) = match bvh {
+        Some(bvh) => largest(bvh, &groups),
+        None => (vec![Binary::zeroed()], vec![(0, Subtree::of_group(*first, groups.places(0)))]),
+    };
+    let sizes: Vec<usize> = below.par_iter().map(|(_, subtree)| 2 * subtree.leaves(bvh, &groups) - 2).collect();
     let mut parts = Vec::with_capacity(1 + sizes.len());
     parts.push(0..top.len());
     for size in &sizes {
@@ -106,19 +116,16 @@ pub(super) fn copy(bvh: Option<&Bvh2>, groups: &Groups) -> BinaryTree {
     let (first, rest) = nodes.split_at_mut(top.len());
     first.copy_from_slice(&top);
     let of_parts = parts[1..].par_iter().zip(split(rest, &parts[1..])).zip(&below);
-    let write = of_parts.map(|((part, out), (_, subtree))| subtree.write(bvh, groups, part.start, out));
+    let write = of_parts.map(|((part, out), (_, subtree))| subtree.write(bvh, &groups, part.start, out));
     let roots: Vec<Binary> = write.collect();
     for ((to, _), root) in below.iter().zip(roots) {
         nodes[*to] = root;
     }
-    for i in (0..top.len()).rev() {
-        nodes[i] = with_bounds(nodes[i], 0, &nodes);
-    }
-    BinaryTree { nodes, parts }
+    BinaryTree { nodes, parts, triangles: groups.triangles }
 }
 
 /// The top of the tree, the nodes of its largest boxes, and what is below which of them.
-fn largest<'a>(bvh: &Bvh2, groups: &'a Groups) -> (Vec<Binary>, Vec<(usize, Subtree<'a>)>) {
+fn largest(bvh: &Bvh2, groups: &Groups) -> (Vec<Binary>, Vec<(usize, Subtree)>) {
     // by area, which is not negative: its bits compare like the numbers
     let area = |node: usize| bvh.nodes[node].aabb().half_area().to_bits();
     let mut nodes = vec![Binary::zeroed()];
@@ -131,7 +138,7 @@ fn largest<'a>(bvh: &Bvh2, groups: &'a Groups) -> (Vec<Binary>, Vec<(usize, Subt
             continue;
         }
         let (first, at) = (bvh.nodes[node].first_index as usize, nodes.len());
-        nodes[to].index = at as u32;
+        nodes[to] = Binary { bounds: bounds(&bvh.nodes[node]), index: at as u32, triangles: 0 };
         nodes.extend([Binary::zeroed(); 2]);
         open.extend([0, 1].map(|k| (area(first + k), first + k, at + k)));
     }
