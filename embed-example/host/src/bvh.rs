@@ -2,9 +2,9 @@
 //!
 //! `obvhs` builds a binary tree (PLOC with reinsertion, Meister & Bittner 2018); `collapse` turns it into 8-wide nodes
 //! over leaves of up to eight triangles at the lowest expected cost; subtrees that would be too deep are rebuilt by
-//! median splits. `groups` takes triangles with the same box, and pairs, as one before, `parts` divides the work among threads:
-//! the tree is the same for any number of them. Nodes and leaves are numbered depth first, slots ascending: a parent comes before its children, and a
-//! walk mostly goes forward in memory.
+//! median splits. Before, `groups` makes one of triangles with the same box, and in large meshes of pairs that share an
+//! edge. `parts` divides the work among threads: the tree is the same for any number of them. Nodes and leaves are
+//! numbered depth first, slots ascending: a parent comes before its children, and a walk mostly goes forward in memory.
 
 mod binary;
 mod collapse;

@@ -485,7 +485,7 @@ fn cache_seeds() -> Vec<Vec<u8>> {
     vec![saved]
 }
 
-/// A guide that has learned nothing, and one of several leaves.
+/// A guide that has learned, and one that has not.
 fn guide_seeds() -> Vec<Vec<u8>> {
     let blob = small_blob();
     let scene = Scene::from_bytes(&blob).expect("a valid scene");
@@ -496,19 +496,20 @@ fn guide_seeds() -> Vec<Vec<u8>> {
     let mut session = built.expect("memory of the plan");
     let mut own = AlignedBytes::zeroed(plan.shard().size);
     let mut shard = Shard::new(&plan, 0, own.as_mut()).expect("memory of the plan");
-    let mut seeds = Vec::new();
-    for samples in [0, 1, 2, 4, 8] {
-        if samples > 0 {
-            session.begin_iteration(samples);
-            while shard.step(&session, Budget { rays: 1 << 16 }) != StepResult::Done {}
-            session.end_iteration(std::slice::from_ref(&shard)).expect("a finished shard");
-        }
+    let save = |session: &Session<'_, '_, Guided<Full>>| {
         let mut saved = vec![0; session.saved_statistics_len()];
         session.save_statistics(&mut saved).expect("memory of that length");
-        seeds.push(saved);
+        saved
+    };
+    let empty = save(&session);
+    for samples in [1, 2, 4, 8] {
+        session.begin_iteration(samples);
+        while shard.step(&session, Budget { rays: 1 << 16 }) != StepResult::Done {}
+        session.end_iteration(std::slice::from_ref(&shard)).expect("a finished shard");
     }
-    assert!(seeds[4].len() > 4 * seeds[0].len(), "{:?}", seeds.iter().map(Vec::len).collect::<Vec<_>>());
-    vec![seeds.swap_remove(4), seeds.swap_remove(0)]
+    let learned = save(&session);
+    assert!(learned.len() > 4 * empty.len(), "{} and {} bytes", learned.len(), empty.len());
+    vec![learned, empty]
 }
 
 fn checkpoint_seeds() -> Vec<Vec<u8>> {

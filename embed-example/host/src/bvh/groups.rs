@@ -16,8 +16,8 @@ const ALONE: (u32, u32) = (u32::MAX, u32::MAX);
 /// each other and share an edge.
 ///
 /// PLOC merges nearest neighbours: among equal boxes hardly any two choose each other, and it would need as many passes as
-/// there are boxes. The two halves of a quadrilateral it would merge first anyway: in meshes of those its first pass, which
-/// takes as long as all others, has nothing to do.
+/// there are boxes. The two halves of a quadrilateral it would merge first anyway: in meshes of those it is spared the
+/// longest of its passes.
 pub(super) struct Groups {
     pub(super) boxes: Vec<Bounds>,
     /// Triangles, group by group, each ascending.
@@ -53,11 +53,11 @@ impl Groups {
                 places[group[0].1 as usize] = if group.len() == 1 { ALONE } else { (from, shared.len() as u32) };
             }
         }
-        let boxes = sorted.len();
+        let finite = sorted.len();
         let mut out = Self {
-            boxes: Vec::with_capacity(boxes),
-            triangles: Vec::with_capacity(boxes),
-            ends: Vec::with_capacity(boxes),
+            boxes: Vec::with_capacity(finite),
+            triangles: Vec::with_capacity(finite),
+            ends: Vec::with_capacity(finite),
             pairs,
         };
         let mut paired = false;
@@ -96,7 +96,7 @@ fn bits(b: &Bounds) -> [u32; 6] {
     array::from_fn(|k| if k < 3 { b.min[k] } else { b.max[k - 3] }.to_bits())
 }
 
-/// A hash of a box: sorting these takes half as long as sorting boxes.
+/// A hash of a box, which is sooner sorted than boxes are.
 fn hash(b: &Bounds) -> u64 {
     bits(b).iter().fold(0, |h: u64, x| (h.rotate_left(25) ^ u64::from(*x)).wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }

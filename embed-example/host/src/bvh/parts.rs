@@ -15,8 +15,8 @@ const PARTS: usize = 256;
 /// What is below a node of the copy.
 #[derive(Clone)]
 enum Subtree {
-    /// The subtree of this node of obvhs's tree.
-    Node(usize),
+    /// The subtree of a node of obvhs's tree, which has this box.
+    Node(Bounds, usize),
     /// Triangles that stay together, by their places, and their box.
     Leaf(Bounds, Range<u32>),
     /// A balanced tree over triangles that all have this box, by their places.
@@ -27,7 +27,7 @@ impl Subtree {
     fn of(bvh: &Bvh2, groups: &Groups, node: usize) -> Self {
         let n = &bvh.nodes[node];
         if !n.is_leaf() {
-            return Self::Node(node);
+            return Self::Node(bounds(n), node);
         }
         Self::of_group(bounds(n), groups.places(bvh.primitive_indices[n.first_index as usize] as usize))
     }
@@ -46,7 +46,7 @@ impl Subtree {
                 let middle = places.start + places.len() as u32 / 2;
                 Some([places.start..middle, middle..places.end].map(|places| Self::Equal(*bounds, places)))
             }
-            Self::Node(n) => bvh.map(|bvh| {
+            Self::Node(_, n) => bvh.map(|bvh| {
                 let first = bvh.nodes[*n].first_index as usize;
                 [first, first + 1].map(|n| Self::of(bvh, groups, n))
             }),
@@ -60,7 +60,7 @@ impl Subtree {
             match subtree {
                 Self::Leaf(..) => count += 1,
                 Self::Equal(_, places) => count += places.len(),
-                Self::Node(_) => todo.extend(subtree.children(bvh, groups).into_iter().flatten()),
+                Self::Node(..) => todo.extend(subtree.children(bvh, groups).into_iter().flatten()),
             }
         }
         count
@@ -71,9 +71,8 @@ impl Subtree {
         let (mut root, mut used, mut todo) = (Binary::zeroed(), 0, vec![(self.clone(), None)]);
         while let Some((subtree, to)) = todo.pop() {
             let children = subtree.children(bvh, groups);
-            let box_of_node = |n: usize| bvh.map_or(Bounds::EMPTY, |bvh| bounds(&bvh.nodes[n]));
             let (bounds, places) = match subtree {
-                Self::Node(n) => (box_of_node(n), 0..0),
+                Self::Node(bounds, _) => (bounds, 0..0),
                 Self::Leaf(bounds, places) | Self::Equal(bounds, places) => (bounds, places),
             };
             let node = match children {
