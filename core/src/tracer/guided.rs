@@ -4,8 +4,8 @@
 //! A sample comes from the guide with probability g, from the BSDF else, and counts f cos / (g q + (1 - g) p) with
 //! both densities q and p at its direction, whichever it came from (Veach's balance heuristic for one sample). Next
 //! event estimation is weighted against the mixture too. Delta lobes, which no guide can find, count 1 / (1 - g)
-//! times. g is 0 in media, at materials that scatter into narrow lobes, and where the guide's statistics promise
-//! nothing.
+//! times. g is 0 at materials and in media that scatter into narrow lobes, and where the guide's statistics promise
+//! nothing. In media the phase function has the place of the BSDF.
 
 use super::class::Kernel as ClassKernel;
 use super::guide_notes::GuideNote8;
@@ -15,12 +15,16 @@ use crate::bsdf::{self, Bsdf, Eval8, Inputs8, Sample8, Visitor, folded};
 use crate::extension::Extension;
 use crate::learn::guiding::{Guide, Guide8, NO_LEAF, UNKNOWN_SHARE, sphere};
 use crate::sampler::Sampler;
-use crate::scene::Scene;
+use crate::scene::{Effects, Scene};
 use crate::world::World;
 use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
 
 /// Phong exponent from which on a lobe is too narrow for a guide: GGX widths below 0.05.
 const NARROW: f32 = 2.0 / (0.05 * 0.05) - 2.0;
+
+/// Mean cosine, of either sign, from which on phase functions are not guided: what they scatter depends on the direction that
+/// light comes from, which a guide's leaf in a medium has the mean of.
+const FORWARD: f32 = 0.8;
 
 /// Largest ratio of second moments that a single sample tells.
 const MOST: f32 = 1e4;
@@ -44,6 +48,25 @@ pub(super) struct Guided8<'a, 'm> {
     guided: Mask8,
 }
 
+/// Lanes whose materials, or media, scatter into lobes that are wide enough for a guide.
+#[inline(always)]
+fn wide_lobes<W: World>(scene: &Scene<'_>, kernel: ClassKernel, material: U32x8) -> Mask8 {
+    let index = material.to_array();
+    match kernel {
+        ClassKernel::Surface(kind) => {
+            let shininess = F32x8::from_fn(|i| {
+                let m = scene.materials.get(index[i] as usize);
+                m.map_or(f32::INFINITY, |m| bsdf::shininess_with::<<W::Extension as Extension>::Bsdf>(kind, m))
+            });
+            shininess.lt(F32x8::splat(NARROW))
+        }
+        ClassKernel::Phase if W::EFFECTS.contains(Effects::MEDIA) => {
+            F32x8::from_fn(|i| scene.media.get(index[i] as usize).map_or(1.0, |m| m.g.abs())).lt(F32x8::splat(FORWARD))
+        }
+        _ => Mask8::NONE,
+    }
+}
+
 /// Draws from the guide for a packet of one surface class; `None` if guiding is off or of no use. Lanes that are learned
 /// from and not guided have a leaf and no direction.
 #[inline(never)]
@@ -52,7 +75,6 @@ pub(super) fn draw<'a, 'm: 'a, W: World>(
     world: &W,
     samples: &Samples8,
 ) -> Option<Guided8<'a, 'm>> {
-    let ClassKernel::Surface(kind) = samples.class.kernel() else { return None };
     let learned = if world.learned().learns_from_all() { samples.active } else { samples.guided };
     let recorded = learned.and_not(samples.path.record.eq(U32x8::splat(NO_RECORD)));
     let asked = samples.continues & (samples.guided | recorded);
@@ -60,17 +82,13 @@ pub(super) fn draw<'a, 'm: 'a, W: World>(
         return None;
     }
     let v = &samples.vertex;
-    let (material, materials) = (v.material.to_array(), world.scene().materials);
-    let shininess = F32x8::from_fn(|i| {
-        let m = materials.get(material[i] as usize);
-        m.map_or(f32::INFINITY, |m| bsdf::shininess_with::<<W::Extension as Extension>::Bsdf>(kind, m))
-    });
-    let lanes = asked & shininess.lt(F32x8::splat(NARROW));
+    let lanes = asked & wide_lobes::<W>(world.scene(), samples.class.kernel(), v.material);
     if lanes.none() {
         return None;
     }
     // by the vertex's key: if the leaf went with the light sample's numbers, the weights of MIS would be biased
-    let at = guide.at(v.p, v.ns, v.key.cache_jitter(world.sampler()), lanes);
+    let normal = (samples.class.kernel() != ClassKernel::Phase).then_some(v.ns);
+    let at = guide.at(v.p, normal, v.key.cache_jitter(world.sampler()), lanes);
     let overall = at.fraction * world.learned().guided_part(world.iteration().samples);
     let (at, recorded) = (at.only(samples.guided), lanes & recorded);
     if recorded.none() && !at.fraction.gt(F32x8::ZERO).any() {

@@ -67,23 +67,27 @@ pub(crate) fn scatter<W: World>(
     if W::GUIDING
         && let Some(guide) = world.learned().guide()
         && let Some(guided) = guided::draw(guide, world, samples)
-        && let ClassKernel::Surface(kind) = samples.class.kernel()
-        && let from = (world.scene(), world.sampler())
-        && let Some(both) = dispatch::<W, _>(kind, GuidedKernel::new(from, samples, nee, &guided))
+        && let kernel = GuidedKernel::new((world.scene(), world.sampler()), samples, nee, &guided)
+        && let Some(both) = visit::<W, _>(samples, kernel)
     {
         let m = guided::mix(&guided, &both, nee);
         *note = m.note;
         return onwards(world, samples, m.nee, &m.sample, m.wi);
     }
     let kernel = Kernel { scene: world.scene(), samples, nee, u: samples.key.scattering(world.sampler()) };
-    // a class outside the profile cannot be: sessions refuse such scenes
-    let scattered = match samples.class.kernel() {
+    let (nee, s, frame) = visit::<W, _>(samples, kernel).unwrap_or_else(nothing);
+    onwards(world, samples, nee, &s, frame.to_world(s.wi))
+}
+
+/// Calls `kernel` with what scatters the samples. `None` for a class outside the profile, which cannot be: sessions refuse
+/// such scenes.
+#[inline(always)]
+fn visit<'s, W: World, V: Visitor<'s>>(samples: &Samples8, kernel: V) -> Option<V::Out> {
+    match samples.class.kernel() {
         ClassKernel::Surface(kind) => dispatch::<W, _>(kind, kernel),
         ClassKernel::Phase if W::EFFECTS.contains(Effects::MEDIA) => Some(kernel.visit::<HenyeyGreenstein>()),
         _ => None,
-    };
-    let (nee, s, frame) = scattered.unwrap_or_else(nothing);
-    onwards(world, samples, nee, &s, frame.to_world(s.wi))
+    }
 }
 
 /// The rays of the samples `s` in the world directions `wi`.

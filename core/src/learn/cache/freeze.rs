@@ -13,8 +13,9 @@
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use super::bins::{BINS, BinSums, freeze_leaf};
+use super::kind::ROOTS;
 use super::shared::{Cache, Freeze};
-use super::tree::{OctreeNode, ROOTS, Tree};
+use super::tree::{OctreeNode, group_nodes, group_of};
 
 /// Samples that the surroundings of a cell count for in it.
 const PRIOR_SAMPLES: f64 = 4.0;
@@ -85,7 +86,7 @@ impl Cache<'_> {
                     None => (0..ROOTS).for_each(|root| self.freeze_node(root, &BinSums::ZERO)),
                     Some(group) => {
                         let prior = self.groups.get(group as usize).copied().unwrap_or(BinSums::ZERO);
-                        Tree::group_nodes(group).for_each(|node| self.freeze_node(node, &prior));
+                        group_nodes(group).for_each(|node| self.freeze_node(node, &prior));
                     }
                 }
                 f.index += 1;
@@ -144,11 +145,11 @@ impl Cache<'_> {
     /// Sums over everything below the nodes of a group, those of later groups being there.
     fn sum_group(&mut self, group: u32) {
         let mut all = BinSums::ZERO;
-        for node in Tree::group_nodes(group) {
+        for node in group_nodes(group) {
             match self.tree.node(node) {
                 OctreeNode::Leaf { number, .. } => self.leaf(number).iter().for_each(|b| all.add(b, 1.0)),
                 OctreeNode::Inner { child } => {
-                    if let Some(below) = self.groups.get(Tree::group_of(child)) {
+                    if let Some(below) = self.groups.get(group_of(child)) {
                         all.add(below, 1.0);
                     }
                 }
@@ -164,7 +165,7 @@ impl Cache<'_> {
         match self.tree.node(index) {
             OctreeNode::Leaf { number, .. } => self.freeze_one(number, prior, PRIOR_SAMPLES),
             OctreeNode::Inner { child } => {
-                if let Some(sums) = self.groups.get_mut(Tree::group_of(child)) {
+                if let Some(sums) = self.groups.get_mut(group_of(child)) {
                     sums.shrink(prior, PRIOR_SAMPLES);
                 }
             }

@@ -32,6 +32,9 @@ kinds! {
     FirstMedium;
 }
 
+/// Number of octrees, one for each kind.
+pub(super) const ROOTS: u32 = VertexKind::ALL.len() as u32;
+
 /// Kinds of eight vertices. No lane can hold anything but a row of [`VertexKind::ALL`], so look-ups need no check.
 #[derive(Clone, Copy, Debug)]
 pub struct VertexKind8(U32x8);

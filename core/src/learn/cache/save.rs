@@ -16,8 +16,9 @@
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use super::bins::{BINS, BinSums};
+use super::kind::ROOTS;
 use super::shared::Cache;
-use super::tree::{MAX_DEPTH, OctreeNode, ROOTS};
+use super::tree::{MAX_DEPTH, OctreeNode};
 use crate::learn::settings::Objective;
 use crate::scene::blob::content_hash;
 use bytemuck::{Pod, Zeroable};
@@ -242,7 +243,7 @@ impl<'b> SavedCache<'b> {
         }
         let (shape, sums) = body.split_at_checked(padded(header.nodes)).unwrap_or((&[], &[]));
         let shape = shape.get(..header.nodes as usize).unwrap_or(&[]);
-        check_shape(shape, [header.nodes, header.leaves])?;
+        check_shape(ROOTS, shape, [header.nodes, header.leaves])?;
         for (i, b) in (0u32..).zip(sums.chunks_exact(size_of::<BinSums>())) {
             let bin = read_sums(b);
             // a NaN is in no range
@@ -266,12 +267,12 @@ impl<'b> SavedCache<'b> {
     }
 }
 
-/// Checks that the shape is one tree after the other, as many as there are kinds of vertices.
-pub(in crate::learn) fn check_shape(shape: &[u8], expected: [u32; 2]) -> Result<(), CacheError> {
+/// Checks that the shape is one tree after the other, `roots` of them.
+pub(in crate::learn) fn check_shape(roots: u32, shape: &[u8], expected: [u32; 2]) -> Result<(), CacheError> {
     // nodes still to come at every depth
     let mut open = [0u32; MAX_DEPTH as usize + 1];
     if let Some(o) = open.first_mut() {
-        *o = ROOTS;
+        *o = roots;
     }
     let (mut depth, mut leaves) = (0usize, 0u32);
     for (index, found) in (0u32..).zip(shape.iter().copied()) {

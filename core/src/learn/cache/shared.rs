@@ -2,10 +2,10 @@
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use super::bins::{BINS, BinSums, FrozenBin, NO_BIN};
-use super::kind::VertexKind8;
+use super::kind::{ROOTS, VertexKind8};
 use super::size::CacheSize;
 use super::training::Training;
-use super::tree::{MAX_DEPTH, OctreeNode, ROOTS, Tree, TreeScalars, direction_bin};
+use super::tree::{MAX_DEPTH, OctreeNode, Tree, TreeScalars, direction_bin, group_nodes, nodes_for};
 use crate::learn::settings::Objective;
 use crate::memory::{Carver, Layout, Measure, MemoryError};
 use crate::rrs::Local8;
@@ -80,7 +80,7 @@ impl Freeze {
         let [mut next, end] = [self.index, self.end];
         // behind the roots lie unused words
         if next == ROOTS {
-            next = Tree::group_nodes(0).start;
+            next = group_nodes(0).start;
         }
         self.index = next.saturating_add(1);
         (next < end).then_some(next)
@@ -90,7 +90,7 @@ impl Freeze {
 /// Shared side of the statistics: frozen while shards work, changed between iterations.
 #[derive(Debug)]
 pub struct Cache<'m> {
-    pub(super) tree: Tree<'m>,
+    pub(super) tree: Tree<'m, ROOTS>,
     pub(super) sums: &'m mut [BinSums],
     pub(super) frozen: &'m mut [FrozenBin],
     /// Square roots of visibilities in 255ths, apart from `frozen` because they are read for other bins.
@@ -108,13 +108,13 @@ pub struct Cache<'m> {
 impl CacheScalars {
     /// Those of an empty cache over the bounds `lo` to `hi`.
     pub(crate) fn new([lo, hi]: [[f32; 3]; 2]) -> Self {
-        let tree = TreeScalars::roots(lo, hi);
+        let tree = TreeScalars::roots(ROOTS, lo, hi);
         Self { subdivisions_refused: 0, freeze: Freeze::default(), readable: 0, unset: 1, tree }
     }
 
     /// Are these the scalars of a cache of this size?
     pub(crate) fn fit(&self, size: CacheSize) -> bool {
-        Tree::fits(&self.tree, size.subdivisions, size.leaves())
+        Tree::<ROOTS>::fits(&self.tree, size.subdivisions, size.leaves())
     }
 }
 
@@ -141,7 +141,7 @@ impl<'m> Cache<'m> {
 
     /// Bytes; [`Self::carve`] leaves the tables as they are until [`Self::reset`].
     pub(crate) fn measure(m: Measure, size: CacheSize) -> Measure {
-        Tree::measure(m, Tree::nodes_for(size.subdivisions), size.leaves())
+        Tree::<ROOTS>::measure(m, nodes_for(size.subdivisions), size.leaves())
             .add::<BinSums>(size.bins())
             .add::<FrozenBin>(size.bins())
             .add::<u8>(size.bins())
@@ -154,7 +154,7 @@ impl<'m> Cache<'m> {
         objective: Objective,
         scalars: &CacheScalars,
     ) -> Result<Self, MemoryError> {
-        let tree = Tree::carve(c, Tree::nodes_for(size.subdivisions), size.leaves(), &scalars.tree)?;
+        let tree = Tree::carve(c, nodes_for(size.subdivisions), size.leaves(), &scalars.tree)?;
         let (sums, frozen) = (c.take_unset(size.bins())?, c.take_unset(size.bins())?);
         let visibility = c.take_unset(size.bins())?;
         let groups = c.take_unset(size.subdivisions as usize)?;

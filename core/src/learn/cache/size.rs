@@ -1,7 +1,8 @@
 //! Room for leaves, from which the bytes of both sides of the cache follow.
 
 use super::bins::BINS;
-use super::tree::{MAX_LEAVES, ROOTS};
+use super::kind::ROOTS;
+use super::tree::MAX_LEAVES;
 
 /// Capacity of a cache: nodes and leaves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

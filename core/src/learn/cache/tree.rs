@@ -10,7 +10,7 @@
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
 use super::bins::{BINS, NO_BIN};
-use super::kind::{VertexKind, VertexKind8};
+use super::kind::VertexKind8;
 use crate::memory::{Carver, Measure, MemoryError};
 use bytemuck::{Pod, Zeroable};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -19,11 +19,9 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 pub(in crate::learn) const MAX_DEPTH: u32 = 16;
 /// Largest number of leaves: their numbers have 26 bits.
 pub(in crate::learn) const MAX_LEAVES: u32 = 1 << 26;
-/// Number of octrees, one for each kind of vertex. Their roots are the first nodes.
-pub(in crate::learn) const ROOTS: u32 = VertexKind::ALL.len() as u32;
-/// Children lie at multiples of 8, so the roots have eight words as well.
+/// The roots are the first nodes. Children lie at multiples of 8, so the roots have eight words as well, however many there
+/// are.
 const FIRST_CHILD: u32 = 8;
-const _: () = assert!(ROOTS <= FIRST_CHILD);
 
 // no bin of any leaf has the number of none
 const _: () = assert!(MAX_LEAVES as u64 * BINS as u64 <= NO_BIN as u64);
@@ -52,16 +50,16 @@ pub(in crate::learn) struct TreeScalars {
 }
 
 impl TreeScalars {
-    /// Octrees that are leaves, over the bounds `lo` to `hi`.
-    pub(in crate::learn) fn roots(lo: [f32; 3], hi: [f32; 3]) -> Self {
-        Self { used: FIRST_CHILD, leaves: ROOTS, cube: cube(lo, hi) }
+    /// `roots` octrees that are leaves, over the bounds `lo` to `hi`.
+    pub(in crate::learn) fn roots(roots: u32, lo: [f32; 3], hi: [f32; 3]) -> Self {
+        Self { used: FIRST_CHILD, leaves: roots, cube: cube(lo, hi) }
     }
 
-    /// Are these scalars of a tree with room for `nodes` nodes and `max_leaves` leaves?
-    fn fit(&self, nodes: u32, max_leaves: u32) -> bool {
+    /// Are these scalars of `roots` octrees with room for `nodes` nodes and `max_leaves` leaves?
+    fn fit(&self, roots: u32, nodes: u32, max_leaves: u32) -> bool {
         let [x, y, z, edge] = self.cube;
         let groups = self.used.checked_sub(FIRST_CHILD).filter(|n| n % 8 == 0).map(|n| n / 8);
-        groups.and_then(|g| g.checked_mul(7)?.checked_add(ROOTS)) == Some(self.leaves)
+        groups.and_then(|g| g.checked_mul(7)?.checked_add(roots)) == Some(self.leaves)
             && self.used <= nodes
             && self.leaves <= max_leaves
             && [x, y, z].iter().all(|x| x.is_finite())
@@ -70,8 +68,9 @@ impl TreeScalars {
     }
 }
 
+/// `ROOTS` octrees over the same cube, at most eight.
 #[derive(Debug)]
-pub(in crate::learn) struct Tree<'m> {
+pub(in crate::learn) struct Tree<'m, const ROOTS: u32> {
     nodes: &'m mut [u32],
     /// Words of the nodes at depth `grid_bits`, or of leaves above it, by cell; one grid per root.
     grid: &'m mut [u32],
@@ -84,14 +83,26 @@ pub(in crate::learn) struct Tree<'m> {
     scale: f32,
 }
 
-impl<'m> Tree<'m> {
-    pub(in crate::learn) const fn nodes_for(subdivisions: u32) -> u32 {
-        FIRST_CHILD + 8 * subdivisions
-    }
+/// Nodes of octrees with so many subdivisions.
+pub(in crate::learn) const fn nodes_for(subdivisions: u32) -> u32 {
+    FIRST_CHILD + 8 * subdivisions
+}
 
+/// Nodes of a group of children.
+pub(in crate::learn) fn group_nodes(group: u32) -> core::ops::Range<u32> {
+    let first = FIRST_CHILD + 8 * group;
+    first..first + 8
+}
+
+/// Group that begins with node `child`.
+pub(in crate::learn) fn group_of(child: u32) -> usize {
+    (child.saturating_sub(FIRST_CHILD) / 8) as usize
+}
+
+impl<'m, const ROOTS: u32> Tree<'m, ROOTS> {
     /// Bytes; [`Self::carve`] leaves nodes and grid as they are until [`Self::reset`].
     pub(in crate::learn) fn measure(m: Measure, nodes: u32, max_leaves: u32) -> Measure {
-        m.add::<u32>(nodes as usize).add::<u32>(grid_len(max_leaves))
+        m.add::<u32>(nodes as usize).add::<u32>(grid_len(ROOTS, max_leaves))
     }
 
     pub(in crate::learn) fn carve(
@@ -100,11 +111,12 @@ impl<'m> Tree<'m> {
         max_leaves: u32,
         scalars: &TreeScalars,
     ) -> Result<Self, MemoryError> {
+        const { assert!(ROOTS <= FIRST_CHILD) };
         let TreeScalars { used, leaves, cube } = *scalars;
         let [.., edge] = cube;
         Ok(Self {
             nodes: c.take_unset(nodes as usize)?,
-            grid: c.take_unset(grid_len(max_leaves))?,
+            grid: c.take_unset(grid_len(ROOTS, max_leaves))?,
             grid_bits: grid_bits(max_leaves),
             used,
             leaves,
@@ -120,7 +132,7 @@ impl<'m> Tree<'m> {
 
     /// Are these the scalars of a tree with this room? Whatever nodes there are then, none leads out of memory.
     pub(in crate::learn) fn fits(scalars: &TreeScalars, subdivisions: u32, max_leaves: u32) -> bool {
-        scalars.fit(Self::nodes_for(subdivisions), max_leaves)
+        scalars.fit(ROOTS, nodes_for(subdivisions), max_leaves)
     }
 
     /// Makes all roots leaves.
@@ -165,17 +177,6 @@ impl<'m> Tree<'m> {
     /// Number of groups of eight children.
     pub(in crate::learn) fn groups(&self) -> u32 {
         (self.used - FIRST_CHILD) / 8
-    }
-
-    /// Nodes of a group of children.
-    pub(in crate::learn) fn group_nodes(group: u32) -> core::ops::Range<u32> {
-        let first = FIRST_CHILD + 8 * group;
-        first..first + 8
-    }
-
-    /// Group that begins with node `child`.
-    pub(in crate::learn) fn group_of(child: u32) -> usize {
-        (child.saturating_sub(FIRST_CHILD) / 8) as usize
     }
 
     /// A node as memory has it. Memory that something else has written to has no inner nodes but those that lead to a
@@ -269,7 +270,7 @@ impl<'m> Tree<'m> {
         self.leaf(kind.octree(), p, jitter) * U32x8::splat(BINS as u32)
     }
 
-    /// Number of the leaf around each position in octree `root`, below [`ROOTS`]. With `jitter` in [0, 1): of the leaf
+    /// Number of the leaf around each position in octree `root`, below `ROOTS`. With `jitter` in [0, 1): of the leaf
     /// around the position moved by `jitter - 0.5` of the edge of its own leaf, but not out of the cube.
     #[inline(always)]
     pub(in crate::learn) fn leaf(&self, root: U32x8, p: Vec3x8, jitter: Option<[F32x8; 3]>) -> U32x8 {
@@ -295,8 +296,8 @@ fn grid_bits(max_leaves: u32) -> u32 {
     }
 }
 
-fn grid_len(max_leaves: u32) -> usize {
-    (ROOTS as usize) << (3 * grid_bits(max_leaves))
+fn grid_len(roots: u32, max_leaves: u32) -> usize {
+    (roots as usize) << (3 * grid_bits(max_leaves))
 }
 
 /// Smallest corner and edge of a cube around the bounds, world units; the unit cube where bounds are not finite.

@@ -4,9 +4,9 @@
 use super::fraction::LeafSums;
 use super::node::{CELLS, LEVELS, UNIFORM};
 use super::save::{SavedGuide, SavedNode};
-use super::shared::Guide;
+use super::shared::{Guide, ROOTS};
 use crate::learn::cache::CacheError;
-use crate::learn::cache::tree::{OctreeNode, ROOTS};
+use crate::learn::cache::tree::OctreeNode;
 
 /// A saved leaf: its sums, and the nodes of its tree.
 #[derive(Clone, Copy)]

@@ -15,8 +15,8 @@
 use super::fraction::LeafSums;
 use super::log::{GuideHit, GuideLog};
 use super::node::{CELLS, GuideNode, LEVELS, NodeSums, UNIFORM, cell_at};
-use super::shared::{FrozenLeaf, Guide, GuideScalars, Rebuild};
-use crate::learn::cache::tree::{OctreeNode, ROOTS, Tree};
+use super::shared::{FrozenLeaf, Guide, GuideScalars, ROOTS, Rebuild};
+use crate::learn::cache::tree::{OctreeNode, group_nodes};
 
 /// A cell with a larger part of its leaf's mass becomes a node.
 const GROW: f32 = 0.04;
@@ -123,8 +123,7 @@ impl Guide<'_> {
             }
             SUBDIVIDE => {
                 // behind the roots lie unused words
-                let node =
-                    if r.index <= ROOTS { index as u32 } else { Tree::group_nodes(0).start + index as u32 - ROOTS };
+                let node = if r.index <= ROOTS { index as u32 } else { group_nodes(0).start + index as u32 - ROOTS };
                 if node < self.tree.end() {
                     let nodes = |s: &GuideScalars| s.used - s.free_nodes;
                     let before = nodes(&self.scalars);

@@ -13,8 +13,8 @@
 
 use super::fraction::{LeafSums, MOST_FRACTION};
 use super::node::{CELLS, LEVELS, NodeSums, UNIFORM};
-use super::shared::{FrozenLeaf, Guide};
-use crate::learn::cache::tree::{OctreeNode, ROOTS};
+use super::shared::{FrozenLeaf, Guide, ROOTS};
+use crate::learn::cache::tree::OctreeNode;
 use crate::learn::cache::{CacheError, check_shape};
 use crate::scene::blob::content_hash;
 use bytemuck::{Pod, Zeroable};
@@ -22,7 +22,7 @@ use bytemuck::{Pod, Zeroable};
 /// First bytes of a saved guide.
 const MAGIC: u64 = u64::from_le_bytes(*b"CRPGUIDE");
 /// Version of the format.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 const HEADER: usize = size_of::<Header>();
 const LEAF_BYTES: usize = size_of::<SavedLeaf>();
@@ -205,7 +205,7 @@ impl<'b> SavedGuide<'b> {
         }
         let (shape, rest) = body.split_at_checked(padded(h.nodes)).unwrap_or((&[], &[]));
         let shape = shape.get(..h.nodes as usize).unwrap_or(&[]);
-        check_shape(shape, [h.nodes, h.leaves])?;
+        check_shape(ROOTS, shape, [h.nodes, h.leaves])?;
         let (leaves, trees) = rest.split_at_checked(h.leaves as usize * LEAF_BYTES).unwrap_or((&[], &[]));
         let (mut left, mut nodes) = (trees, 0u32);
         for (leaf, b) in (0u32..).zip(leaves.chunks_exact(LEAF_BYTES)) {

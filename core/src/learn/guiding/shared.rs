@@ -6,7 +6,7 @@ use super::log::{GuideLog, NO_LEAF};
 use super::node::{self, Cell, GuideNode, LEVELS, NodeSums, UNIFORM};
 use super::size::GuideSize;
 use super::sphere;
-use crate::learn::cache::tree::{ROOTS, Tree, TreeScalars};
+use crate::learn::cache::tree::{Tree, TreeScalars, nodes_for};
 use crate::memory::{Carver, Layout, Measure, MemoryError};
 use bytemuck::{Pod, Zeroable};
 use core::f32::consts::PI;
@@ -14,7 +14,8 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Directions in which a shading normal may mainly point: an octree for each.
 const FACES: u32 = 6;
-const _: () = assert!(FACES <= ROOTS);
+/// Number of octrees: the last is that of vertices without a normal, in media.
+pub(super) const ROOTS: u32 = FACES + 1;
 
 /// Density of all directions alike, 1/sr.
 const UNIFORM_PDF: f32 = 1.0 / (4.0 * PI);
@@ -113,7 +114,15 @@ impl GuideScalars {
     /// Those of a guide that has learned nothing, over the bounds `lo` to `hi`.
     pub(crate) fn new([lo, hi]: [[f32; 3]; 2]) -> Self {
         let rebuild = Rebuild::default();
-        Self { tree: TreeScalars::roots(lo, hi), used: 1, free: 0, free_nodes: 0, refused: 0, thinned: 0, rebuild }
+        Self {
+            tree: TreeScalars::roots(ROOTS, lo, hi),
+            used: 1,
+            free: 0,
+            free_nodes: 0,
+            refused: 0,
+            thinned: 0,
+            rebuild,
+        }
     }
 
     /// Are these the scalars of a guide of this size?
@@ -121,8 +130,19 @@ impl GuideScalars {
         let nodes = self.used >= 1 && self.used <= size.nodes && self.free < self.used && self.free_nodes < self.used;
         let r = &self.rebuild;
         let rebuild = r.round < LEVELS as u32 && (0.0..=1.0).contains(&r.keep);
-        nodes && rebuild && Tree::fits(&self.tree, size.subdivisions, leaves(size))
+        nodes && rebuild && Tree::<ROOTS>::fits(&self.tree, size.subdivisions, leaves(size))
     }
+}
+
+/// The face of a cube that each of eight vectors mainly points to, below [`FACES`].
+#[inline(always)]
+fn face(n: Vec3x8) -> U32x8 {
+    let a = n.abs();
+    let z = a.z.ge(a.x.max(a.y));
+    let y = a.y.ge(a.x);
+    let along = z.select(n.z, y.select(n.y, n.x));
+    let axis = U32x8::select(z, U32x8::splat(4), U32x8::select(y, U32x8::splat(2), U32x8::splat(0)));
+    U32x8::select(along.lt(F32x8::ZERO), axis + U32x8::splat(1), axis)
 }
 
 /// Most leaves of a guide.
@@ -145,7 +165,7 @@ pub struct Guide8 {
 /// Distributions of directions by position, as all shards sample them.
 #[derive(Debug)]
 pub struct Guide<'m> {
-    pub(super) tree: Tree<'m>,
+    pub(super) tree: Tree<'m, ROOTS>,
     pub(super) frozen: &'m mut [FrozenLeaf],
     pub(super) leaves: &'m mut [LeafSums],
     pub(super) nodes: &'m mut [GuideNode],
@@ -174,7 +194,7 @@ impl<'m> Guide<'m> {
 
     /// Bytes; [`Self::carve`] leaves the tables as they are until [`Self::reset`].
     pub(crate) fn measure(m: Measure, size: GuideSize) -> Measure {
-        Tree::measure(m, Tree::nodes_for(size.subdivisions), leaves(size))
+        Tree::<ROOTS>::measure(m, nodes_for(size.subdivisions), leaves(size))
             .add::<FrozenLeaf>(leaves(size) as usize)
             .add::<LeafSums>(leaves(size) as usize)
             .add::<GuideNode>(size.nodes as usize)
@@ -182,7 +202,7 @@ impl<'m> Guide<'m> {
     }
 
     pub(crate) fn carve(c: &mut Carver<'m>, size: GuideSize, scalars: &GuideScalars) -> Result<Self, MemoryError> {
-        let tree = Tree::carve(c, Tree::nodes_for(size.subdivisions), leaves(size), &scalars.tree)?;
+        let tree = Tree::carve(c, nodes_for(size.subdivisions), leaves(size), &scalars.tree)?;
         let (frozen, sums) = (c.take_unset(leaves(size) as usize)?, c.take_unset(leaves(size) as usize)?);
         let (nodes, node_sums) = (c.take_unset(size.nodes as usize)?, c.take_unset(size.nodes as usize)?);
         Ok(Self { tree, frozen, leaves: sums, nodes, sums: node_sums, size, scalars: *scalars })
@@ -205,17 +225,12 @@ impl<'m> Guide<'m> {
         (s.thinned, s.rebuild) = (0, Rebuild::default());
     }
 
-    /// The leaves of eight vertices at `p`, world space, with shading normals `n`: of positions moved by `jitter -
-    /// 0.5` of the edge of their leaf, `jitter` in [0, 1), so that borders of leaves are not visible.
+    /// The leaves of eight vertices at `p`, world space, with shading normals `n`, none in media: of positions moved by
+    /// `jitter - 0.5` of the edge of their leaf, `jitter` in [0, 1), so that borders of leaves are not visible.
     #[inline(always)]
-    pub fn at(&self, p: Vec3x8, n: Vec3x8, jitter: [F32x8; 3], active: Mask8) -> Guide8 {
-        let a = n.abs();
-        let z = a.z.ge(a.x.max(a.y));
-        let y = a.y.ge(a.x);
-        let along = z.select(n.z, y.select(n.y, n.x));
-        let axis = U32x8::select(z, U32x8::splat(4), U32x8::select(y, U32x8::splat(2), U32x8::splat(0)));
-        let face = U32x8::select(along.lt(F32x8::ZERO), axis + U32x8::splat(1), axis);
-        let leaf = U32x8::select(active, self.tree.leaf(face, p, Some(jitter)), U32x8::splat(NO_LEAF));
+    pub fn at(&self, p: Vec3x8, n: Option<Vec3x8>, jitter: [F32x8; 3], active: Mask8) -> Guide8 {
+        let root = n.map_or(U32x8::splat(FACES), face);
+        let leaf = U32x8::select(active, self.tree.leaf(root, p, Some(jitter)), U32x8::splat(NO_LEAF));
         let (of, used) = (leaf.to_array(), self.frozen.get(..self.tree.leaves() as usize).unwrap_or(&[]));
         let none = FrozenLeaf { root: UNIFORM, fraction: 0 };
         let found: [FrozenLeaf; 8] = core::array::from_fn(|i| used.get(of[i] as usize).copied().unwrap_or(none));

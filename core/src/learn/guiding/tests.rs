@@ -3,6 +3,8 @@
 #![expect(clippy::disallowed_methods, reason = "oracles in f64 have the standard library")]
 
 extern crate std;
+mod media;
+
 use super::node::UNIFORM;
 use super::sphere::{from_square, quantised, to_square};
 use super::*;
@@ -55,7 +57,7 @@ fn with_guide<R>(bytes: usize, f: impl FnOnce(&mut Guide<'_>, &mut GuideLog<'_>)
 
 fn middle(guide: &Guide<'_>) -> Guide8 {
     let p = Vec3x8::splat(0.4, 0.4, 0.4);
-    guide.at(p, Vec3x8::splat(0.0, 0.0, 1.0), [F32x8::splat(0.5); 3], Mask8::all_lanes())
+    guide.at(p, Some(Vec3x8::splat(0.0, 0.0, 1.0)), [F32x8::splat(0.5); 3], Mask8::all_lanes())
 }
 
 /// Light from around one direction, and a little from everywhere.
@@ -256,7 +258,7 @@ fn small_guides_run_out_of_room() {
                     let p = Vec3x8::new(random.unit8(), random.unit8(), random.unit8());
                     let d = from_square([random.unit8() * 0.1, random.unit8()]);
                     let n = from_square([random.unit8(), random.unit8()]);
-                    let at = guide.at(p, n, [F32x8::splat(0.5); 3], Mask8::all_lanes());
+                    let at = guide.at(p, Some(n), [F32x8::splat(0.5); 3], Mask8::all_lanes());
                     let (found, _) = guide.sample(&at, random.words(), at.known);
                     let point = quantised(Vec3x8::select(at.known, found, d));
                     for i in 0..8 {
@@ -300,7 +302,7 @@ fn pieces_do_not_change_what_is_learned() {
                 log.clear();
                 for _ in 0..3000 {
                     let p = Vec3x8::new(random.unit8(), random.unit8(), random.unit8());
-                    let at = guide.at(p, p, [F32x8::splat(0.5); 3], Mask8::all_lanes());
+                    let at = guide.at(p, Some(p), [F32x8::splat(0.5); 3], Mask8::all_lanes());
                     log.add(at.leaf.lane(0), random.next(), random.next(), random.unit(), random.unit());
                 }
                 guide.begin_learning(0.75);

@@ -25,13 +25,13 @@ use bytemuck::{Pod, Zeroable};
 /// Gain, less a quarter of its standard error, from which on the guide is enabled. Vertices of a path that could be guided
 /// one after the other count apart, so that pictures gain more than this ratio says; guided samples take more time, most
 /// where rays are cheap. The benchmark `guiding` shows all three.
-const ENABLED_ABOVE: f64 = 1.12;
+const ENABLED_ABOVE: f64 = 1.08;
 /// Standard errors that the gain must lie above a bound. A ratio of which few samples, those that found rare light, make
 /// the most has a standard error of the same size, and is most likely too small; one that turns out to be too large
 /// soon disables the guide again.
 const DOUBT: f64 = 0.25;
 /// Gain below which it is disabled again.
-const DISABLED_BELOW: f64 = 1.06;
+const DISABLED_BELOW: f64 = 1.04;
 /// Pixels that are guided while nothing is decided, and after a gain is out of the question, within the bounds [`MOST`]
 /// and [`LEAST`]. A guided pixel costs some of what Sobol' points gain, because its samples have a sequence of their own
 /// in each iteration; what they tell of the gain depends on their number, not on the size of the picture.
