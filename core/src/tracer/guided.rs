@@ -67,7 +67,7 @@ fn wide_lobes<W: World>(scene: &Scene<'_>, kernel: ClassKernel, material: U32x8)
     }
 }
 
-/// Draws from the guide for a packet of one surface class; `None` if guiding is off or of no use. Lanes that are learned
+/// Draws from the guide for a packet of one class; `None` if guiding is off or of no use. Lanes that are learned
 /// from and not guided have a leaf and no direction.
 #[inline(never)]
 pub(super) fn draw<'a, 'm: 'a, W: World>(

@@ -28,8 +28,8 @@ use std::{error, fmt};
 /// First bytes of a file.
 pub const MAGIC: [u8; 8] = *b"CRPCHKPT";
 
-/// Version of the layout of this module.
-const LAYOUT: u32 = 3;
+/// Version of the layout of this module, and of what sessions keep.
+const LAYOUT: u32 = 4;
 
 /// Most bytes of the text and most records that are read.
 const MAX_TEXT: u64 = 1 << 16;

@@ -23,6 +23,8 @@ use bytemuck::{Pod, Zeroable};
 const MAGIC: u64 = u64::from_le_bytes(*b"CRPGUIDE");
 /// Version of the format.
 const VERSION: u32 = 2;
+// another number of octrees is another format
+const _: () = assert!(VERSION == 2 && ROOTS == 7);
 
 const HEADER: usize = size_of::<Header>();
 const LEAF_BYTES: usize = size_of::<SavedLeaf>();

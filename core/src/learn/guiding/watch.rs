@@ -262,7 +262,7 @@ mod tests {
         assert!(!decided(fresh, &promise(4000, 2.0)).enabled());
         assert!(!decided(fresh, &promise(100, 0.1)).enabled(), "too few samples");
         // one sample that would have been large, and one of three times all others together
-        for (without, enabled) in [(600.0, false), (12_000.0, true)] {
+        for (without, enabled) in [(400.0, false), (12_000.0, true)] {
             let mut rare = promise(4000, 1.0);
             rare.add(without, 1.0);
             assert_eq!(decided(fresh, &rare).enabled(), enabled, "{:?}", rare.gain());
