@@ -115,8 +115,8 @@ fn guided_renders_agree_with_others() {
     }
 }
 
-/// A box half full of fog that scatters forwards, or back where `g` is negative, and walls that reflect nothing: light comes
-/// from vertices in the fog alone.
+/// A box half full of fog that scatters forwards, or back where `g` is negative, and walls that reflect nothing: light
+/// comes from vertices in the fog alone.
 fn fog(g: f32) -> SceneDescription {
     let mut s = cornell([12, 12]);
     (0..3).for_each(|wall| s.materials[wall].model = grey(0.0));
@@ -124,8 +124,8 @@ fn fog(g: f32) -> SceneDescription {
     s
 }
 
-/// Phase functions and the guide are one mixture. Killed by: samples in media that are not guided or not learned from; a
-/// density that is not the mixture's, of light samples or of emitters that are met; an albedo that counts twice.
+/// Phase functions and the guide are one mixture. Killed by: samples in media that are not learned from; a density that
+/// is not the mixture's, of light samples or of emitters that are met; an albedo that counts twice.
 #[test]
 fn guided_media_agree_with_others() {
     for g in [0.6, -0.3] {
@@ -148,8 +148,8 @@ fn guided_media_agree_with_others() {
     }
 }
 
-/// Narrow phase functions are left alone: the picture is that without guiding, bit by bit, and no other one is. Killed by: no
-/// limit, a sign that counts, a guide in media that learns and is not sampled.
+/// Narrow phase functions are left alone: their pictures have the mean of those without guiding, bit by bit, and no
+/// others have. Killed by: no limit, a sign that counts, a guide in media that learns and is not sampled.
 #[test]
 fn narrow_phase_functions_are_not_guided() {
     for (g, expected) in [(0.79, true), (0.81, false), (-0.81, false)] {

@@ -22,8 +22,8 @@ use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
 /// Phong exponent from which on a lobe is too narrow for a guide: GGX widths below 0.05.
 const NARROW: f32 = 2.0 / (0.05 * 0.05) - 2.0;
 
-/// Mean cosine, of either sign, from which on phase functions are not guided: what they scatter depends on the direction that
-/// light comes from, which a guide's leaf in a medium has the mean of.
+/// Mean cosine, of either sign, from which on phase functions are not guided: what they scatter depends on the path's
+/// direction, and a leaf in a medium has the mean over those.
 const FORWARD: f32 = 0.8;
 
 /// Largest ratio of second moments that a single sample tells.

@@ -31,7 +31,8 @@ use core::fmt;
 
 /// First bytes of a saved shard.
 const MAGIC: u64 = u64::from_ne_bytes(*b"CRPSHARD");
-/// Version of the format, which covers the layout of sums and counters, and what densities and leaves of path guiding mean.
+/// Version of the format, which covers the layout of sums and counters, and what densities and leaves of path guiding
+/// mean.
 const VERSION: u32 = 5;
 /// Bytes of magic and hash, which the hash does not cover.
 const UNHASHED: usize = 16;

@@ -19,8 +19,8 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 pub(in crate::learn) const MAX_DEPTH: u32 = 16;
 /// Largest number of leaves: their numbers have 26 bits.
 pub(in crate::learn) const MAX_LEAVES: u32 = 1 << 26;
-/// The roots are the first nodes. Children lie at multiples of 8, so the roots have eight words as well, however many there
-/// are.
+/// The roots are the first nodes. Children lie at multiples of 8, so the roots have eight words as well, however many
+/// there are.
 const FIRST_CHILD: u32 = 8;
 
 // no bin of any leaf has the number of none

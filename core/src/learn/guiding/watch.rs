@@ -24,7 +24,7 @@ use bytemuck::{Pod, Zeroable};
 
 /// Gain, less a quarter of its standard error, from which on the guide is enabled. Vertices of a path that could be guided
 /// one after the other count apart, so that pictures gain more than this ratio says; guided samples take more time, most
-/// where rays are cheap. The benchmark `guiding` shows all three.
+/// where rays are cheap. The benchmark `guiding` shows all three. Where guiding is left alone, scenes promise 1.06 at most.
 const ENABLED_ABOVE: f64 = 1.08;
 /// Standard errors that the gain must lie above a bound. A ratio of which few samples, those that found rare light, make
 /// the most has a standard error of the same size, and is most likely too small; one that turns out to be too large

@@ -2,8 +2,8 @@
 
 use super::*;
 
-/// Vertices in media learn apart from surfaces, whichever way those face, and keep that when saved. Killed by: an octree that
-/// both share, one that is not saved.
+/// Vertices in media learn apart from surfaces, whichever way those face, and keep that when saved. Killed by: an octree
+/// that both share, one that is not saved.
 #[test]
 fn media_have_leaves_of_their_own() {
     let mut random = Random(12);
