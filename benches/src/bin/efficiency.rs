@@ -45,7 +45,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 const SCENES: [&str; 9] =
     ["kitchen", "bathroom", "living_room", "pool", "water_caustic", "cbox", "veach_mis", "smoke", "volumetric_caustic"];
-const STRATEGIES: [&str; 5] = ["classic", "throughput", "adrrs", "ears", "ears+shadow"];
+/// The last is what the program does by default.
+const STRATEGIES: [&str; 4] = ["classic", "adrrs", "ears+shadow", "ears+shadow+auto"];
 /// With `--all`.
 const ALL: [&str; 24] = [
     "none",

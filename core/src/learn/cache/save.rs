@@ -112,7 +112,7 @@ pub enum CacheError {
         /// Nodes and leaves in the shape.
         found: [u32; 2],
     },
-    /// A sum that is negative, not finite or above 1e100.
+    /// A sum that is negative, not finite or too large: above 1e100 in a cache, above the largest f32 in a guide.
     Sum {
         /// Leaf in the order of the shape.
         leaf: u32,
@@ -164,7 +164,7 @@ impl fmt::Display for CacheError {
             Self::Sum { leaf, bin, field, found } => {
                 write!(
                     f,
-                    "leaf {leaf} bin {bin} field {field} of the saved statistics is {found}, need 0 to {MAX_SUM:e}"
+                    "leaf {leaf} bin {bin} field {field} of the saved statistics is {found}: negative, not finite or too large"
                 )
             }
             Self::Absent => f.write_str("nothing is learned here that could be saved or loaded, or an iteration runs"),

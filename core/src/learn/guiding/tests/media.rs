@@ -2,8 +2,8 @@
 
 use super::*;
 
-/// Vertices in media learn apart from surfaces, whichever way those face, and keep that when saved. Killed by: an octree
-/// that both share, one that is not saved.
+/// Vertices in media learn apart from surfaces, whichever way those face, and keep that when saved, loaded and merged.
+/// Killed by: an octree that both share, one that is not saved, one that is not merged, or into that of surfaces.
 #[test]
 fn media_have_leaves_of_their_own() {
     let mut random = Random(12);
@@ -31,6 +31,9 @@ fn media_have_leaves_of_their_own() {
         guide.reset();
         assert!(at(guide, None).known.none());
         guide.load(&bytes).expect("a guide");
+        check(guide);
+        guide.reset();
+        guide.merge(&bytes).expect("a guide");
         check(guide);
     });
 }
