@@ -164,7 +164,8 @@ impl fmt::Display for CacheError {
             Self::Sum { leaf, bin, field, found } => {
                 write!(
                     f,
-                    "leaf {leaf} bin {bin} field {field} of the saved statistics is {found}: negative, not finite or too large"
+                    "leaf {leaf} bin {bin} field {field} of the saved statistics is {found}: \
+                     negative, not finite or too large"
                 )
             }
             Self::Absent => f.write_str("nothing is learned here that could be saved or loaded, or an iteration runs"),
