@@ -106,12 +106,15 @@ pub struct Counters {
     pub passed: Utilisation,
     /// Largest number of vertices that waited at once.
     pub ring_peak: u64,
+    /// Closest-hit rays of light paths, which path guiding learns from at first. No part of [`Self::cost`]: camera samples do
+    /// not take them.
+    pub light_path_rays: u64,
 }
 
 impl Counters {
     /// Number of rays of all kinds.
     pub fn rays(&self) -> u64 {
-        self.camera_rays + self.scatter_rays + self.straight_rays + self.shadow_rays
+        self.camera_rays + self.scatter_rays + self.straight_rays + self.light_path_rays + self.shadow_rays
     }
 
     /// Work in units of a ray: rays, and the steps through media ([`MEDIUM_STEPS_PER_RAY`] count as one).
@@ -147,6 +150,7 @@ impl Counters {
         self.camera_rays += o.camera_rays;
         self.scatter_rays += o.scatter_rays;
         self.straight_rays += o.straight_rays;
+        self.light_path_rays += o.light_path_rays;
         self.medium_steps += o.medium_steps;
         self.shadow_rays += o.shadow_rays;
         self.camera_samples += o.camera_samples;

@@ -131,6 +131,12 @@ impl LightScene {
         })
     }
 
+    /// Gives the scene bounds.
+    pub fn within(mut self, [lo, hi]: [[f32; 3]; 2]) -> Self {
+        (self.info.bounds_min, self.info.bounds_max) = (lo, hi);
+        self
+    }
+
     /// Selects by power, the scene taken as of radius 1.
     pub fn finish(self) -> Self {
         let weights = environment::light_weights(&self.lights, self.environment.as_ref(), &self.env_texels, 1.0);

@@ -1,7 +1,7 @@
 //! Every kind of light under one contract: what its samples add up to is the irradiance by an independent formula, and
 //! they say of themselves what the table of kinds says. A kind without an example does not compile.
 
-use croupier::unstable::light::{LightSample8, PowerSelector};
+use croupier::unstable::light::{LightSample8, PowerSelector, emission_of};
 use croupier::unstable::scene::Effects;
 use croupier::unstable::scene::blob::{EnvironmentKind, LightKind};
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -120,6 +120,66 @@ fn irradiance_is_the_formulas() {
         total += expected;
     }
     assert_near("all kinds", irradiance(&all.finish(), 100), total);
+}
+
+/// Radius of the disk that receives what lights emit.
+const RECEIVER: f32 = 0.25;
+
+/// Mean irradiance of a disk around the origin that faces +y by rays that leave the lights, with its standard error; over
+/// the emission.
+fn received(s: &LightScene, seed: u64) -> (f64, f64) {
+    let (scene, mut rng, mut mean) = (s.scene(), SplitMix(seed), Mean::default());
+    let area = PI * f64::from(RECEIVER).powi(2);
+    for _ in 0..8 * PACKETS {
+        let words = std::array::from_fn(|_| std::array::from_fn(|_| U32x8::from_fn(|_| rng.word())));
+        let e = emission_of(Effects(u32::MAX), &scene, &PowerSelector(scene), words, Mask8::all_lanes());
+        let t = -e.o.y / e.d.y;
+        let p = e.o + e.d * t;
+        let inside = (p.x * p.x + p.z * p.z).le(F32x8::splat(RECEIVER * RECEIVER));
+        let crosses = e.valid & inside & t.gt(F32x8::ZERO) & e.d.y.lt(F32x8::ZERO);
+        let power = crosses.zero_unless(e.power.y / RGB[1]).to_array();
+        power.into_iter().for_each(|x| mean.add(f64::from(x) / area));
+    }
+    (mean.mean(), mean.error())
+}
+
+/// The same by samples of the lights, from points all over the disk.
+fn sampled(s: &LightScene, seed: u64) -> (f64, f64) {
+    let (scene, mut rng, mut mean) = (s.scene(), SplitMix(seed), Mean::default());
+    for _ in 0..PACKETS {
+        let words = std::array::from_fn(|_| U32x8::from_fn(|_| rng.word()));
+        let [r, turn] = [(); 2].map(|()| U32x8::from_fn(|_| rng.word()).to_unit());
+        let (sin, cos) = turn.sin_cos_2pi();
+        let r = r.sqrt() * RECEIVER;
+        let (p, up) = (Vec3x8::new(r * cos, F32x8::ZERO, r * sin), Vec3x8::splat(0.0, 1.0, 0.0));
+        let l = sample(&scene, &PowerSelector(scene), p, up, words, Mask8::all_lanes());
+        let estimate = l.valid.zero_unless(l.radiance.y * l.wi.y.max(F32x8::ZERO) / l.pdf) / RGB[1];
+        estimate.to_array().into_iter().for_each(|x| mean.add(f64::from(x)));
+    }
+    (mean.mean(), mean.error())
+}
+
+/// Lights emit what their samples say of them: the power through a disk, from either side of shapes with two. Killed by:
+/// an area or a solid angle that is left out, a side that does not emit, a disk that does not cover the scene, directions
+/// that are uniform in place of by the cosine, a selection probability that is left out.
+#[test]
+fn emitted_power_is_what_is_sampled() {
+    let bounds = |s: LightScene| s.finish().within([[-3.0, -1.0, -3.0], [3.0, 4.0, 3.0]]);
+    let mut scenes = vec![];
+    for kind in LightKind::ALL {
+        scenes.push((kind.name(), bounds(example(*kind, LightScene::default()).0)));
+    }
+    for kind in [LightKind::Sphere, LightKind::Rectangle, LightKind::Disk] {
+        scenes.push(("two-sided", bounds(example(kind, LightScene::default()).0.two_sided())));
+    }
+    let all = LightKind::ALL.iter().fold(LightScene::default(), |s, kind| example(*kind, s).0);
+    scenes.push(("all kinds", bounds(all)));
+    for (seed, (what, s)) in (0..).zip(scenes) {
+        let ((a, da), (b, db)) = (received(&s, 200 + seed), sampled(&s, 300 + seed));
+        let error = da.hypot(db);
+        assert!(error < 0.04 * b, "{what}: a standard error of {error} sees nothing of {b}");
+        assert!((a - b).abs() < 4.5 * error, "{what}: {a} +- {da} received, {b} +- {db} sampled");
+    }
 }
 
 /// A kind whose effect the profile lacks gives no sample; delta lights say so. Killed by: an effect of the wrong row,

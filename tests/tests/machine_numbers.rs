@@ -266,7 +266,7 @@ fn counters_add_up() {
             let c: Counters = image.counters;
             let what = format!("{name}, {strategy}: {c:?}");
             assert_eq!((c.camera_rays, c.camera_samples), (3200, 3200), "{what}");
-            assert_eq!(c.trace.lanes, c.camera_rays + c.scatter_rays + c.straight_rays, "{what}");
+            assert_eq!(c.trace.lanes, c.camera_rays + c.scatter_rays + c.straight_rays + c.light_path_rays, "{what}");
             assert_eq!(c.straight_rays, c.passed.lanes, "{what}");
             assert_eq!(c.straight_rays > 0, name == "everything", "{what}");
             assert_eq!(c.occlude.lanes, c.shadow_rays, "{what}");

@@ -905,6 +905,8 @@ typedef struct croupier_counters {
   struct croupier_utilisation passed;
   // Largest number of vertices that waited at once.
   uint64_t ring_peak;
+  // Closest-hit rays of light paths, which path guiding learns from at first.
+  uint64_t light_path_rays;
 } croupier_counters;
 
 // A pixel of the picture so far. Linear Rec. 709.

@@ -232,6 +232,8 @@ pub struct croupier_counters {
     pub passed: croupier_utilisation,
     /// Largest number of vertices that waited at once.
     pub ring_peak: u64,
+    /// Closest-hit rays of light paths, which path guiding learns from at first.
+    pub light_path_rays: u64,
 }
 
 // SAFETY: `repr(C)` and Pod, begins with its size.

@@ -208,6 +208,11 @@ impl<'m> LearnedState<'m> {
         self.watches().then(|| GuideUse { enabled: self.watch.enabled(), gain: self.watch.gain() })
     }
 
+    /// Is the guide to be trained by light paths: is there one that has learned nothing?
+    pub(crate) fn wants_light_paths(&self) -> bool {
+        self.guide().is_some_and(Guide::is_new)
+    }
+
     /// Begins to learn from the logs of path guiding; `false` if it is off.
     pub(crate) fn begin_guide(&mut self) -> bool {
         let keep = self.learning.decay;

@@ -13,6 +13,7 @@
 //! Points are uniform on the triangle; seen from distance r under the angle cos at the light their solid-angle density
 //! is r^2 / (A cos).
 
+use super::emit::{Emission8, Numbers8, SceneSphere};
 use super::{Chosen, LightModel, LightSample8, LightSelector, SceneExtent, luminance, usable};
 use crate::geometry::{self, OFFSET_BOUND, Placed8, SurfaceHit8};
 use crate::scene::Scene;
@@ -94,6 +95,13 @@ impl LightModel for Area {
     /// Power of a Lambertian emitter.
     fn power(light: &Light, _: &SceneExtent) -> f64 {
         PI * f64::from(light.area) * luminance(light.emission)
+    }
+
+    #[inline(always)]
+    fn emit(scene: &Scene<'_>, light: &Chosen, sphere: &SceneSphere, n: &Numbers8, mask: Mask8) -> Emission8 {
+        // points are the same from wherever they are seen
+        let s = Self::sample(scene, light, sphere.centre(), n.words, mask);
+        Emission8::from_surface((s.point, s.normal, s.point_error), light.emission, light.area, n)
     }
 }
 

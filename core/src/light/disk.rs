@@ -18,6 +18,7 @@
 //! [`SHAPE_TWO_SIDED`]: crate::scene::blob::SHAPE_TWO_SIDED
 //! [`LEAST_SOLID_ANGLE`]: super::rectangle::LEAST_SOLID_ANGLE
 
+use super::emit::{Emission8, Numbers8, SceneSphere};
 use super::rectangle::SphericalRectangle8;
 use super::shape::{Sampled8, Shape, ShapeFields, area_density, shape_sample};
 use super::{Chosen, LightModel, LightSample8, SceneExtent, luminance};
@@ -138,5 +139,13 @@ impl LightModel for Disk {
     fn power(light: &Light, _: &SceneExtent) -> f64 {
         let [_, _, _, radius, ..] = light.params.map(f64::from);
         PI * PI * radius * radius * super::shape::sides(light) * luminance(light.emission)
+    }
+
+    #[inline(always)]
+    fn emit(_: &Scene<'_>, light: &Chosen, _: &SceneSphere, n: &Numbers8, _: Mask8) -> Emission8 {
+        let s = Self::read(light);
+        let [x, y] = concentric_disk([n.words[0], n.words[1]].map(U32x8::to_unit));
+        let on = Frame8::from_normal(s.normal).to_world(Vec3x8::new(x, y, F32x8::ZERO));
+        Emission8::from_shape((s.middle + on * s.radius, s.normal), s.two_sided, light.emission, s.area(), n)
     }
 }

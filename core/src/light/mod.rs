@@ -14,6 +14,9 @@
 //! | rectangle | `rectangle.rs` | uniform in its solid angle | 1 / solid angle | pi A L |
 //! | disk | `disk.rs` | near: in the solid angle of a square around it; far: uniform on the disk | 1 / that; r^2 / (A cos) | pi A L |
 //!
+//! Rays that leave lights are sampled in `emit.rs`: from the whole surface of those that have one, by its area and the cosine;
+//! towards the whole scene from those at infinity.
+//!
 //! A light is chosen by a [`LightSelector`] (power-weighted: `power.rs`; by a tree in scenes with many: `tree.rs`); every density stated here contains the
 //! selection probability. What [`sample_of`] states for a direction is what [`area_pdf`], [`meet_shapes`] and
 //! [`environment_pdf`] give for a scattered ray that finds the same light (NUMERICS MIS-3): for the environment and where
@@ -23,6 +26,7 @@
 mod area;
 mod directional;
 mod disk;
+mod emit;
 mod environment;
 mod meet;
 mod mis;
@@ -36,12 +40,14 @@ mod sun;
 mod tree;
 
 pub use area::{area_of, area_pdf, area_radiance, area_texture};
+pub use emit::Emission8;
 pub use environment::{environment_met, environment_pdf, environment_radiance};
 pub use meet::{ShapeRays8, meet_shapes, nearest_shape};
 pub use mis::power_heuristic;
 pub use power::{PowerSelector, SceneExtent, luminance};
 pub use tree::{LightTree, SURFACE_FLOOR, TreeSelector, build_light_tree, light_importance, light_node_of};
 
+use self::emit::{Numbers8, SceneSphere};
 use crate::scene::blob::{Light, LightKind, NONE};
 use crate::scene::{Effects, Scene, gather};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
@@ -238,6 +244,9 @@ trait LightModel {
 
     /// Emitted power in luminance units: the weight of its selection.
     fn power(light: &Light, scene: &SceneExtent) -> f64;
+
+    /// Rays that leave the light in the lanes of `mask`, without the selection probability; other lanes may hold anything.
+    fn emit(scene: &Scene<'_>, light: &Chosen, sphere: &SceneSphere, n: &Numbers8, mask: Mask8) -> Emission8;
 }
 
 macro_rules! models {
@@ -261,6 +270,28 @@ macro_rules! models {
                 let mask = light.of_kind(LightKind::$kind, mask);
                 if mask.any() {
                     out.merge(mask, &<$model>::sample(scene, light, p, words, mask));
+                }
+            })*
+            out
+        }
+
+        /// Rays in the lanes of `mask`, likewise.
+        #[inline(always)]
+        fn emit_chosen(
+            profile: Effects,
+            scene: &Scene<'_>,
+            light: &Chosen,
+            sphere: &SceneSphere,
+            n: &Numbers8,
+            mask: Mask8,
+        ) -> Emission8 {
+            let mut out = Emission8::NONE;
+            $(if profile.intersects(Effects::of_light(LightKind::$kind))
+                && scene.effects.intersects(Effects::of_light(LightKind::$kind))
+            {
+                let mask = light.of_kind(LightKind::$kind, mask);
+                if mask.any() {
+                    out.merge(mask, &<$model>::emit(scene, light, sphere, n, mask), <$model>::DELTA);
                 }
             })*
             out
@@ -364,6 +395,33 @@ pub fn sample_at<S: LightSelector>(
     out.valid &= usable(out.pdf) & out.wi.is_finite() & out.radiance.is_finite() & out.radiance.any_positive();
     out.pdf = out.valid.zero_unless(out.pdf);
     out.radiance = out.radiance.zero_unless(out.valid);
+    out
+}
+
+/// Rays that leave the lights of the scene, of eight random words each; the lights are those that `selector` chooses at the
+/// middle of the scene. Lights that move are where they are when the shutter opens.
+#[inline(always)]
+pub fn emission_of<S: LightSelector>(
+    profile: Effects,
+    scene: &Scene<'_>,
+    selector: &S,
+    [[choice, a, b, c], [d, e, side, _]]: [[U32x8; 4]; 2],
+    active: Mask8,
+) -> Emission8 {
+    let sphere = SceneSphere::new(scene);
+    let (light, probability) = selector.select(sphere.centre(), Vec3x8::ZERO, choice);
+    let placed = profile.contains(Effects::INSTANCES) && scene.effects.contains(Effects::INSTANCES);
+    let chosen = Chosen::gather(scene, light, F32x8::ZERO, placed, active);
+    let possible = active & probability.gt(F32x8::ZERO);
+    let n = Numbers8 { words: [a, b, c], u: [d, e].map(U32x8::to_unit), side: side.to_unit() };
+    let mut out = emit_chosen(profile, scene, &chosen, &sphere, &n, possible);
+    if profile.contains(TEXTURED_EMISSION) && scene.effects.contains(TEXTURED_EMISSION) {
+        let textured = chosen.of_kind(LightKind::Area, possible);
+        let factor = area::sampled_factor(scene, &chosen, [a, b], textured);
+        out.power = Vec3x8::select(textured, out.power * factor, out.power);
+    }
+    out.power = out.power / probability;
+    out.valid &= possible & out.power.is_finite() & out.power.any_positive() & out.d.is_finite() & out.o.is_finite();
     out
 }
 

@@ -5,6 +5,7 @@
 //! | `vector` | position, world units | finite |
 //! | `emission` | intensity, power / sr | >= 0 |
 
+use super::emit::{Emission8, Numbers8, SceneSphere};
 use super::{Chosen, LightModel, LightSample8, SceneExtent, luminance};
 use crate::scene::Scene;
 use crate::scene::blob::Light;
@@ -46,5 +47,11 @@ impl LightModel for Point {
     /// Power over all directions.
     fn power(light: &Light, _: &SceneExtent) -> f64 {
         2.0 * TAU * luminance(light.emission)
+    }
+
+    #[inline(always)]
+    fn emit(_: &Scene<'_>, light: &Chosen, _: &SceneSphere, n: &Numbers8, _: Mask8) -> Emission8 {
+        let (axis, all_around) = (Vec3x8::splat(0.0, 0.0, 1.0), F32x8::splat(2.0));
+        Emission8::from_point(light.vector, axis, all_around, light.emission, n)
     }
 }

@@ -25,6 +25,7 @@
 //!
 //! [`SHAPE_TWO_SIDED`]: crate::scene::blob::SHAPE_TWO_SIDED
 
+use super::emit::{Emission8, Numbers8, SceneSphere};
 use super::shape::{Sampled8, Shape, ShapeFields, area_density, shape_sample};
 use super::{Chosen, LightModel, LightSample8, SceneExtent, luminance};
 use crate::geometry::OFFSET_BOUND;
@@ -237,5 +238,13 @@ impl LightModel for Rectangle {
         let [a, b, c, x, y, z] = light.params;
         let half = |x: f32, y: f32, z: f32| f64::from(Vec3x8::splat(x, y, z).length().lane(0));
         PI * 4.0 * half(a, b, c) * half(x, y, z) * super::shape::sides(light) * luminance(light.emission)
+    }
+
+    #[inline(always)]
+    fn emit(_: &Scene<'_>, light: &Chosen, _: &SceneSphere, n: &Numbers8, _: Mask8) -> Emission8 {
+        let s = Self::read(light);
+        let [x, y, _] = n.words.map(|w| w.to_unit() * 2.0 - 1.0);
+        let point = s.middle + s.axes[0] * (s.half[0] * x) + s.axes[1] * (s.half[1] * y);
+        Emission8::from_shape((point, s.normal), s.two_sided, light.emission, s.area(), n)
     }
 }

@@ -17,6 +17,7 @@
 //!
 //! [`SHAPE_TWO_SIDED`]: crate::scene::blob::SHAPE_TWO_SIDED
 
+use super::emit::{Emission8, Numbers8, SceneSphere};
 use super::shape::{Sampled8, Shape, ShapeFields, shape_sample};
 use super::{Chosen, LightModel, LightSample8, SceneExtent, luminance};
 use crate::geometry::OFFSET_BOUND;
@@ -122,5 +123,17 @@ impl LightModel for Sphere {
     fn power(light: &Light, _: &SceneExtent) -> f64 {
         let [radius, ..] = light.params.map(f64::from);
         4.0 * PI * PI * radius * radius * luminance(light.emission)
+    }
+
+    /// To the outside alone: rays to the inside would have to end where they leave the sphere again.
+    #[inline(always)]
+    fn emit(_: &Scene<'_>, light: &Chosen, _: &SceneSphere, n: &Numbers8, _: Mask8) -> Emission8 {
+        let s = Self::read(light);
+        let [below, turn, _] = n.words.map(U32x8::to_unit);
+        let (below, (sin_phi, cos_phi)) = (below * 2.0, turn.sin_cos_2pi());
+        let across = (below * (2.0 - below)).safe_sqrt();
+        let normal = Vec3x8::new(across * cos_phi, across * sin_phi, 1.0 - below);
+        let area = s.radius * s.radius * (2.0 * TAU);
+        Emission8::from_shape((s.centre + normal * s.radius, normal), Mask8::NONE, light.emission, area, n)
     }
 }

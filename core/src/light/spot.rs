@@ -12,6 +12,7 @@
 //! inner)` clamped to 0..=1. Cones are kept as 1 - cos because cosines of narrow ones are all near 1: x is half the
 //! squared distance of the two unit vectors, which is precise there.
 
+use super::emit::{Emission8, Numbers8, SceneSphere};
 use super::{Chosen, LightModel, LightSample8, SceneExtent, luminance, point};
 use crate::scene::Scene;
 use crate::scene::blob::Light;
@@ -45,5 +46,12 @@ impl LightModel for Spot {
     fn power(light: &Light, _: &SceneExtent) -> f64 {
         let [_, _, _, outer, inner, _] = light.params.map(f64::from);
         TAU * (inner + (outer - inner) / 3.0) * luminance(light.emission)
+    }
+
+    #[inline(always)]
+    fn emit(_: &Scene<'_>, light: &Chosen, _: &SceneSphere, n: &Numbers8, _: Mask8) -> Emission8 {
+        let [x, y, z, outer, ..] = light.params;
+        let e = Emission8::from_point(light.vector, Vec3x8::new(x, y, z), outer, light.emission, n);
+        Emission8 { power: e.power * falloff(light, e.d), ..e }
     }
 }

@@ -50,7 +50,7 @@ pub(super) struct Guided8<'a, 'm> {
 
 /// Lanes whose materials, or media, scatter into lobes that are wide enough for a guide.
 #[inline(always)]
-fn wide_lobes<W: World>(scene: &Scene<'_>, kernel: ClassKernel, material: U32x8) -> Mask8 {
+pub(super) fn wide_lobes<W: World>(scene: &Scene<'_>, kernel: ClassKernel, material: U32x8) -> Mask8 {
     let index = material.to_array();
     match kernel {
         ClassKernel::Surface(kind) => {

@@ -5,6 +5,7 @@
 //! | `pipeline` | all stages in order |
 //! | `refill`, `camera_rays` | what fills a packet: samples of waiting vertices, or camera samples |
 //! | `points` | camera samples that begin at surfaces |
+//! | `light_paths` | paths from lights, which path guiding learns from at first |
 //! | `nee`, `occlude` | next event estimation: light samples, their shadow rays |
 //! | `scatter` | BSDF samples and values |
 //! | `trace` | closest hits |
@@ -35,6 +36,7 @@ mod guide_notes;
 mod guided;
 mod job;
 mod ledger;
+mod light_paths;
 mod media_set;
 mod medium;
 mod nee;

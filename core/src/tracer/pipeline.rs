@@ -10,6 +10,9 @@
 //!    +------------------------------------ settle <-- roulette <-- aov <----------------------------------+
 //! ```
 //!
+//! Before the first camera samples of a guide that has learned nothing come packets of light paths, each from the lights to
+//! its end (`light_paths.rs`).
+//!
 //! Camera samples of an extension that has points in place of rays (`points.rs`) join at `aov`.
 //!
 //! `medium` and `pass` are compiled in with effects that call for them. Waiting rays stopped in a medium, or passed what
@@ -24,6 +27,7 @@ use super::emission;
 use super::first_surfaces::first_surfaces;
 use super::guide_notes::GuideNote8;
 use super::job::Job;
+use super::light_paths::trace_light_paths;
 use super::medium::{Collision8, arrive_in_media, cross_media};
 use super::nee::{sample_lights, shadow_rays};
 use super::occlude::occlude;
@@ -46,7 +50,11 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// One packet of shard `index` through all stages; `false` when nothing is left.
 pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State<'_>) -> bool {
-    let State { cursor, ring, book, comb } = state;
+    if W::GUIDING && state.light_packets > 0 {
+        trace_light_paths(world, job, index, &mut state.book, &mut state.light_packets);
+        return true;
+    }
+    let State { cursor, ring, book, comb, .. } = state;
     let settings = &job.settings;
 
     let filled = refill(cursor, ring, book);

@@ -21,7 +21,7 @@ use croupier_simd::{F32x8, U32x8, Vec3x8};
 /// Up to eight camera samples of shard `index`, from the extension's points to the ring.
 #[inline(never)]
 pub(super) fn begin_at_points<W: World>(world: &W, job: &Job, index: u32, state: &mut State<'_>) {
-    let State { cursor, ring, book, comb } = state;
+    let State { cursor, ring, book, comb, .. } = state;
     let settings = &job.settings;
     let samples = camera_samples(world, job, index, cursor, book);
     let path = &samples.path;

@@ -33,7 +33,7 @@ use core::fmt;
 const MAGIC: u64 = u64::from_ne_bytes(*b"CRPSHARD");
 /// Version of the format, which covers the layout of sums and counters, and what densities and leaves of path guiding
 /// mean.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 /// Bytes of magic and hash, which the hash does not cover.
 const UNHASHED: usize = 16;
 
@@ -42,8 +42,8 @@ const HEADER: usize = size_of::<Header>();
 const GUIDED: usize = size_of::<GuideHeader>();
 
 // Any of these is part of the layout: other counters or sums need another version.
-const _: () = assert!(VERSION == 5 && HEADER == 392 && size_of::<PixelSums>() == 48 && Training::BIN_BYTES == 52);
-const _: () = assert!(VERSION == 5 && GUIDED == 56);
+const _: () = assert!(VERSION == 6 && HEADER == 400 && size_of::<PixelSums>() == 48 && Training::BIN_BYTES == 52);
+const _: () = assert!(VERSION == 6 && GUIDED == 56);
 
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]

@@ -18,7 +18,7 @@ use core::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
     /// Rays of all kinds, and as many steps through media as cost the same ([`Counters::work`]); exceeded by less than one
-    /// packet (16 rays, unless they pass surfaces or media). Camera samples for which an
+    /// packet (16 rays, unless they pass surfaces or media; of light paths, with path guiding, up to 256). Camera samples for which an
     /// [`Extension`](crate::unstable::extension::Extension) has no ray count as if they had one.
     pub rays: u64,
 }
@@ -180,6 +180,7 @@ impl<'m> Shard<'m> {
     /// joins it with a step of 0 rays first.
     pub fn stop(&mut self) {
         self.state.cursor = CameraCursor::finished();
+        self.state.light_packets = 0;
     }
 
     /// Works until the budget is used or the iteration is finished. Many small steps and one big step give the same
@@ -234,8 +235,8 @@ impl<'m> Shard<'m> {
 
     /// Has the shard finished this iteration of this scene?
     pub(crate) fn is_done(&self, identity: Identity) -> bool {
-        let State { cursor, ring, book, .. } = &self.state;
-        self.joined == identity && cursor.is_finished() && ring.waiting() == 0 && book.is_clear()
+        let State { cursor, ring, book, light_packets, .. } = &self.state;
+        self.joined == identity && *light_packets == 0 && cursor.is_finished() && ring.waiting() == 0 && book.is_clear()
     }
 
     /// Is this the iteration of the shard's last step? `world` is the session.

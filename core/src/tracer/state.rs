@@ -3,6 +3,7 @@
 use super::book::{BookRecord, Bookkeeping};
 use super::camera_rays::{CameraCursor, CursorRecord};
 use super::job::Job;
+use super::light_paths::packets_of;
 use super::ring::{Ring, RingRecord};
 use super::roulette::CombNumbers;
 use crate::memory::{Carver, Measure, MemoryError};
@@ -20,6 +21,8 @@ pub(crate) struct State<'m> {
     pub book: Bookkeeping<'m>,
     /// Numbers of the combs.
     pub comb: CombNumbers,
+    /// Packets of light paths that are left; they come before the camera samples.
+    pub light_packets: u32,
 }
 
 /// What a shard's state holds besides its slabs and sums.
@@ -31,6 +34,7 @@ pub(crate) struct StateRecord {
     book: BookRecord,
     /// Numbers drawn for the combs.
     drawn: u64,
+    light_packets: u64,
 }
 
 impl<'m> State<'m> {
@@ -45,6 +49,7 @@ impl<'m> State<'m> {
             ring: Ring::carve(c, job.settings.ring as usize)?,
             book: Bookkeeping::carve(c, job, pixels)?,
             comb: CombNumbers::new(0, 0, 0),
+            light_packets: 0,
         })
     }
 
@@ -55,6 +60,7 @@ impl<'m> State<'m> {
             ring: self.ring.suspend(),
             book: self.book.suspend(),
             drawn: self.comb.suspend(),
+            light_packets: self.light_packets.into(),
         }
     }
 
@@ -65,6 +71,7 @@ impl<'m> State<'m> {
         self.ring.resume(&r.ring)?;
         self.book.resume(&r.book)?;
         self.comb = CombNumbers::new(job.settings.seed, iteration.number, index).resume(r.drawn);
+        self.light_packets = u32::try_from(r.light_packets).ok()?;
         Some(())
     }
 
@@ -73,6 +80,7 @@ impl<'m> State<'m> {
         self.cursor = CameraCursor::finished();
         self.ring.reset();
         self.book.reset();
+        self.light_packets = 0;
     }
 
     /// Joins an iteration as shard `index`; what one that was given up has left is forgotten.
@@ -82,5 +90,7 @@ impl<'m> State<'m> {
         self.book.begin(world.learned());
         self.cursor = CameraCursor::new(&job.tiles, index, iteration.samples);
         self.comb = CombNumbers::new(job.settings.seed, iteration.number, index);
+        let trained = W::GUIDING && iteration.first_sample == 0 && world.learned().wants_light_paths();
+        self.light_packets = if trained { packets_of(job.tiles.pixels_of(index)) } else { 0 };
     }
 }

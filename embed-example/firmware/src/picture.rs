@@ -23,7 +23,7 @@ pub const ITERATIONS: [u32; 3] = [2, 2, 4];
 pub const BETWEEN_TICKS: u64 = 48;
 
 /// Bytes of the session's block, [`Plan::session`]: a constant, because the memory is static. A test compares the two.
-pub const SESSION_BYTES: usize = 231_168;
+pub const SESSION_BYTES: usize = 231_232;
 /// Bytes of the shard's block, [`Plan::shard_of`]; as above.
 pub const SHARD_BYTES: usize = 239_424;
 

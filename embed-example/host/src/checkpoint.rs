@@ -29,7 +29,7 @@ use std::{error, fmt};
 pub const MAGIC: [u8; 8] = *b"CRPCHKPT";
 
 /// Version of the layout of this module, and of what sessions keep.
-const LAYOUT: u32 = 4;
+const LAYOUT: u32 = 5;
 
 /// Most bytes of the text and most records that are read.
 const MAX_TEXT: u64 = 1 << 16;

@@ -35,7 +35,7 @@ use std::{error, fmt};
 pub const MAGIC: [u8; 8] = *b"CRPRPART";
 
 /// Version of the layout of this module.
-const LAYOUT: u32 = 4;
+const LAYOUT: u32 = 5;
 
 /// Most bytes of texts that are read.
 const MAX_TEXT: u64 = 1 << 26;

@@ -380,6 +380,7 @@ fn stats(r: &Rendered) -> RenderStats {
         ("camera_rays", c.camera_rays),
         ("scatter_rays", c.scatter_rays),
         ("shadow_rays", c.shadow_rays),
+        ("light_path_rays", c.light_path_rays),
         ("vertex_samples", c.vertex_samples),
         ("paths_terminated", c.paths_terminated),
         ("splits", c.splits),

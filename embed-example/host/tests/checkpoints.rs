@@ -151,7 +151,7 @@ fn other_files_are_refused_by_name() {
     // the layout's version
     let mut newer = good.clone();
     newer[8] += 1;
-    assert!(error(resume(&newer, &options, scene)).contains("written by version 5 of the file's layout"));
+    assert!(error(resume(&newer, &options, scene)).contains("written by version 6 of the file's layout"));
     let mut small = vec![0; 10];
     fs::write(&path, &good).unwrap();
     assert!(matches!(read(&path, scene.hash, &settings, &mut small), Err(CheckpointError::Block(_, 10))));

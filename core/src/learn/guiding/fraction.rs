@@ -24,6 +24,12 @@ pub(super) const MOST_FRACTION: u32 = 49_152;
 /// Effective samples that a useless guide counts for.
 const PRIOR: f64 = 2.0;
 
+/// Effective samples that an arrival of a light path counts for: directions were learned from the same ones, and that the
+/// surface is diffuse is a guess.
+const PER_ARRIVAL: f32 = 0.25;
+/// Most effective samples that all of them count for.
+const MOST_PRIOR: f32 = 32.0;
+
 /// Smallest gain for which a leaf is guided: a guided sample evaluates the BSDF once more.
 const LEAST_GAIN: f64 = 0.02;
 
@@ -84,6 +90,20 @@ impl LeafSums {
         part.hits *= 0.125;
         part.scale_moments(0.125);
         part
+    }
+
+    /// Makes sums over arrivals of light paths what they would be over a few contributions of this mean square.
+    pub(super) fn become_prior(&mut self, mean_square: f32) {
+        let known = self.square * self.square / self.fourth;
+        let n = (known * PER_ARRIVAL).min(MOST_PRIOR);
+        if known > 0.0 && self.square < f32::MAX {
+            let by = mean_square * n / self.square;
+            self.moments.iter_mut().for_each(|m| *m *= by);
+            (self.square, self.fourth) = (mean_square * n, mean_square * mean_square * n);
+        } else {
+            *self = Self::EMPTY;
+        }
+        self.hits = 0.0;
     }
 
     fn scale_moments(&mut self, by: f32) {

@@ -1,4 +1,5 @@
-//! What one shard notes in one iteration: directions in which the bounce of a sample found light.
+//! What one shard notes in one iteration: directions in which the bounce of a sample found light, or from which the power
+//! of a light path arrived.
 //!
 //! A full log holds a uniform sample of all that was offered: number n replaces one that is chosen by a hash of n, with
 //! probability capacity / n (Vitter, "Random Sampling with a Reservoir", 1985, algorithm R), so that each counts as
@@ -21,15 +22,26 @@ const MAX_SQUARE: f32 = 1e15;
 /// Range of densities, 1/sr.
 const PDF_RANGE: [f32; 2] = [1e-15, 1e15];
 
-/// A direction that contributed, 12 bytes.
+/// Power that has arrived along a light path.
+pub(super) struct Arrival {
+    /// Where: [`Guide::place`](super::Guide::place).
+    pub(super) place: u32,
+    /// Power, mean of rgb.
+    pub(super) power: f32,
+    /// Density with which a BSDF would sample the direction, 1/sr.
+    pub(super) pdf: f32,
+}
+
+/// A direction that contributed, 12 bytes; or one from which power arrived, see [`Self::arrival`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct GuideHit {
-    /// Leaf, and below it in 8 bits the share, see [`Self::share`].
+    /// Leaf, and below it in 8 bits the share, see [`Self::share`]; of light paths the place.
     leaf: u32,
     /// Point of the square, [`super::sphere::quantised`].
     pub(super) point: u32,
-    /// Upper halves of two floats: square of the contribution, and below it the density of the direction.
+    /// Upper halves of two floats: square of the contribution, and below it the density of the direction; of light paths
+    /// the power, and a density below 0.
     value: u32,
 }
 
@@ -50,10 +62,16 @@ impl GuideHit {
         [f32::from_bits(self.value & 0xffff_0000), f32::from_bits(self.value << 16)]
     }
 
+    /// The arrival of a light path, if it is none of a camera path's directions.
+    pub(super) fn arrival(&self) -> Option<Arrival> {
+        let [power, pdf] = self.square_and_pdf();
+        (pdf < 0.0).then_some(Arrival { place: self.leaf, power, pdf: -pdf })
+    }
+
     /// Are these numbers that a log may hold?
     fn is_sound(&self) -> bool {
         let [square, pdf] = self.square_and_pdf();
-        (0.0..=MAX_SQUARE).contains(&square) && (0.0..=PDF_RANGE[1]).contains(&pdf)
+        (0.0..=MAX_SQUARE).contains(&square) && (0.0..=PDF_RANGE[1]).contains(&pdf.abs())
     }
 }
 
@@ -122,6 +140,22 @@ impl<'m> GuideLog<'m> {
         let value = square.min(MAX_SQUARE).to_bits() & 0xffff_0000
             | if pdf > 0.0 { pdf.clamp(least, most).to_bits() >> 16 } else { 0 };
         let hit = GuideHit { leaf: leaf << 8 | share.min(UNKNOWN_SHARE), point, value };
+        self.insert(hit)
+    }
+
+    /// Adds power that has arrived along a light path: where ([`super::Guide::place`]), the point of the direction that it
+    /// came from, the power, and the density with which the BSDF would have sampled the direction, 1/sr.
+    #[inline]
+    pub(crate) fn add_light(&mut self, place: u32, point: u32, power: f32, pdf: f32) {
+        if !(power.is_finite() && pdf.is_finite() && power > 0.0) {
+            return;
+        }
+        let [least, most] = PDF_RANGE;
+        let value = power.min(MAX_SQUARE).to_bits() & 0xffff_0000 | (-pdf.clamp(least, most)).to_bits() >> 16;
+        self.insert(GuideHit { leaf: place, point, value });
+    }
+
+    fn insert(&mut self, hit: GuideHit) -> bool {
         let (n, room) = (u64::from(self.offered), self.hits.len() as u64);
         self.offered = self.offered.saturating_add(1);
         let place = if n < room { n } else { mix(n) % (n + 1) };

@@ -16,6 +16,9 @@
 //! [`GuideLog`]. Logs are replayed in the order of the shards when the iteration ends ([`Guide::learn`]), so the trees
 //! do not depend on threads, and there is one of them, whatever the number of shards.
 //!
+//! A guide that has learned nothing learns from light paths first (`tracer/light_paths.rs`), which find what camera paths
+//! hardly ever find.
+//!
 //! | file | holds |
 //! |---|---|
 //! | `sphere` | map between directions and the unit square |
@@ -25,6 +28,7 @@
 //! | `size` | [`GuideSize`]: room for leaves, nodes and logs |
 //! | `shared` | [`Guide`]: what all shards sample |
 //! | `rebuild` | from logs to what is sampled |
+//! | `light` | from the logs of light paths, at first |
 //! | `save` | the guide as bytes |
 //! | `merge` | guides that were learned apart |
 //! | `watch` | is it worth its cost? |
@@ -33,6 +37,7 @@
 pub(crate) const COMPILED: bool = cfg!(feature = "guiding");
 
 mod fraction;
+mod light;
 mod log;
 mod merge;
 mod node;

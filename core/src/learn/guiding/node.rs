@@ -163,8 +163,12 @@ impl NodeSums {
         }
     }
 
-    /// Masses of the cells without a node, on level `level`: roots of integrals of squares, times areas.
-    pub(super) fn masses(&self, level: usize) -> [f32; CELLS] {
+    /// Masses of the cells without a node, on level `level`: roots of integrals of squares, times areas. Of sums of power
+    /// these themselves.
+    pub(super) fn masses(&self, level: usize, of_power: bool) -> [f32; CELLS] {
+        if of_power {
+            return self.moment;
+        }
         let root_of_area = 1.0 / (1u32 << (2 * (level + 1))) as f32;
         let root = |from: usize| {
             let moment = F32x8::from_fn(|i| self.moment[from + i]);

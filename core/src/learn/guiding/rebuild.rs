@@ -10,9 +10,13 @@
 //!
 //! Replay and freeze come three times, once for each level: what was made in one round learns from the same logs in the
 //! next.
+//!
+//! A guide that has learned nothing learns from light paths in the logs, if there are any (`light.rs`): replay, subdivide and
+//! grid once for each level of the octrees, then replay and freeze as above. The rest of those logs only tells units then.
 #![deny(clippy::unwrap_used, clippy::expect_used)]
 
 use super::fraction::LeafSums;
+use super::light::{CAMERA, COUNT, LIGHT, SUBDIVIDE_ARRIVALS, SUBDIVISIONS};
 use super::log::{GuideHit, GuideLog};
 use super::node::{CELLS, GuideNode, LEVELS, NodeSums, UNIFORM, cell_at};
 use super::shared::{FrozenLeaf, Guide, GuideScalars, ROOTS, Rebuild};
@@ -59,7 +63,8 @@ impl Guide<'_> {
     /// Begins to learn from an iteration.
     pub(crate) fn begin_learning(&mut self, keep: f32) {
         let keep = if keep >= 0.0 { keep.min(1.0) } else { 0.0 };
-        self.scalars.rebuild = Rebuild { pass: DISCOUNT_NODES, round: 0, index: 0, keep };
+        let (pass, source) = if self.is_new() { (REPLAY, COUNT) } else { (DISCOUNT_NODES, CAMERA) };
+        self.scalars.rebuild = Rebuild { pass, keep, source, ..Rebuild::default() };
     }
 
     /// Are logs to be replayed next?
@@ -67,9 +72,9 @@ impl Guide<'_> {
         self.scalars.rebuild.pass == REPLAY
     }
 
-    /// Are the logs replayed for the first time?
+    /// Are the logs replayed for the first time, to learn directions?
     pub(crate) fn is_first_replay(&self) -> bool {
-        self.scalars.rebuild.round == 0
+        self.scalars.rebuild.round == 0 && self.scalars.rebuild.source != COUNT
     }
 
     /// Replays a log from entry `at` on, `limit` at most; their number, and `true` after the last. The part `guided` of its
@@ -92,8 +97,15 @@ impl Guide<'_> {
 
     /// All logs were replayed.
     pub(crate) fn end_replay(&mut self) {
+        let counted = self.scalars.rebuild.source == COUNT;
+        let pass = match (counted, counted && self.end_count()) {
+            (false, _) => FREEZE,
+            (true, true) => SUBDIVIDE,
+            // too few arrivals: the camera paths of the same logs
+            (true, false) => REPLAY,
+        };
         let r = &mut self.scalars.rebuild;
-        (r.pass, r.index) = (FREEZE, 0);
+        (r.pass, r.index) = (pass, 0);
     }
 
     /// Goes on where no logs are wanted; work done, in units of about a ray, and `true` when there is no more.
@@ -109,6 +121,7 @@ impl Guide<'_> {
                 None => r = next(DISCOUNT_LEAVES),
             },
             DISCOUNT_LEAVES => match self.leaves.get_mut(index).filter(|_| index < self.tree.leaves() as usize) {
+                Some(leaf) if r.source != CAMERA => *leaf = LeafSums::EMPTY,
                 Some(leaf) => leaf.discount(r.keep),
                 None => r = next(REPLAY),
             },
@@ -117,6 +130,8 @@ impl Guide<'_> {
                     work = self.freeze_leaf(index, r.round + 1 < LEVELS as u32);
                 } else if r.round + 1 < LEVELS as u32 {
                     r = Rebuild { round: r.round + 1, ..next(REPLAY) };
+                } else if r.source == LIGHT {
+                    r = Rebuild::default();
                 } else {
                     r = next(SUBDIVIDE);
                 }
@@ -138,6 +153,10 @@ impl Guide<'_> {
                 work = 10;
                 match self.tree.refresh(index * GRID_AT_ONCE, GRID_AT_ONCE) {
                     Some(_) => {}
+                    None if r.source == COUNT => {
+                        r = Rebuild { level: r.level + 1, ..next(DISCOUNT_LEAVES) };
+                        r.source = if r.level < SUBDIVISIONS { COUNT } else { LIGHT };
+                    }
                     None => r = Rebuild::default(),
                 }
             }
@@ -154,31 +173,47 @@ impl Guide<'_> {
     /// Adds a contribution that counts `weight` times; after the first round, which has the part of samples that were
     /// guided, to nodes that are new only.
     fn add(&mut self, hit: &GuideHit, weight: f32, first: Option<f32>) {
+        if self.scalars.rebuild.source != CAMERA {
+            return self.add_while_light(hit, weight);
+        }
         let leaf = hit.leaf() as usize;
-        if leaf >= self.tree.leaves() as usize {
+        if leaf >= self.tree.leaves() as usize || hit.arrival().is_some() {
             return;
         }
         let [square, pdf] = hit.square_and_pdf();
         if let Some(guided) = first {
-            let FrozenLeaf { root, .. } = self.frozen[leaf];
             let share = f32::from(self.frozen[leaf].share()) / 65_536.0;
             self.leaves[leaf].add(square, hit.share(), share * guided, weight);
-            if root == UNIFORM && pdf > 0.0 {
-                let Some(root) = self.take_node() else { return };
-                self.frozen[leaf].root = root;
-            }
         }
-        let mut node = self.frozen[leaf].root;
-        if node == UNIFORM || pdf <= 0.0 {
+        if pdf <= 0.0 {
             return;
         }
+        let root = if first.is_some() { self.root_of(leaf) } else { self.frozen[leaf].root };
+        if root != UNIFORM {
+            self.add_to_cell(root, hit.point, square * pdf * weight, first.is_some());
+        }
+    }
+
+    /// The node of all directions of a leaf, a new one if it has none; [`UNIFORM`] if there is no room.
+    pub(super) fn root_of(&mut self, leaf: usize) -> u16 {
+        if self.frozen[leaf].root == UNIFORM
+            && let Some(root) = self.take_node()
+        {
+            self.frozen[leaf].root = root;
+        }
+        self.frozen[leaf].root
+    }
+
+    /// Adds to the cell around a point of the square, from a node on; if not `always`, to nodes that are new only.
+    pub(super) fn add_to_cell(&mut self, root: u16, point: u32, moment: f32, always: bool) {
+        let mut node = root;
         for level in 0..LEVELS {
-            let cell = cell_at(hit.point, level);
+            let cell = cell_at(point, level);
             let Some((n, sums)) = self.nodes.get(node as usize).zip(self.sums.get_mut(node as usize)) else { return };
             let child = n.child[cell];
             if child == UNIFORM {
-                if first.is_some() || sums.fresh != 0 {
-                    sums.add(cell, square * pdf * weight);
+                if always || sums.fresh != 0 {
+                    sums.add(cell, moment);
                 }
                 return;
             }
@@ -234,7 +269,7 @@ impl Guide<'_> {
         let Some((n, s)) = self.nodes.get(index as usize).zip(self.sums.get(index as usize)) else {
             return [0.0; CELLS];
         };
-        let mut masses = s.masses(level);
+        let mut masses = s.masses(level, self.scalars.rebuild.source == LIGHT);
         if level + 1 < LEVELS {
             for (mass, child) in masses.iter_mut().zip(n.child).filter(|(_, c)| *c != UNIFORM) {
                 *mass = self.masses(child, level + 1).iter().sum();
@@ -246,6 +281,10 @@ impl Guide<'_> {
     /// Computes what is sampled in a leaf; cells become nodes if `grow`. Work done.
     pub(super) fn freeze_leaf(&mut self, leaf: usize, grow: bool) -> u64 {
         let root = self.frozen[leaf].root;
+        let last_of_light = !grow && self.scalars.rebuild.source == LIGHT;
+        if last_of_light {
+            self.become_prior(leaf);
+        }
         if !grow {
             self.frozen[leaf].fraction = self.leaves[leaf].fraction();
         }
@@ -256,6 +295,10 @@ impl Guide<'_> {
         let total = self.masses(root, 0).iter().sum();
         let mut visited = 0;
         self.freeze_node(root, 0, total, grow, &mut visited);
+        if last_of_light {
+            self.become_moments(root);
+            visited *= 2;
+        }
         4 * visited
     }
 
@@ -371,7 +414,13 @@ impl Guide<'_> {
     /// room.
     fn subdivide(&mut self, index: u32) -> bool {
         let OctreeNode::Leaf { number, .. } = self.tree.node(index) else { return false };
-        let many = self.leaves.get(number as usize).is_some_and(|l| l.hits > SUBDIVIDE_HITS);
+        let counted = self.scalars.rebuild.source == COUNT;
+        let Some(leaf) = self.leaves.get_mut(number as usize) else { return false };
+        let many = leaf.hits > if counted { SUBDIVIDE_ARRIVALS } else { SUBDIVIDE_HITS };
+        if counted {
+            // its children are counted anew
+            leaf.hits = 0.0;
+        }
         many && self.divide(index)
     }
 

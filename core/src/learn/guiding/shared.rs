@@ -18,7 +18,10 @@ const FACES: u32 = 6;
 pub(super) const ROOTS: u32 = FACES + 1;
 
 /// Density of all directions alike, 1/sr.
-const UNIFORM_PDF: f32 = 1.0 / (4.0 * PI);
+pub(super) const UNIFORM_PDF: f32 = 1.0 / (4.0 * PI);
+
+/// Places along each axis that logs tell apart.
+const PLACES: f32 = 256.0;
 
 /// Most nodes: their numbers have 16 bits.
 const MOST_NODES: u32 = 1 << 16;
@@ -90,6 +93,25 @@ pub(crate) struct Rebuild {
     pub(super) index: u32,
     /// Part of the old sums that is kept.
     pub(super) keep: f32,
+    /// What is learned from: see `light.rs`.
+    pub(super) source: u32,
+    /// Subdivisions by light paths that have been made.
+    pub(super) level: u32,
+    pub(super) seen: SeenSums,
+}
+
+/// Sums over the logs of an iteration with light paths.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct SeenSums {
+    /// Arrivals of light paths.
+    pub(super) arrivals: f32,
+    /// Contributions of camera paths.
+    pub(super) contributions: f32,
+    /// Their squares.
+    pub(super) square: f32,
+    /// Their squares times densities.
+    pub(super) moment: f32,
 }
 
 /// All of a guide but its tables.
@@ -240,6 +262,24 @@ impl<'m> Guide<'m> {
             known: !U32x8::from_fn(|i| found[i].root.into()).eq(U32x8::splat(UNIFORM.into())),
             root: found.map(|f| f.root),
         }
+    }
+
+    /// Words of the places of eight vertices, as [`GuideLog`] keeps those of light paths: 8 bits for each coordinate in the
+    /// octrees' cube, and for the octree.
+    #[inline(always)]
+    pub(crate) fn place(&self, p: Vec3x8, n: Option<Vec3x8>) -> U32x8 {
+        let root = n.map_or(U32x8::splat(FACES), face);
+        let [x, y, z, edge] = self.tree.cube;
+        let q = [p.x - x, p.y - y, p.z - z].map(|d| (d * (PLACES / edge)).clamp(0.0, PLACES - 0.01).to_i32().to_u32());
+        root | q[0] << 8 | q[1] << 16 | q[2] << 24
+    }
+
+    /// The leaf of a place.
+    pub(super) fn leaf_of_place(&self, place: u32) -> u32 {
+        let [x, y, z, edge] = self.tree.cube;
+        let [i, j, k] = [8, 16, 24].map(|shift| ((place >> shift & 0xff) as f32 + 0.5) * (edge / PLACES));
+        let root = U32x8::splat((place & 0xff).min(ROOTS - 1));
+        self.tree.leaf(root, Vec3x8::splat(x + i, y + j, z + k), None).lane(0)
     }
 
     /// Unit vectors, world space, and their densities, 1/sr, from four random words each, of which the upper half of

@@ -3,6 +3,7 @@
 #![expect(clippy::disallowed_methods, reason = "oracles in f64 have the standard library")]
 
 extern crate std;
+mod light;
 mod media;
 
 use super::node::UNIFORM;

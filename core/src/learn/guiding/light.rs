@@ -1,0 +1,134 @@
+//! The first lesson: what light paths have found, before camera paths have found anything.
+//!
+//! An arrival of power says where light comes from, so the density of a cell is in proportion to the power in it, which is
+//! the same as the root of the moment that [`super::rebuild`] learns, but known sooner. Logs keep an arrival's place, not
+//! its leaf: octrees are subdivided first, a level at a time, then the arrivals are distributed. In the end
+//! the sums of power become moments, so that camera paths go on from there. Units do not agree: of power it is
+//! not known what it contributes. Together the moments of a leaf, and the squares that its share of guided samples is
+//! computed from, become what a few contributions of the picture's camera paths would have been, so that the leaf's own
+//! soon outweigh them.
+#![deny(clippy::unwrap_used, clippy::expect_used)]
+
+use super::fraction::LeafSums;
+use super::log::GuideHit;
+use super::node::{self, CELLS, LEVELS, UNIFORM};
+use super::shared::{Guide, SeenSums, UNIFORM_PDF};
+
+/// What is learned from: contributions of camera paths.
+pub(super) const CAMERA: u32 = 0;
+/// Arrivals of light paths, of which leaves are subdivided.
+pub(super) const COUNT: u32 = 1;
+/// Arrivals of light paths, of which directions are learned.
+pub(super) const LIGHT: u32 = 2;
+
+/// Times that leaves are subdivided by arrivals.
+pub(super) const SUBDIVISIONS: u32 = 4;
+/// Arrivals of a leaf that is subdivided.
+pub(super) const SUBDIVIDE_ARRIVALS: f32 = 256.0;
+/// With fewer arrivals nothing is learned from them.
+const FEWEST: f32 = 64.0;
+/// Contributions that the directions of a leaf count for.
+const CONTRIBUTIONS: f32 = 256.0;
+/// Mean of what camera paths contribute, if they have not contributed anything.
+const UNKNOWN: f32 = 1e-15;
+
+impl Guide<'_> {
+    /// Has it learned nothing?
+    pub(crate) fn is_new(&self) -> bool {
+        self.scalars.used == 1 && !self.has_learned_from(f32::MIN_POSITIVE)
+    }
+
+    /// The arrivals are counted: leaves are subdivided next, unless there are too few.
+    pub(super) fn end_count(&mut self) -> bool {
+        let enough = self.scalars.rebuild.seen.arrivals >= FEWEST;
+        if !enough {
+            self.scalars.rebuild.source = CAMERA;
+            self.leaves.iter_mut().take(self.tree.leaves() as usize).for_each(|l| *l = LeafSums::EMPTY);
+        }
+        enough
+    }
+
+    /// Adds an entry of a log while light paths are learned from.
+    pub(super) fn add_while_light(&mut self, hit: &GuideHit, weight: f32) {
+        let r = &mut self.scalars.rebuild;
+        let first = r.source == COUNT && r.level == 0;
+        let Some(arrival) = hit.arrival() else {
+            if first {
+                let [square, pdf] = hit.square_and_pdf();
+                r.seen.contributions += weight;
+                r.seen.square = (r.seen.square + square * weight).min(f32::MAX);
+                r.seen.moment = (r.seen.moment + square * pdf * weight).min(f32::MAX);
+            }
+            return;
+        };
+        if first {
+            r.seen.arrivals += weight;
+        }
+        let (source, round) = (r.source, r.round as usize);
+        let leaf = self.leaf_of_place(arrival.place) as usize;
+        let Some(sums) = self.leaves.get_mut(leaf) else { return };
+        if source == COUNT {
+            sums.hits += weight;
+            return;
+        }
+        let root = self.root_of(leaf);
+        if root == UNIFORM {
+            return;
+        }
+        if round + 1 == LEVELS {
+            let q = node::find(self.nodes, root, hit.point).density * UNIFORM_PDF;
+            // as if they had been sampled by the guide: in proportion to the power
+            self.leaves[leaf].add(arrival.power, Some(q / (q + arrival.pdf)), 1.0, weight);
+        }
+        self.add_to_cell(root, hit.point, arrival.power * weight, round == 0);
+    }
+
+    /// Makes the sums of power of a leaf what camera paths go on from.
+    pub(super) fn become_prior(&mut self, leaf: usize) {
+        let seen = self.scalars.rebuild.seen;
+        if let Some(sums) = self.leaves.get_mut(leaf) {
+            sums.become_prior(seen.mean(seen.square));
+        }
+    }
+
+    /// Makes the powers of a leaf's cells, from its node `root` on, moments.
+    pub(super) fn become_moments(&mut self, root: u16) {
+        let seen = self.scalars.rebuild.seen;
+        let power = self.moment(root, 0);
+        if !(power > 0.0 && power.is_finite()) {
+            return;
+        }
+        let per_power = 1.0 / power;
+        let sum = self.square_of(root, 0, per_power, None);
+        let _ = self.square_of(root, 0, per_power, Some(seen.mean(seen.moment) * CONTRIBUTIONS / sum));
+    }
+
+    /// Sum over the cells from a node on of the moments that give densities in proportion to their power: the square of its
+    /// share in that of the leaf, over the cell's area. With `by` they become that, times `by`.
+    fn square_of(&mut self, index: u16, level: usize, per_power: f32, by: Option<f32>) -> f32 {
+        let Some(n) = self.nodes.get(index as usize).copied() else { return 0.0 };
+        let per_area = (1u32 << (4 * (level + 1))) as f32;
+        let mut sum = 0.0;
+        for cell in 0..CELLS {
+            if level + 1 < LEVELS && n.child[cell] != UNIFORM {
+                sum += self.square_of(n.child[cell], level + 1, per_power, by);
+            } else if let Some(s) = self.sums.get_mut(index as usize) {
+                let share = s.moment[cell] * per_power;
+                let moment = share * share * per_area;
+                sum += moment;
+                if let Some(by) = by {
+                    s.moment[cell] = (moment * by).min(f32::MAX);
+                }
+            }
+        }
+        sum
+    }
+}
+
+impl SeenSums {
+    /// A sum over the number of contributions.
+    fn mean(&self, sum: f32) -> f32 {
+        let mean = sum / self.contributions;
+        if mean > 0.0 && mean.is_finite() { mean.max(UNKNOWN) } else { UNKNOWN }
+    }
+}

@@ -1,0 +1,73 @@
+//! Light paths, which a guide that has learned nothing learns from in its first iteration.
+
+use croupier::Settings;
+use croupier::unstable::learn::Guiding;
+use croupier_host::description::{Emitter, Model, SceneDescription};
+use croupier_tests::runner::{Image, Learned, Schedule, learning, settings};
+use croupier_tests::scenes::*;
+
+fn guided(scene: &[u8], guiding: Guiding) -> Settings {
+    let mut s = Settings { max_depth: 6, shards: 3, seed: 2, size: [64, 64], ..settings(scene, "ears") };
+    s.learning.cache_bytes = 1 << 20;
+    (s.learning.guiding, s.learning.guide_bytes) = (guiding, 1 << 20);
+    s
+}
+
+fn run(scene: &[u8], s: &Settings, iterations: &[u32], before: &mut dyn FnMut(usize, &mut dyn Learned)) -> Image {
+    learning(scene, s, iterations, Schedule::InOrder(1 << 20), before)
+}
+
+/// A box whose small emitter lies behind a slab of glass: where camera paths go on from the floor they hardly ever meet it,
+/// and light samples never see it.
+fn behind_glass() -> SceneDescription {
+    let mut s = box_with_emitter();
+    let glass = s.add_material("glass", Model::Dielectric { int_ior: 1.5, ext_ior: 1.0 });
+    add_box(&mut s, glass, [-0.99, 0.7, -0.99], [0.99, 0.8, 0.99], false);
+    let small = s.add_material("small", grey(0.0));
+    add_quad(&mut s, "small", small, facing_y(0.1, 0.9, -1.0));
+    s.emitters = vec![Emitter::Area { material: small, radiance: [50.0, 60.0, 70.0] }];
+    s
+}
+
+/// In the first iteration alone, of guides that have learned nothing, within the work that one camera sample for each pixel
+/// takes. Killed by: light paths in every iteration, with a guide that was loaded, without a guide, as many as camera
+/// samples.
+#[test]
+fn light_paths_are_traced_once() {
+    let scene = blob(&mirror_and_glass());
+    let traced = |s: &Settings, iterations: &[u32]| run(&scene, s, iterations, &mut |_, _| ()).counters.light_path_rays;
+    let s = guided(&scene, Guiding::On);
+    let once = traced(&s, &[1]);
+    assert!((1000..64 * 64 * 4).contains(&once), "{once} rays");
+    assert_eq!((traced(&s, &[1, 1, 2]), traced(&s, &[16])), (once, once));
+    assert_eq!(traced(&guided(&scene, Guiding::Off), &[1, 1]), 0);
+    let mut saved = None;
+    run(&scene, &s, &[1, 1], &mut |_, l| saved = l.saved_statistics());
+    let saved = saved.expect("statistics");
+    let again = run(&scene, &s, &[1, 1], &mut |i, l| {
+        if i == 0 {
+            l.load_statistics(&saved).expect("statistics of this scene");
+        }
+    });
+    assert_eq!(again.counters.light_path_rays, 0);
+}
+
+/// Light behind glass and mirrors is known after one camera sample for each pixel, and known to pay two samples later:
+/// camera paths take far more. Killed by: arrivals of another place, normal or direction than those of camera paths that
+/// find the light, shares of guided samples that stay 0, arrivals straight from the light alone.
+#[test]
+fn caustics_are_found_at_once() {
+    let scene = blob(&behind_glass());
+    let mut enabled = 0;
+    for seed in 0..6 {
+        let (mut found, mut once) = (None, false);
+        let s = Settings { seed, ..guided(&scene, Guiding::Auto) };
+        run(&scene, &s, &[1, 1, 1, 1], &mut |_, l| {
+            found = l.guide_use();
+            once |= found.is_some_and(|f| f.enabled);
+        });
+        println!("seed {seed}: enabled {once}, {found:?}");
+        enabled += u32::from(once);
+    }
+    assert!(enabled >= 4, "enabled with {enabled} of 6 seeds");
+}
