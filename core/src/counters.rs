@@ -106,7 +106,8 @@ pub struct Counters {
     pub passed: Utilisation,
     /// Largest number of vertices that waited at once.
     pub ring_peak: u64,
-    /// Closest-hit rays of light paths, which path guiding learns from at first. No part of [`Self::cost`]: camera samples do
+    /// Closest-hit rays of light paths, which path guiding learns from at first, and as many steps through media as cost
+    /// the same. No part of [`Self::cost`]: camera samples do
     /// not take them.
     pub light_path_rays: u64,
 }

@@ -399,7 +399,7 @@ pub fn sample_at<S: LightSelector>(
 }
 
 /// Rays that leave the lights of the scene, of eight random words each; the lights are those that `selector` chooses at the
-/// middle of the scene. Lights that move are where they are when the shutter opens.
+/// middle of the scene, so that those to which it gives no chance there emit nothing. Lights that move are where they are when the shutter opens.
 #[inline(always)]
 pub fn emission_of<S: LightSelector>(
     profile: Effects,

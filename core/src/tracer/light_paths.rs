@@ -5,11 +5,13 @@
 //!
 //! A packet of eight goes from the lights to the ends of its paths in one turn. Power that arrives straight from a light is
 //! not noted: light samples find it. Nor is what no camera path finds: the light of points, cones and the sun (`sun.rs`)
-//! behind mirrors and smooth glass. Roulette by what surfaces absorb keeps the power of a path the same to its end.
+//! behind mirrors and smooth glass. Roulette goes by what surfaces
+//! absorb.
 //!
 //! What is noted need not be exact, since it decides how directions are sampled, not what they count. So surfaces are where
 //! they are when the shutter opens, lights within media are taken to be in those of the camera, and flights through media
-//! that take too many steps end.
+//! that take too many steps end. Refraction has the weights of
+//! radiance: within glass fewer paths are left, by the squared index, and have more power when they leave it.
 
 use super::book::Bookkeeping;
 use super::class::{Kernel, PacketClass};
@@ -25,10 +27,11 @@ use super::path::Path8;
 use super::scatter::scatter;
 use super::shading::{Arrival8, may_pass, shade};
 use super::surfaces::{own_surfaces, places};
+use crate::cost::MEDIUM_STEPS_PER_RAY;
 use crate::counters::Counters;
 use crate::geometry::{self, Hit8, Ray8, SurfaceHit8};
 use crate::learn::guiding::{Guide, GuideLog, sphere};
-use crate::light::emission_of;
+use crate::light::{LightSelector, emission_of};
 use crate::media::{self, Segment8};
 use crate::rng::Key8;
 use crate::sampler::{Numbers8, Sampler};
@@ -40,7 +43,7 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 /// Pixels for each light path: with fewer paths what they have to find is missed, more cost more than they gain.
 const PIXELS: usize = 2;
 
-/// Arrivals of power after which no more light paths begin, of all shards.
+/// Arrivals of power after which no more light paths begin: each shard has an equal part of them.
 const ENOUGH: u32 = 4096;
 
 /// Most rays of a light path.
@@ -81,6 +84,10 @@ pub(super) fn trace_light_paths<W: World>(
     *left = left.saturating_sub(1);
     let number = U32x8::from_fn(|i| left.wrapping_mul(8).wrapping_add(i as u32));
     let (mut rays, delta) = emitted(world, Key8::camera(job.settings.seed ^ SEED, U32x8::splat(index), number));
+    if rays.active.none() {
+        // no light emits: packets without a ray would take no budget
+        *left = 0;
+    }
     let mut noted = Mask8::NONE;
     for _ in 0..MOST_RAYS {
         if rays.active.none() {
@@ -98,7 +105,9 @@ pub(super) fn trace_light_paths<W: World>(
 /// Rays that leave the lights, and the lanes whose light no camera path hits.
 fn emitted<W: World>(world: &W, key: Key8) -> (RayState8, Mask8) {
     let words = [LIGHT_BLOCK, DIRECTION_BLOCK].map(|block| key.words(block));
-    let e = emission_of(W::EFFECTS, world.scene(), world.lights(), words, Mask8::all_lanes());
+    // by power: a tree leaves out lights that the middle of the scene does not see
+    let lights = world.lights().without_tree();
+    let e = emission_of(W::EFFECTS, world.scene(), &lights, words, Mask8::all_lanes());
     let media = if W::EFFECTS.contains(Effects::MEDIA) {
         MediaSet8::splat(world.camera_media()).without(e.infinite)
     } else {
@@ -165,7 +174,7 @@ fn fly<W: World>(world: &W, counters: &mut Counters, rays: &mut RayState8, hit: 
     let segment = Segment8 { o: rays.ray.o, d: rays.ray.d, tmax: hit.hit.select(hit.t, rays.ray.tmax) };
     let numbers = Numbers8::hashed(rays.key);
     let f = media::fly(W::EFFECTS, world.scene(), medium, &segment, rays.beta, numbers, inside);
-    counters.medium_steps += u64::from(f.steps);
+    counters.light_path_rays += u64::from(f.steps).div_ceil(MEDIUM_STEPS_PER_RAY);
     rays.beta = Vec3x8::select(inside, rays.beta * f.weight, rays.beta);
     let on = (f.collided | f.passed) & rays.beta.any_positive() & rays.beta.is_finite();
     rays.active = rays.active.and_not(inside.and_not(on));

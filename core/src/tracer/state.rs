@@ -71,7 +71,8 @@ impl<'m> State<'m> {
         self.ring.resume(&r.ring)?;
         self.book.resume(&r.book)?;
         self.comb = CombNumbers::new(job.settings.seed, iteration.number, index).resume(r.drawn);
-        self.light_packets = u32::try_from(r.light_packets).ok()?;
+        let most = if job.guide.is_some() { packets_of(job.tiles.pixels_of(index)) } else { 0 };
+        self.light_packets = u32::try_from(r.light_packets).ok().filter(|left| *left <= most)?;
         Some(())
     }
 

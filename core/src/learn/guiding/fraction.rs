@@ -98,7 +98,7 @@ impl LeafSums {
         let n = (known * PER_ARRIVAL).min(MOST_PRIOR);
         if known > 0.0 && self.square < f32::MAX {
             let by = mean_square * n / self.square;
-            self.moments.iter_mut().for_each(|m| *m *= by);
+            self.moments.iter_mut().for_each(|m| *m = (*m * by).min(f32::MAX));
             (self.square, self.fourth) = (mean_square * n, mean_square * mean_square * n);
         } else {
             *self = Self::EMPTY;

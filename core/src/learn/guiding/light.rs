@@ -12,7 +12,7 @@
 use super::fraction::LeafSums;
 use super::log::GuideHit;
 use super::node::{self, CELLS, LEVELS, UNIFORM};
-use super::shared::{Guide, SeenSums, UNIFORM_PDF};
+use super::shared::{Guide, Rebuild, SeenSums, UNIFORM_PDF};
 
 /// What is learned from: contributions of camera paths.
 pub(super) const CAMERA: u32 = 0;
@@ -29,6 +29,8 @@ pub(super) const SUBDIVIDE_ARRIVALS: f32 = 256.0;
 const FEWEST: f32 = 64.0;
 /// Contributions that the directions of a leaf count for.
 const CONTRIBUTIONS: f32 = 256.0;
+/// Least share of a density in the sum of both, that of a log's camera paths.
+const LEAST_SHARE: f32 = 0.5 / 255.0;
 /// Mean of what camera paths contribute, if they have not contributed anything.
 const UNKNOWN: f32 = 1e-15;
 
@@ -78,7 +80,9 @@ impl Guide<'_> {
         if round + 1 == LEVELS {
             let q = node::find(self.nodes, root, hit.point).density * UNIFORM_PDF;
             // as if they had been sampled by the guide: in proportion to the power
-            self.leaves[leaf].add(arrival.power, Some(q / (q + arrival.pdf)), 1.0, weight);
+            // no nearer to the ends than camera paths' shares are kept
+            let share = (q / (q + arrival.pdf)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE);
+            self.leaves[leaf].add(arrival.power, Some(share), 1.0, weight);
         }
         self.add_to_cell(root, hit.point, arrival.power * weight, round == 0);
     }
@@ -98,22 +102,21 @@ impl Guide<'_> {
         if !(power > 0.0 && power.is_finite()) {
             return;
         }
-        let per_power = 1.0 / power;
-        let sum = self.square_of(root, 0, per_power, None);
-        let _ = self.square_of(root, 0, per_power, Some(seen.mean(seen.moment) * CONTRIBUTIONS / sum));
+        let sum = self.square_of(root, 0, power, None);
+        let _ = self.square_of(root, 0, power, Some(seen.mean(seen.moment) * CONTRIBUTIONS / sum));
     }
 
     /// Sum over the cells from a node on of the moments that give densities in proportion to their power: the square of its
-    /// share in that of the leaf, over the cell's area. With `by` they become that, times `by`.
-    fn square_of(&mut self, index: u16, level: usize, per_power: f32, by: Option<f32>) -> f32 {
+    /// share in the `power` of the leaf, over the cell's area. With `by` they become that, times `by`.
+    fn square_of(&mut self, index: u16, level: usize, power: f32, by: Option<f32>) -> f32 {
         let Some(n) = self.nodes.get(index as usize).copied() else { return 0.0 };
         let per_area = (1u32 << (4 * (level + 1))) as f32;
         let mut sum = 0.0;
         for cell in 0..CELLS {
             if level + 1 < LEVELS && n.child[cell] != UNIFORM {
-                sum += self.square_of(n.child[cell], level + 1, per_power, by);
+                sum += self.square_of(n.child[cell], level + 1, power, by);
             } else if let Some(s) = self.sums.get_mut(index as usize) {
-                let share = s.moment[cell] * per_power;
+                let share = s.moment[cell] / power;
                 let moment = share * share * per_area;
                 sum += moment;
                 if let Some(by) = by {
@@ -130,5 +133,12 @@ impl SeenSums {
     fn mean(&self, sum: f32) -> f32 {
         let mean = sum / self.contributions;
         if mean > 0.0 && mean.is_finite() { mean.max(UNKNOWN) } else { UNKNOWN }
+    }
+}
+
+impl Rebuild {
+    /// Is the source one that there is, and the level one that is reached?
+    pub(super) fn has_source(&self) -> bool {
+        self.source <= LIGHT && self.level <= SUBDIVISIONS
     }
 }

@@ -147,7 +147,7 @@ impl<'m> GuideLog<'m> {
     /// came from, the power, and the density with which the BSDF would have sampled the direction, 1/sr.
     #[inline]
     pub(crate) fn add_light(&mut self, place: u32, point: u32, power: f32, pdf: f32) {
-        if !(power.is_finite() && pdf.is_finite() && power > 0.0) {
+        if !(power.is_finite() && pdf.is_finite() && power >= f32::MIN_POSITIVE) {
             return;
         }
         let [least, most] = PDF_RANGE;

@@ -154,7 +154,7 @@ impl Guide<'_> {
                 match self.tree.refresh(index * GRID_AT_ONCE, GRID_AT_ONCE) {
                     Some(_) => {}
                     None if r.source == COUNT => {
-                        r = Rebuild { level: r.level + 1, ..next(DISCOUNT_LEAVES) };
+                        r = Rebuild { level: r.level.saturating_add(1), ..next(DISCOUNT_LEAVES) };
                         r.source = if r.level < SUBDIVISIONS { COUNT } else { LIGHT };
                     }
                     None => r = Rebuild::default(),

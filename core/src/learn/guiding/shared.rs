@@ -151,7 +151,7 @@ impl GuideScalars {
     pub(crate) fn fit(&self, size: GuideSize) -> bool {
         let nodes = self.used >= 1 && self.used <= size.nodes && self.free < self.used && self.free_nodes < self.used;
         let r = &self.rebuild;
-        let rebuild = r.round < LEVELS as u32 && (0.0..=1.0).contains(&r.keep);
+        let rebuild = r.round < LEVELS as u32 && (0.0..=1.0).contains(&r.keep) && r.has_source();
         nodes && rebuild && Tree::<ROOTS>::fits(&self.tree, size.subdivisions, leaves(size))
     }
 }

@@ -107,7 +107,7 @@ fn few_arrivals_change_nothing() {
 fn adversarial_arrivals_are_sampled_as_they_say() {
     let mut random = Random(14);
     for bytes in [1 << 14, 1 << 19] {
-        for case in 0..5 {
+        for case in 0..7 {
             with_guide(bytes, |guide, log| {
                 log.clear();
                 for _ in 0..2000 {
@@ -116,9 +116,11 @@ fn adversarial_arrivals_are_sampled_as_they_say() {
                         1 => f32::MIN_POSITIVE,
                         2 => [f32::NAN, f32::INFINITY, -1.0, 0.0, 1.0][random.next() as usize % 5],
                         3 => [1e-30, 1e15][random.next() as usize % 2],
+                        4 => 1e-40,
+                        5 => 1e-25,
                         _ => random.unit(),
                     };
-                    let pdf = [0.0, -1.0, f32::MAX, f32::NAN, 0.3][random.next() as usize % 5];
+                    let pdf = [0.0, 1e-12, f32::MAX, f32::NAN, 0.3][random.next() as usize % 5];
                     log.add_light(random.next(), random.next(), power, pdf);
                     log.add_light(place(guide), random.next(), power, pdf);
                     log.add(random.next(), random.next(), random.next(), power, pdf);
