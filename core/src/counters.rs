@@ -107,8 +107,7 @@ pub struct Counters {
     /// Largest number of vertices that waited at once.
     pub ring_peak: u64,
     /// Closest-hit rays of light paths, which path guiding learns from at first, and as many steps through media as cost
-    /// the same. No part of [`Self::cost`]: camera samples do
-    /// not take them.
+    /// the same. No part of [`Self::cost`]: camera samples do not take them.
     pub light_path_rays: u64,
 }
 

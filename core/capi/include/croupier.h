@@ -905,7 +905,8 @@ typedef struct croupier_counters {
   struct croupier_utilisation passed;
   // Largest number of vertices that waited at once.
   uint64_t ring_peak;
-  // Closest-hit rays of light paths, which path guiding learns from at first.
+  // Closest-hit rays of light paths, which path guiding learns from at first, and as many steps through media as cost
+  // the same.
   uint64_t light_path_rays;
 } croupier_counters;
 

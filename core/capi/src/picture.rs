@@ -232,7 +232,8 @@ pub struct croupier_counters {
     pub passed: croupier_utilisation,
     /// Largest number of vertices that waited at once.
     pub ring_peak: u64,
-    /// Closest-hit rays of light paths, which path guiding learns from at first.
+    /// Closest-hit rays of light paths, which path guiding learns from at first, and as many steps through media as cost
+    /// the same.
     pub light_path_rays: u64,
 }
 

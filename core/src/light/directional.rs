@@ -5,7 +5,6 @@
 //! | `vector` | unit direction towards the light, world space | |
 //! | `emission` | irradiance on a facing surface | >= 0 |
 
-use super::emit::{Emission8, Numbers8, SceneSphere};
 use super::{Chosen, LightModel, LightSample8, SceneExtent, luminance};
 use crate::scene::Scene;
 use crate::scene::blob::Light;
@@ -34,11 +33,5 @@ impl LightModel for Directional {
     /// Power through a disk of the scene's radius.
     fn power(light: &Light, scene: &SceneExtent) -> f64 {
         PI * scene.radius * scene.radius * luminance(light.emission)
-    }
-
-    #[inline(always)]
-    fn emit(scene: &Scene<'_>, light: &Chosen, sphere: &SceneSphere, n: &Numbers8, mask: Mask8) -> Emission8 {
-        let s = Self::sample(scene, light, sphere.centre(), n.words, mask);
-        Emission8::from_infinity(s.wi, s.radiance / s.pdf, s.valid, sphere, n)
     }
 }

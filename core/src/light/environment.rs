@@ -19,7 +19,6 @@
 //! **Small differences.** 1 - cos theta near a pole is a difference of nearly equal numbers. Rows are counted from the
 //! nearer pole, and cos a - cos b is taken as 2 sin((a + b) / 2) sin((b - a) / 2) (compare NUMERICS SMP-8).
 
-use super::emit::{Emission8, Numbers8, SceneSphere};
 use super::power::{pick, probability};
 use super::{Chosen, LightModel, LightSample8, LightSelector, SceneExtent, usable};
 use crate::scene::Scene;
@@ -249,12 +248,6 @@ impl LightModel for Surroundings {
     /// Power through a disk of the scene's radius.
     fn power(_: &Light, scene: &SceneExtent) -> f64 {
         PI * scene.radius * scene.radius * scene.environment
-    }
-
-    #[inline(always)]
-    fn emit(scene: &Scene<'_>, light: &Chosen, sphere: &SceneSphere, n: &Numbers8, mask: Mask8) -> Emission8 {
-        let s = Self::sample(scene, light, sphere.centre(), n.words, mask);
-        Emission8::from_infinity(s.wi, s.radiance / s.pdf, s.valid, sphere, n)
     }
 }
 

@@ -246,7 +246,12 @@ trait LightModel {
     fn power(light: &Light, scene: &SceneExtent) -> f64;
 
     /// Rays that leave the light in the lanes of `mask`, without the selection probability; other lanes may hold anything.
-    fn emit(scene: &Scene<'_>, light: &Chosen, sphere: &SceneSphere, n: &Numbers8, mask: Mask8) -> Emission8;
+    /// Provided: those of lights at infinity.
+    #[inline(always)]
+    fn emit(scene: &Scene<'_>, light: &Chosen, sphere: &SceneSphere, n: &Numbers8, mask: Mask8) -> Emission8 {
+        let s = Self::sample(scene, light, sphere.centre(), n.words, mask);
+        Emission8::from_infinity(s.wi, s.radiance / s.pdf, s.valid, sphere, n)
+    }
 }
 
 macro_rules! models {

@@ -10,7 +10,6 @@
 //! that leave the scene towards it see what is behind. So smooth surfaces have no image of it, and nothing focuses it
 //! into single bright samples.
 
-use super::emit::{Emission8, Numbers8, SceneSphere};
 use super::{Chosen, LightModel, LightSample8, SceneExtent, luminance};
 use crate::camera::concentric_disk;
 use crate::scene::Scene;
@@ -47,11 +46,5 @@ impl LightModel for Sun {
     /// Power through a disk of the scene's radius.
     fn power(light: &Light, scene: &SceneExtent) -> f64 {
         PI * scene.radius * scene.radius * luminance(light.emission)
-    }
-
-    #[inline(always)]
-    fn emit(scene: &Scene<'_>, light: &Chosen, sphere: &SceneSphere, n: &Numbers8, mask: Mask8) -> Emission8 {
-        let s = Self::sample(scene, light, sphere.centre(), n.words, mask);
-        Emission8::from_infinity(s.wi, s.radiance / s.pdf, s.valid, sphere, n)
     }
 }

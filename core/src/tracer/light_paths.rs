@@ -5,13 +5,12 @@
 //!
 //! A packet of eight goes from the lights to the ends of its paths in one turn. Power that arrives straight from a light is
 //! not noted: light samples find it. Nor is what no camera path finds: the light of points, cones and the sun (`sun.rs`)
-//! behind mirrors and smooth glass. Roulette goes by what surfaces
-//! absorb.
+//! behind mirrors and smooth glass. Roulette goes by what surfaces absorb.
 //!
 //! What is noted need not be exact, since it decides how directions are sampled, not what they count. So surfaces are where
 //! they are when the shutter opens, lights within media are taken to be in those of the camera, and flights through media
-//! that take too many steps end. Refraction has the weights of
-//! radiance: within glass fewer paths are left, by the squared index, and have more power when they leave it.
+//! that take too many steps end. Refraction has the weights of radiance: within glass fewer paths are left, by the squared
+//! index, and have more power when they leave it.
 
 use super::book::Bookkeeping;
 use super::class::{Kernel, PacketClass};
@@ -109,7 +108,7 @@ fn emitted<W: World>(world: &W, key: Key8) -> (RayState8, Mask8) {
     let lights = world.lights().without_tree();
     let e = emission_of(W::EFFECTS, world.scene(), &lights, words, Mask8::all_lanes());
     let media = if W::EFFECTS.contains(Effects::MEDIA) {
-        MediaSet8::splat(world.camera_media()).without(e.infinite)
+        MediaSet8::splat(world.camera_media()).select(e.infinite, MediaSet8::NONE)
     } else {
         MediaSet8::NONE
     };

@@ -34,12 +34,6 @@ impl MediaSet8 {
         Self(U32x8::splat(set))
     }
 
-    /// Outside of all media in the lanes of `mask`.
-    #[inline(always)]
-    pub(crate) fn without(self, mask: Mask8) -> Self {
-        Self::NONE.select(!mask, self)
-    }
-
     /// The sets of `o` in the lanes of `mask`.
     #[inline(always)]
     pub(crate) fn select(self, mask: Mask8, o: Self) -> Self {

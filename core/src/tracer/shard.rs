@@ -18,8 +18,8 @@ use core::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
     /// Rays of all kinds, and as many steps through media as cost the same ([`Counters::work`]); exceeded by less than one
-    /// packet (16 rays, unless they pass surfaces or media; of light paths, with path guiding, up to 256). Camera samples for which an
-    /// [`Extension`](crate::unstable::extension::Extension) has no ray count as if they had one.
+    /// packet (16 rays, unless they pass surfaces or media; of light paths, with path guiding, up to 256). Camera samples
+    /// for which an [`Extension`](crate::unstable::extension::Extension) has no ray count as if they had one.
     pub rays: u64,
 }
 

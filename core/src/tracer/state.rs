@@ -95,3 +95,26 @@ impl<'m> State<'m> {
         self.light_packets = if trained { packets_of(job.tiles.pixels_of(index)) } else { 0 };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::world;
+
+    /// A record of a shard without a guide has no light paths left. Killed by: a number that is believed, which no step
+    /// would ever work off.
+    #[test]
+    fn forged_light_paths_are_refused() {
+        world(
+            |_| (),
+            |world, shard| {
+                let (job, record) = (shard.job, shard.state.suspend());
+                let mut resumes = |light_packets| {
+                    let forged = StateRecord { light_packets, ..record };
+                    shard.state.resume(&job, 0, world.iteration(), &forged).is_some()
+                };
+                assert!(resumes(0) && !resumes(1) && !resumes(1 << 32));
+            },
+        );
+    }
+}

@@ -2,11 +2,10 @@
 //!
 //! An arrival of power says where light comes from, so the density of a cell is in proportion to the power in it, which is
 //! the same as the root of the moment that [`super::rebuild`] learns, but known sooner. Logs keep an arrival's place, not
-//! its leaf: octrees are subdivided first, a level at a time, then the arrivals are distributed. In the end
-//! the sums of power become moments, so that camera paths go on from there. Units do not agree: of power it is
-//! not known what it contributes. Together the moments of a leaf, and the squares that its share of guided samples is
-//! computed from, become what a few contributions of the picture's camera paths would have been, so that the leaf's own
-//! soon outweigh them.
+//! its leaf: octrees are subdivided first, a level at a time, then the arrivals are distributed. In the end the sums of power
+//! become moments, so that camera paths go on from there. Units do not agree: of power it is not known what it contributes.
+//! Together the moments of a leaf, and the squares that its share of guided samples is computed from, become what a few
+//! contributions of the picture's camera paths would have been, so that the leaf's own soon outweigh them.
 #![deny(clippy::unwrap_used, clippy::expect_used)]
 
 use super::fraction::LeafSums;
@@ -79,9 +78,9 @@ impl Guide<'_> {
         }
         if round + 1 == LEVELS {
             let q = node::find(self.nodes, root, hit.point).density * UNIFORM_PDF;
-            // as if they had been sampled by the guide: in proportion to the power
-            // no nearer to the ends than camera paths' shares are kept
+            // no nearer to the ends than logs keep the shares of camera paths
             let share = (q / (q + arrival.pdf)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE);
+            // as if the guide had sampled them: in proportion to the power
             self.leaves[leaf].add(arrival.power, Some(share), 1.0, weight);
         }
         self.add_to_cell(root, hit.point, arrival.power * weight, round == 0);

@@ -97,12 +97,13 @@ impl Guide<'_> {
 
     /// All logs were replayed.
     pub(crate) fn end_replay(&mut self) {
-        let counted = self.scalars.rebuild.source == COUNT;
-        let pass = match (counted, counted && self.end_count()) {
-            (false, _) => FREEZE,
-            (true, true) => SUBDIVIDE,
+        let pass = if self.scalars.rebuild.source != COUNT {
+            FREEZE
+        } else if self.end_count() {
+            SUBDIVIDE
+        } else {
             // too few arrivals: the camera paths of the same logs
-            (true, false) => REPLAY,
+            REPLAY
         };
         let r = &mut self.scalars.rebuild;
         (r.pass, r.index) = (pass, 0);

@@ -101,6 +101,22 @@ fn few_arrivals_change_nothing() {
     assert_ne!(learned(0), learned(64));
 }
 
+/// Scalars as memory may hold them: only those that learning can go on with are taken. Killed by: a source that there is
+/// not, a level beyond the last.
+#[test]
+fn forged_sources_are_refused() {
+    use crate::learn::guiding::light::{LIGHT, SUBDIVISIONS};
+    with_guide(1 << 16, |guide, _| {
+        let fits = |source, level| {
+            let mut scalars = guide.scalars();
+            (scalars.rebuild.source, scalars.rebuild.level) = (source, level);
+            scalars.fit(guide.size)
+        };
+        assert!(fits(0, 0) && fits(LIGHT, SUBDIVISIONS));
+        assert!(!fits(LIGHT + 1, 0) && !fits(LIGHT, SUBDIVISIONS + 1) && !fits(1, u32::MAX));
+    });
+}
+
 /// Killed by: an overflow of squares, a place outside of the octrees, a sum of nothing that is divided by, arrivals that
 /// find no room.
 #[test]
