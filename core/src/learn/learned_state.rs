@@ -174,10 +174,16 @@ impl<'m> LearnedState<'m> {
         !self.watches() || self.watch.enabled()
     }
 
-    /// Does the guide learn from the samples of all pixels with a record, guided or not?
+    /// Does the guide learn from samples of pixels that are not guided?
     #[inline(always)]
-    pub(crate) fn learns_from_all(&self) -> bool {
-        self.watches() && self.trial.all_teach && self.watch.is_open()
+    fn learns_from_others(&self) -> bool {
+        self.watches() && self.trial.all_teach && self.watch.teaching() > 0.0
+    }
+
+    /// Does the guide learn from all samples with a record of a packet, the first of which has this key, guided or not?
+    #[inline(always)]
+    pub(crate) fn teaches(&self, key: [u32; 2]) -> bool {
+        self.learns_from_others() && self.watch.teaches(key)
     }
 
     /// Are samples of the pixel in column and row `at` guided in iteration `iteration`?
@@ -189,10 +195,10 @@ impl<'m> LearnedState<'m> {
     /// Part of the samples that the guide learns from that are guided, in an iteration of so many samples per pixel.
     #[inline(always)]
     pub(crate) fn guided_part(&self, samples: u32) -> f32 {
-        if !self.learns_from_all() {
+        if !self.learns_from_others() {
             return 1.0;
         }
-        self.trial.guided_part([true, false].map(|guided| self.learned_samples(guided).min(samples)))
+        self.watch.guided_part(self.trial, [true, false].map(|guided| self.learned_samples(guided).min(samples)))
     }
 
     /// How many samples of a pixel are learned from in an iteration.

@@ -27,8 +27,8 @@ pub(crate) struct Samples8 {
     pub key: Key8,
     /// Times of the paths.
     pub time: F32x8,
-    /// Lanes that are guided, where the guide asks for it. If they have a record, they are learned from; others are in small
-    /// pictures while nothing is decided.
+    /// Lanes that are guided, where the guide asks for it. If they have a record, they are learned from; others may be in
+    /// small pictures while nothing is decided.
     pub guided: Mask8,
 }
 

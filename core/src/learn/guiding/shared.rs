@@ -167,6 +167,12 @@ fn face(n: Vec3x8) -> U32x8 {
     U32x8::select(along.lt(F32x8::ZERO), axis + U32x8::splat(1), axis)
 }
 
+/// The octrees of vertices with shading normals `n`, or without, in media.
+#[inline(always)]
+fn octree(n: Option<Vec3x8>) -> U32x8 {
+    n.map_or(U32x8::splat(FACES), face)
+}
+
 /// Most leaves of a guide.
 fn leaves(size: GuideSize) -> u32 {
     ROOTS + 7 * size.subdivisions
@@ -251,7 +257,7 @@ impl<'m> Guide<'m> {
     /// `jitter - 0.5` of the edge of their leaf, `jitter` in [0, 1), so that borders of leaves are not visible.
     #[inline(always)]
     pub fn at(&self, p: Vec3x8, n: Option<Vec3x8>, jitter: [F32x8; 3], active: Mask8) -> Guide8 {
-        let root = n.map_or(U32x8::splat(FACES), face);
+        let root = octree(n);
         let leaf = U32x8::select(active, self.tree.leaf(root, p, Some(jitter)), U32x8::splat(NO_LEAF));
         let (of, used) = (leaf.to_array(), self.frozen.get(..self.tree.leaves() as usize).unwrap_or(&[]));
         let none = FrozenLeaf { root: UNIFORM, fraction: 0 };
@@ -268,7 +274,7 @@ impl<'m> Guide<'m> {
     /// octrees' cube, and for the octree.
     #[inline(always)]
     pub(crate) fn place(&self, p: Vec3x8, n: Option<Vec3x8>) -> U32x8 {
-        let root = n.map_or(U32x8::splat(FACES), face);
+        let root = octree(n);
         let [x, y, z, edge] = self.tree.cube;
         let q = [p.x - x, p.y - y, p.z - z].map(|d| (d * (PLACES / edge)).clamp(0.0, PLACES - 0.01).to_i32().to_u32());
         root | q[0] << 8 | q[1] << 16 | q[2] << 24

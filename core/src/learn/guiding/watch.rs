@@ -13,9 +13,8 @@
 //! the gain: they would not find what a guide would.
 //!
 //! The guide is disabled while no gain is proven: then the pixels of some blocks are guided, others in each iteration. In
-//! small pictures all pixels teach it meanwhile, so that it finds the sooner what it can gain; in others, and once a gain is
-//! out of the question, those of the blocks alone do, and packets without any of their samples cost what they cost without
-//! guiding. It is enabled while the gain lasts.
+//! small pictures all pixels teach it at first, so that it finds the sooner what it can gain, and once a few iterations have
+//! shown none, those of some packets; in others, and once a gain is out of the question, those of the blocks alone do. Packets that do not teach cost what they cost without guiding. It is enabled while the gain lasts.
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing)]
 
 use crate::film::SqrtNewton;
@@ -32,9 +31,9 @@ const ENABLED_ABOVE: f64 = 1.08;
 const DOUBT: f64 = 0.25;
 /// Gain below which it is disabled again.
 const DISABLED_BELOW: f64 = 1.04;
-/// Pixels that are guided while nothing is decided, and after a gain is out of the question, within the bounds [`MOST`]
-/// and [`LEAST`]. A guided pixel costs some of what Sobol' points gain, because its samples have a sequence of their own
-/// in each iteration; what they tell of the gain depends on their number, not on the size of the picture.
+/// Pixels that are guided at first, and after a gain is out of the question (in small pictures in doubt), within the bounds
+/// [`MOST`] and [`LEAST`]. A guided pixel costs some of what Sobol' points gain, because its samples have a sequence of
+/// their own in each iteration; what they tell of the gain depends on their number, not on the size of the picture.
 const WANTED: [u64; 2] = [4096, 1024];
 /// Most pixels of a small picture: all of them teach the guide while nothing is decided, and half as many are guided. In
 /// larger ones they would crowd out of the logs what guided pixels find, of which each contribution tells more: with a
@@ -146,9 +145,18 @@ pub(crate) struct Watch {
     promise: Promise,
     /// Not 0: all pixels are guided.
     enabled: u32,
-    /// Not 0: a gain is out of the question.
-    unpromising: u32,
+    /// Iterations one after the other that have shown no gain; [`UNPROMISING`] if one is out of the question.
+    doubts: u32,
 }
+
+/// A gain is out of the question.
+const UNPROMISING: u32 = u32::MAX;
+/// Iterations without a gain after which one is in doubt.
+const PATIENCE: u32 = 3;
+
+/// Part of the packets that teach the guide in a small picture while a gain is in doubt. With all of them renders that are
+/// never guided take 4 % more time (five scenes), and make no better guides.
+const TEACHING: f32 = 0.25;
 
 /// Shares of the blocks of pixels that are guided while the guide is disabled, in 65536ths: see [`WANTED`].
 #[derive(Clone, Copy, Debug)]
@@ -168,15 +176,6 @@ impl TrialShares {
         let shares = [share(undecided, MOST[0]), share(unpromising, MOST[1])].map(|x| x.max(LEAST));
         Self { shares, all_teach }
     }
-
-    /// Part of the samples learned from that are guided while nothing is decided, if so many of a guided pixel, and of
-    /// another, are learned from.
-    #[inline]
-    pub(crate) fn guided_part(self, [guided, other]: [u32; 2]) -> f32 {
-        let pixels = self.shares[0] as f32 / 65_536.0;
-        let (guided, other) = (pixels * guided as f32, (1.0 - pixels) * other as f32);
-        guided / (guided + other).max(f32::MIN_POSITIVE)
-    }
 }
 
 impl Watch {
@@ -186,10 +185,41 @@ impl Watch {
         self.enabled != 0
     }
 
-    /// Is it open whether the guide pays?
+    /// Part of the packets that teach the guide in a small picture, whether or not their pixels are guided; 0 unless it is
+    /// open whether the guide pays.
     #[inline(always)]
-    pub(crate) fn is_open(&self) -> bool {
-        self.enabled == 0 && self.unpromising == 0
+    pub(crate) fn teaching(&self) -> f32 {
+        match self.doubts {
+            _ if self.enabled() => 0.0,
+            UNPROMISING => 0.0,
+            PATIENCE.. => TEACHING,
+            _ => 1.0,
+        }
+    }
+
+    /// Is the packet with this key among those that teach the guide?
+    #[inline(always)]
+    pub(crate) fn teaches(&self, [lo, hi]: [u32; 2]) -> bool {
+        let random = mix(u64::from(hi) << 32 | u64::from(lo)) >> 40;
+        (random as f32) < self.teaching() * 16_777_216.0
+    }
+
+    /// Part of the samples learned from that are guided in a small picture while it is open whether the guide pays, if so
+    /// many of a guided pixel, and of another, are learned from.
+    #[inline]
+    pub(crate) fn guided_part(&self, shares: TrialShares, [guided, other]: [u32; 2]) -> f32 {
+        let pixels = self.share(shares) as f32 / 65_536.0;
+        let (guided, other) = (pixels * guided as f32, (1.0 - pixels) * self.teaching() * other as f32);
+        guided / (guided + other).max(f32::MIN_POSITIVE)
+    }
+
+    /// Share of the blocks that are guided while the guide is disabled, in 65536ths.
+    #[inline(always)]
+    fn share(&self, shares: TrialShares) -> u32 {
+        let [undecided, unpromising] = shares.shares;
+        // in larger pictures nothing but these pixels teaches the guide
+        let patience = if shares.all_teach { PATIENCE } else { UNPROMISING };
+        if self.doubts < patience { undecided } else { unpromising }
     }
 
     /// Is the pixel in this column and row guided in iteration `iteration`? Blocks, because samples of a
@@ -197,9 +227,7 @@ impl Watch {
     #[inline]
     pub(crate) fn is_guided(&self, iteration: u64, [x, y]: [u32; 2], shares: TrialShares) -> bool {
         let block = u64::from(y >> BLOCK_BITS) << 32 | u64::from(x >> BLOCK_BITS);
-        let [undecided, unpromising] = shares.shares;
-        let share = if self.unpromising != 0 { unpromising } else { undecided };
-        self.enabled() || (mix(mix(block) ^ mix(iteration)) >> 48) < u64::from(share)
+        self.enabled() || (mix(mix(block) ^ mix(iteration)) >> 48) < u64::from(self.share(shares))
     }
 
     /// Adds what a shard has found.
@@ -217,7 +245,12 @@ impl Watch {
         if let Some(GuideGain { gain, error }) = self.gain() {
             let least = if self.enabled() { DISABLED_BELOW } else { ENABLED_ABOVE };
             self.enabled = (gain * (1.0 - DOUBT * error) > least).into();
-            self.unpromising = (enough && gain * (1.0 + 2.0 * error) < DISABLED_BELOW).into();
+            self.doubts = match self.doubts {
+                _ if self.enabled() => 0,
+                _ if enough && gain * (1.0 + 2.0 * error) < DISABLED_BELOW => UNPROMISING,
+                // one that was out of the question before is in doubt
+                n => n.saturating_add(1).min(PATIENCE),
+            };
         }
         self.promise = self.promise.times(decay);
     }
@@ -248,7 +281,7 @@ mod tests {
         for (enough, open) in [(false, true), (true, false), (true, false), (false, true)] {
             watch.add(&promise(100_000, 2.0));
             watch.decide(0.75, enough);
-            assert_eq!((watch.enabled(), watch.is_open()), (false, open));
+            assert_eq!((watch.enabled(), watch.teaching() > 0.0), (false, open));
         }
     }
 
@@ -302,6 +335,40 @@ mod tests {
         }
     }
 
+    /// All packets of a small picture teach the guide at first, some while a gain is in doubt, none once it is found or out
+    /// of the question. Killed by: packets that are left out at first, or are not later, shares of guided samples that do
+    /// not know of them.
+    #[test]
+    fn fewer_packets_teach_a_guide_that_gains_nothing() {
+        let decided = |iterations, with, enough| {
+            let mut watch = Watch::default();
+            for _ in 0..iterations {
+                watch.add(&promise(100_000, with));
+                watch.decide(0.75, enough);
+            }
+            watch
+        };
+        for (watch, part) in [
+            (decided(2, 0.95, true), 1.0),
+            (decided(3, 0.95, true), 0.25),
+            (decided(1000, 0.95, false), 0.25),
+            (decided(3, 2.0, false), 0.25),
+            (decided(1, 2.0, true), 0.0),
+            (decided(1, 0.5, true), 0.0),
+        ] {
+            let teach = (0..1u32 << 16).filter(|&k| watch.teaches([k.wrapping_mul(0x9e37_79b9), k])).count();
+            let (share, variance) = (teach as f64 / 65_536.0, part * (1.0 - part) / 65_536.0);
+            assert!((share - part).powi(2) <= 16.0 * variance, "{share}, not {part}: {watch:?}");
+        }
+        let mut again = decided(3, 2.0, true);
+        again.add(&promise(100_000, 2.0));
+        again.decide(0.75, false);
+        assert_eq!(again.teaching(), 0.25, "a gain that was out of the question is in doubt");
+        // one pixel in 64 is guided, of which four times as many samples are learned from, as of one in four packets
+        let part = decided(3, 0.95, true).guided_part(TrialShares::of([256, 256]), [32, 8]);
+        assert!((part - 4.0 / (4.0 + 63.0 * 0.25)).abs() < 1e-6, "{part}");
+    }
+
     /// Killed by: a bound that does not hold, pixels of the two exchanged, a product that overflows.
     #[test]
     fn as_many_pixels_are_tried_in_pictures_of_most_sizes() {
@@ -312,7 +379,7 @@ mod tests {
         assert_eq!(pixels([64, 64]), [2048, 128], "no more than a half, a thirty-second");
         assert_eq!(pixels([2048, 1024]), [8192, 8192], "no less than one in 256");
         // one pixel in 32, of which four times as many samples are learned from
-        let part = |learned| TrialShares::of([256, 256]).guided_part(learned);
+        let part = |learned| Watch::default().guided_part(TrialShares::of([256, 256]), learned);
         assert_eq!([part([32, 8]), part([1, 1]), part([0, 0])], [1.0 / 8.75, 1.0 / 32.0, 0.0]);
         for size in [[0, 0], [1, 1], [u32::MAX; 2]] {
             assert!(TrialShares::of(size).shares.iter().all(|x| (256..=32_768).contains(x)), "{size:?}");
