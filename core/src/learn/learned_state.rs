@@ -348,7 +348,7 @@ impl<'m> LearnedState<'m> {
     }
 
     /// Adds the statistics of eight bins, their values times `unscale`.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn local8(&self, learned: &mut Learned8, bin: U32x8, unscale: Vec3x8, active: Mask8) {
         let Some(cache) = &self.cache else { return };
         let l = cache.local(bin, active);

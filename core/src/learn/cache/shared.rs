@@ -204,7 +204,7 @@ impl<'m> Cache<'m> {
     /// Statistics of eight bins; all 0 in inactive lanes, for bins that are not in use and in leaves without samples.
     /// Values are those that were logged. Means and variances are up to 2^-7 (0.8 %) too small, moments too large.
     /// `count` has the samples of the bin itself, without those of its surroundings that the others are shrunk towards.
-    #[inline(always)]
+    #[inline]
     pub fn local(&self, bin: U32x8, active: Mask8) -> Local8 {
         // beyond the bins that were computed lies whatever the caller's memory held
         let used = self.frozen.get(..self.scalars.readable as usize).unwrap_or(&[]);
