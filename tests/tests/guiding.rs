@@ -184,9 +184,9 @@ fn watched_guides_do_not_bias() {
     }
 }
 
-/// Until it is decided whether guiding pays, the guide of a small picture learns from all pixels, not only from those that
-/// it guides: logs of few entries count what they are offered. Killed by: pixels outside of the trial that are not learned
-/// from.
+/// At first, until three iterations have shown no gain, the guide of a small picture learns from all pixels, not only from
+/// those that it guides: logs of few entries count what they are offered. Killed by: pixels outside of the trial that are
+/// not learned from.
 #[test]
 fn all_pixels_are_learned_from_at_first() {
     let scene = blob(&cornell([32, 32]));

@@ -177,7 +177,7 @@ impl<'m> LearnedState<'m> {
     /// Does the guide learn from samples of pixels that are not guided?
     #[inline(always)]
     fn learns_from_others(&self) -> bool {
-        self.watches() && self.trial.all_teach && self.watch.teaching() > 0.0
+        self.watches() && self.trial.small && self.watch.teaching() > 0.0
     }
 
     /// Does the guide learn from all samples with a record of a packet, the first of which has this key, guided or not?

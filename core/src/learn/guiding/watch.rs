@@ -13,8 +13,10 @@
 //! the gain: they would not find what a guide would.
 //!
 //! The guide is disabled while no gain is proven: then the pixels of some blocks are guided, others in each iteration. In
-//! small pictures all pixels teach it at first, so that it finds the sooner what it can gain, and once a few iterations have
-//! shown none, those of some packets; in others, and once a gain is out of the question, those of the blocks alone do. Packets that do not teach cost what they cost without guiding. It is enabled while the gain lasts.
+//! small pictures all packets teach it at first, so that it finds the sooner what it can gain, and one in four once a few
+//! iterations have shown none; in others, and once a gain is out of the question, the pixels of the blocks alone do.
+//! Packets that neither teach nor have guided samples cost what they cost without guiding. It is enabled while the gain
+//! lasts.
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing)]
 
 use crate::film::SqrtNewton;
@@ -31,13 +33,14 @@ const ENABLED_ABOVE: f64 = 1.08;
 const DOUBT: f64 = 0.25;
 /// Gain below which it is disabled again.
 const DISABLED_BELOW: f64 = 1.04;
-/// Pixels that are guided at first, and after a gain is out of the question (in small pictures in doubt), within the bounds
-/// [`MOST`] and [`LEAST`]. A guided pixel costs some of what Sobol' points gain, because its samples have a sequence of
-/// their own in each iteration; what they tell of the gain depends on their number, not on the size of the picture.
+/// Pixels that are guided at first (in small pictures half as many), and after a gain is out of the question (in small
+/// pictures as soon as it is in doubt, [`PATIENCE`]), within the bounds [`MOST`] and [`LEAST`]. A guided pixel costs some of
+/// what Sobol' points gain, because its samples have a sequence of their own in each iteration; what they tell of the gain
+/// depends on their number, not on the size of the picture.
 const WANTED: [u64; 2] = [4096, 1024];
-/// Most pixels of a small picture: all of them teach the guide while nothing is decided, and half as many are guided. In
-/// larger ones they would crowd out of the logs what guided pixels find, of which each contribution tells more: with a
-/// larger limit `render --size 960x540 --spp 12` of `pool` has more error.
+/// Most pixels of a small picture: at first all of them teach the guide (in doubt those of some packets, [`TEACHING`]), and
+/// half as many as [`WANTED`] are guided. In larger ones they would crowd out of the logs what guided pixels find, of which
+/// each contribution tells more: with a larger limit `render --size 960x540 --spp 12` of `pool` has more error.
 const SMALL: u64 = 65_536;
 /// Largest shares of the pixels that those may be, in 65536ths.
 const MOST: [u32; 2] = [65_536 / 2, 65_536 / 32];
@@ -145,7 +148,8 @@ pub(crate) struct Watch {
     promise: Promise,
     /// Not 0: all pixels are guided.
     enabled: u32,
-    /// Iterations one after the other that have shown no gain; [`UNPROMISING`] if one is out of the question.
+    /// Iterations one after the other that have shown no gain, [`PATIENCE`] at most; [`UNPROMISING`] if one is out of the
+    /// question.
     doubts: u32,
 }
 
@@ -154,16 +158,16 @@ const UNPROMISING: u32 = u32::MAX;
 /// Iterations without a gain after which one is in doubt.
 const PATIENCE: u32 = 3;
 
-/// Part of the packets that teach the guide in a small picture while a gain is in doubt. With all of them renders that are
-/// never guided take 4 % more time (five scenes), and make no better guides.
+/// Part of the packets that teach the guide in a small picture while a gain is in doubt. With all of them, and twice the
+/// guided pixels, renders that are never guided take 4 % more time (mean of five scenes, `benches/EFFICIENCY.md`).
 const TEACHING: f32 = 0.25;
 
 /// Shares of the blocks of pixels that are guided while the guide is disabled, in 65536ths: see [`WANTED`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TrialShares {
     shares: [u32; 2],
-    /// Do all pixels teach the guide while nothing is decided?
-    pub(crate) all_teach: bool,
+    /// Is the picture small: do pixels that are not guided teach too while it is open whether the guide pays?
+    pub(crate) small: bool,
 }
 
 impl TrialShares {
@@ -171,10 +175,10 @@ impl TrialShares {
     pub(crate) fn of(size: [u32; 2]) -> Self {
         let pixels = (u64::from(size[0]) * u64::from(size[1])).max(1);
         let share = |wanted: u64, most| (wanted * 65_536 / pixels).min(u64::from(most)) as u32;
-        let ([undecided, unpromising], all_teach) = (WANTED, pixels <= SMALL);
-        let undecided = if all_teach { undecided / 2 } else { undecided };
+        let ([undecided, unpromising], small) = (WANTED, pixels <= SMALL);
+        let undecided = if small { undecided / 2 } else { undecided };
         let shares = [share(undecided, MOST[0]), share(unpromising, MOST[1])].map(|x| x.max(LEAST));
-        Self { shares, all_teach }
+        Self { shares, small }
     }
 }
 
@@ -218,7 +222,7 @@ impl Watch {
     fn share(&self, shares: TrialShares) -> u32 {
         let [undecided, unpromising] = shares.shares;
         // in larger pictures nothing but these pixels teaches the guide
-        let patience = if shares.all_teach { PATIENCE } else { UNPROMISING };
+        let patience = if shares.small { PATIENCE } else { UNPROMISING };
         if self.doubts < patience { undecided } else { unpromising }
     }
 
@@ -364,9 +368,14 @@ mod tests {
         again.add(&promise(100_000, 2.0));
         again.decide(0.75, false);
         assert_eq!(again.teaching(), 0.25, "a gain that was out of the question is in doubt");
-        // one pixel in 64 is guided, of which four times as many samples are learned from, as of one in four packets
+        // one pixel in 64 is guided; 32 of its samples are learned from, and 8 of each other pixel in one packet of four
         let part = decided(3, 0.95, true).guided_part(TrialShares::of([256, 256]), [32, 8]);
         assert!((part - 4.0 / (4.0 + 63.0 * 0.25)).abs() < 1e-6, "{part}");
+        // larger pictures, which no other pixels teach, guide as many as before
+        for (size, i) in [([256, 256], 1), ([512, 256], 0)] {
+            let shares = TrialShares::of(size);
+            assert_eq!(decided(3, 0.95, true).share(shares), shares.shares[i], "{size:?}");
+        }
     }
 
     /// Killed by: a bound that does not hold, pixels of the two exchanged, a product that overflows.
