@@ -312,7 +312,7 @@ fn every_flag_changes_the_picture() {
     ];
     let mut found = Vec::new();
     let pictures = flags.map(|flags| {
-        let more = ["--rrs", "ears", "--spp", "200", "-o", "f.exr", "--stats", "--json"];
+        let more = ["--rrs", "ears", "--spp", "300", "-o", "f.exr", "--stats", "--json"];
         // with so few pixels there are too few samples to learn from otherwise
         let samples: &[&str] = if flags.contains(&"--learn-samples") { &[] } else { &["--learn-samples", "16"] };
         found.push(json(&render(dir.path(), &[&more, samples, flags].concat())));
