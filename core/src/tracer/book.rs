@@ -336,7 +336,7 @@ impl<'m> Bookkeeping<'m> {
     }
 
     /// Charges one ray of relative `cost` to the root and the ledger record of each lane in `mask`.
-    #[inline(always)]
+    #[inline]
     pub(super) fn charge(&mut self, mask: Mask8, path: &Path8, cost: f32) {
         let root = path.root.to_array();
         for i in mask.lanes() {
@@ -367,7 +367,6 @@ impl<'m> Bookkeeping<'m> {
 
     /// Tells the records of the lanes in `active` at which bin the samples of the vertex that they led to are logged,
     /// times which scale, and what they count (`inner`, the bounce's weight over the vertex's factor).
-    #[inline(always)]
     pub(super) fn arrive(&mut self, active: Mask8, path: &Path8, bin: U32x8, scale: Vec3x8, inner: Vec3x8) {
         let active = active.and_not(path.record.eq(U32x8::splat(NO_RECORD)));
         let (record, bin) = (path.record.to_array(), bin.to_array());

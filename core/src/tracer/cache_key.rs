@@ -31,7 +31,6 @@ fn inverse(x: Vec3x8, floor: f32) -> Vec3x8 {
 /// The bins of arrived vertices, keyed by the direction that decides what their model reflects
 /// ([`bsdf::CacheDirection`]). Samples are logged over the albedo, so that a texture, or a black and a white thing in one
 /// cell, does not count as noise.
-#[inline(always)]
 pub(super) fn cache_lookup<W: World>(world: &W, book: &Bookkeeping<'_>, a: &Arrival8, space: Space) -> CacheKey8 {
     let (v, active) = (&a.vertex, a.active);
     let learned = world.learned();

@@ -131,9 +131,10 @@ pub(crate) fn roulette<W: World>(
         let found = Contribution8 { pixel: v.beta * c * rounded, local: a.weight * c * rounded };
         book.accumulate(active, &v.path, &found, Beyond::Unknown);
     }
-    let (bin, scale) = key.as_ref().map_or((U32x8::splat(NO_BIN), Vec3x8::ZERO), |k| (k.bin, k.scale));
-    if key.is_some() || W::GUIDING {
-        book.arrive(active, &v.path, bin, scale, a.weight / s);
+    if let Some(k) = &key {
+        book.arrive(active, &v.path, k.bin, k.scale, a.weight / s);
+    } else if W::GUIDING {
+        book.arrive(active, &v.path, U32x8::splat(NO_BIN), Vec3x8::ZERO, a.weight / s);
     }
     let beta = v.beta / s;
     let nee_roulette = settings.shadow_roulette && key.is_some();
@@ -149,7 +150,7 @@ pub(crate) fn roulette<W: World>(
         v.albedo_product *= a.albedo.mean();
     }
     v.samples = U32x8::from_fn(|i| pack_samples(n[i], with_nee[i]));
-    v.bin = bin;
+    v.bin = key.map_or(U32x8::splat(NO_BIN), |k| k.bin);
     Decision8 { n, with_nee }
 }
 
@@ -175,7 +176,6 @@ fn samples_with_nee(comb: &mut CombNumbers, n: [u32; 8], nee_probability: F32x8,
 
 /// Factors above 1 fall to 1 where waiting room or the camera sample's split budget is short: before any weight is
 /// computed, so that the estimate stays unbiased.
-#[inline(always)]
 fn limit(settings: &Settings, book: &mut Bookkeeping<'_>, free: usize, s: F32x8, root: U32x8, active: Mask8) -> F32x8 {
     let splitting = active & s.gt(F32x8::ONE);
     if splitting.none() {
