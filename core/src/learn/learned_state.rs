@@ -174,16 +174,10 @@ impl<'m> LearnedState<'m> {
         !self.watches() || self.watch.enabled()
     }
 
-    /// Does the guide learn from samples of pixels that are not guided?
-    #[inline(always)]
-    fn learns_from_others(&self) -> bool {
-        self.watches() && self.trial.small && self.watch.teaching() > 0.0
-    }
-
     /// Does the guide learn from all samples with a record of a packet, the first of which has this key, guided or not?
     #[inline(always)]
     pub(crate) fn teaches(&self, key: [u32; 2]) -> bool {
-        self.learns_from_others() && self.watch.teaches(key)
+        self.watches() && self.watch.teaches(self.trial, key)
     }
 
     /// Are samples of the pixel in column and row `at` guided in iteration `iteration`?
@@ -195,7 +189,7 @@ impl<'m> LearnedState<'m> {
     /// Part of the samples that the guide learns from that are guided, in an iteration of so many samples per pixel.
     #[inline(always)]
     pub(crate) fn guided_part(&self, samples: u32) -> f32 {
-        if !self.learns_from_others() {
+        if !self.watches() {
             return 1.0;
         }
         self.watch.guided_part(self.trial, [true, false].map(|guided| self.learned_samples(guided).min(samples)))

@@ -3,12 +3,11 @@
 use super::class::Kernel as ClassKernel;
 use super::crossing::media_towards;
 use super::guide_notes::GuideNote8;
-use super::guided::{self, GuidedKernel, Mixed8};
+use super::guided::{self, GuidedKernel};
 use super::packets::{RayState8, Samples8};
 use super::shading::dispatch;
 use crate::bsdf::{Bsdf, Eval8, HenyeyGreenstein, Inputs8, Sample8, Visitor, folded};
 use crate::geometry::{self, Ray8};
-use crate::learn::guiding::Guide;
 use crate::scene::{Effects, Scene};
 use crate::world::World;
 use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
@@ -67,23 +66,17 @@ pub(crate) fn scatter<W: World>(
 ) -> Scattered8 {
     if W::GUIDING
         && let Some(guide) = world.learned().guide()
-        && let Some(m) = scatter_guided(world, guide, samples, nee)
+        && let Some(guided) = guided::draw(guide, world, samples)
+        && let kernel = GuidedKernel::new((world.scene(), world.sampler()), samples, nee, &guided)
+        && let Some(both) = visit::<W, _>(samples, kernel)
     {
+        let m = guided::mix(&guided, &both, nee);
         *note = m.note;
         return onwards(world, samples, m.nee, &m.sample, m.wi);
     }
     let kernel = Kernel { scene: world.scene(), samples, nee, u: samples.key.scattering(world.sampler()) };
     let (nee, s, frame) = visit::<W, _>(samples, kernel).unwrap_or_else(nothing);
     onwards(world, samples, nee, &s, frame.to_world(s.wi))
-}
-
-/// The same with path guiding; `None` for packets that are not guided and do not teach. Apart, so that those pay nothing.
-#[inline(never)]
-fn scatter_guided<W: World>(world: &W, guide: &Guide<'_>, samples: &Samples8, nee: Option<Vec3x8>) -> Option<Mixed8> {
-    let guided = guided::draw(guide, world, samples)?;
-    let kernel = GuidedKernel::new((world.scene(), world.sampler()), samples, nee, &guided);
-    let both = visit::<W, _>(samples, kernel)?;
-    Some(guided::mix(&guided, &both, nee))
 }
 
 /// Calls `kernel` with what scatters the samples. `None` for a class outside the profile, which cannot be: sessions refuse

@@ -167,7 +167,7 @@ const TEACHING: f32 = 0.25;
 pub(crate) struct TrialShares {
     shares: [u32; 2],
     /// Is the picture small: do pixels that are not guided teach too while it is open whether the guide pays?
-    pub(crate) small: bool,
+    small: bool,
 }
 
 impl TrialShares {
@@ -189,31 +189,30 @@ impl Watch {
         self.enabled != 0
     }
 
-    /// Part of the packets that teach the guide in a small picture, whether or not their pixels are guided; 0 unless it is
-    /// open whether the guide pays.
+    /// Part of the packets that teach the guide whether or not their pixels are guided; 0 in larger pictures, and unless it
+    /// is open whether the guide pays.
     #[inline(always)]
-    pub(crate) fn teaching(&self) -> f32 {
+    fn teaching(&self, shares: TrialShares) -> f32 {
         match self.doubts {
-            _ if self.enabled() => 0.0,
+            _ if self.enabled() || !shares.small => 0.0,
             UNPROMISING => 0.0,
             PATIENCE.. => TEACHING,
             _ => 1.0,
         }
     }
 
-    /// Is the packet with this key among those that teach the guide?
+    /// Is the packet with this key among those that teach the guide whether or not their pixels are guided?
     #[inline(always)]
-    pub(crate) fn teaches(&self, [lo, hi]: [u32; 2]) -> bool {
+    pub(crate) fn teaches(&self, shares: TrialShares, [lo, hi]: [u32; 2]) -> bool {
         let random = mix(u64::from(hi) << 32 | u64::from(lo)) >> 40;
-        (random as f32) < self.teaching() * 16_777_216.0
+        (random as f32) < self.teaching(shares) * 16_777_216.0
     }
 
-    /// Part of the samples learned from that are guided in a small picture while it is open whether the guide pays, if so
-    /// many of a guided pixel, and of another, are learned from.
+    /// Part of the samples learned from that are guided, if so many of a guided pixel, and of another, are learned from.
     #[inline]
     pub(crate) fn guided_part(&self, shares: TrialShares, [guided, other]: [u32; 2]) -> f32 {
         let pixels = self.share(shares) as f32 / 65_536.0;
-        let (guided, other) = (pixels * guided as f32, (1.0 - pixels) * self.teaching() * other as f32);
+        let (guided, other) = (pixels * guided as f32, (1.0 - pixels) * self.teaching(shares) * other as f32);
         guided / (guided + other).max(f32::MIN_POSITIVE)
     }
 
@@ -285,7 +284,7 @@ mod tests {
         for (enough, open) in [(false, true), (true, false), (true, false), (false, true)] {
             watch.add(&promise(100_000, 2.0));
             watch.decide(0.75, enough);
-            assert_eq!((watch.enabled(), watch.teaching() > 0.0), (false, open));
+            assert_eq!((watch.enabled(), watch.teaching(TrialShares::of([64, 64])) > 0.0), (false, open));
         }
     }
 
@@ -344,6 +343,7 @@ mod tests {
     /// not know of them.
     #[test]
     fn fewer_packets_teach_a_guide_that_gains_nothing() {
+        let small = TrialShares::of([256, 256]);
         let decided = |iterations, with, enough| {
             let mut watch = Watch::default();
             for _ in 0..iterations {
@@ -360,24 +360,26 @@ mod tests {
             (decided(1, 2.0, true), 0.0),
             (decided(1, 0.5, true), 0.0),
         ] {
-            let teach = (0..1u32 << 16).filter(|&k| watch.teaches([k.wrapping_mul(0x9e37_79b9), k])).count();
+            let teach = (0..1u32 << 16).filter(|&k| watch.teaches(small, [k.wrapping_mul(0x9e37_79b9), k])).count();
             let (share, variance) = (teach as f64 / 65_536.0, part * (1.0 - part) / 65_536.0);
             assert!((share - part).powi(2) <= 16.0 * variance, "{share}, not {part}: {watch:?}");
         }
         let mut again = decided(3, 2.0, true);
         again.add(&promise(100_000, 2.0));
         again.decide(0.75, false);
-        assert_eq!(again.teaching(), 0.25, "a gain that was out of the question is in doubt");
+        assert_eq!(again.teaching(small), 0.25, "a gain that was out of the question is in doubt");
         // one pixel in 64 is guided; 32 of its samples are learned from, and 8 of each other pixel in one packet of four
-        let part = decided(3, 0.95, true).guided_part(TrialShares::of([256, 256]), [32, 8]);
+        let part = decided(3, 0.95, true).guided_part(small, [32, 8]);
         assert!((part - 4.0 / (4.0 + 63.0 * 0.25)).abs() < 1e-6, "{part}");
         // larger pictures, which no other pixels teach, guide as many as before
-        for (size, small) in [([256, 256], true), ([512, 256], false)] {
-            let shares = TrialShares::of(size);
+        let large = TrialShares::of([512, 256]);
+        for (shares, fewer) in [(small, true), (large, false)] {
             let [undecided, unpromising] = shares.shares;
-            let wanted = if small { unpromising } else { undecided };
-            assert_eq!(decided(3, 0.95, true).share(shares), wanted, "{size:?}");
+            let wanted = if fewer { unpromising } else { undecided };
+            assert_eq!(decided(3, 0.95, true).share(shares), wanted, "{shares:?}");
         }
+        assert_eq!(Watch::default().teaching(large), 0.0);
+        assert_eq!(Watch::default().guided_part(large, [32, 8]), 1.0);
     }
 
     /// Killed by: a bound that does not hold, pixels of the two exchanged, a product that overflows.
