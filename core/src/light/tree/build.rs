@@ -3,8 +3,10 @@
 //! A node takes the range of lights that it was given and splits it in two, always the part that costs most, until
 //! there are eight parts. Splits are those with the least cost among twelve places on each axis: weight times surface
 //! area of the box times solid angle that the lights emit into, regularised by the shape of the box (Conty Estevez
-//! and Kulla 2018, section 4.1; equation 2). Parts that would make the tree too deep are halved. What the nodes say
-//! of their children is written afterwards ([`light_node_of`]), by what edits use, too.
+//! and Kulla 2018, section 4.1; equation 2). Parts that would make the tree too deep are halved. Near the lights nodes are
+//! kept full, which halves the tree: parts of few lights are split at multiples of eight, and parts that fit into one node
+//! are not split unless all their lights fit into this one. What the nodes say of their children is written afterwards
+//! ([`light_node_of`]), by what edits use, too.
 
 use super::extent::{Extent, Group, dot};
 use crate::scene::Scene;
@@ -13,6 +15,9 @@ use bytemuck::Zeroable;
 
 /// Places of a split on each axis.
 const BINS: usize = 12;
+
+/// Lights that two levels of nodes hold.
+const FEW: usize = 64;
 
 /// Memory of a tree in the making, see [`build_light_tree`].
 #[derive(Debug)]
@@ -126,11 +131,14 @@ impl Builder<'_, '_, '_> {
         let mut count = 1;
         parts[0] = (from, upto, 0.0);
         while count < 8 {
-            let largest = parts.iter().take(count).enumerate().filter(|(_, (a, b, _))| b - a > 1);
+            // first parts that do not fit into one node, then those whose lights all fit into this one
+            let large = parts.iter().take(count).any(|(a, b, _)| b - a > 8);
+            let may_split = |n: usize| if large { n > 8 } else { n > 1 && count + n - 1 <= 8 };
+            let candidates = parts.iter().take(count).enumerate().filter(|(_, (a, b, _))| may_split(b - a));
             let halve = upto - from > most(level + 1);
             let of = |&(_, (a, b, cost)): &(usize, &(usize, usize, f32))| if halve { (b - a) as f32 } else { *cost };
-            let Some((k, &(a, b, _))) = largest.max_by(|x, y| of(x).total_cmp(&of(y))) else { break };
-            let middle = self.split(a, b, halve);
+            let Some((k, &(a, b, _))) = candidates.max_by(|x, y| of(x).total_cmp(&of(y))) else { break };
+            let middle = if large { self.split(a, b, halve) } else { a + 1 };
             let [left, right] = [(a, middle), (middle, b)].map(|(a, b)| (a, b, self.sum(a, b).cost()));
             if let Some(place) = parts.get_mut(k) {
                 *place = left;
@@ -189,6 +197,9 @@ impl Builder<'_, '_, '_> {
         let bin = |axis: usize, e: &Extent| {
             (((e.middle[axis] - low[axis]) / side[axis] * BINS as f32) as usize).min(BINS - 1)
         };
+        if upto - from <= FEW && !halve {
+            return self.split_few(from, upto, side, longest).unwrap_or(half);
+        }
         let mut best: Option<(f32, usize, usize)> = None;
         for axis in (0..3).filter(|a| side[*a] > 0.0 && !halve) {
             let mut bins = [Sum::EMPTY; BINS];
@@ -214,6 +225,41 @@ impl Builder<'_, '_, '_> {
         let Some((_, axis, place)) = best else { return half };
         let middle = self.partition(from, upto, |e| bin(axis, e) < place);
         if middle > from && middle < upto { middle } else { half }
+    }
+
+    /// Parts at most [`FEW`] lights at a multiple of eight, so that nodes below are full; where the second part begins.
+    /// `None` if all have one place.
+    fn split_few(&mut self, from: usize, upto: usize, side: [f32; 3], longest: f32) -> Option<usize> {
+        let mut lights = [(0, [0.0; 3], Sum::EMPTY); FEW];
+        let lights = lights.get_mut(..upto - from)?;
+        for (light, at) in lights.iter_mut().zip(from..upto) {
+            let e = self.extent(at)?;
+            *light = (self.tree.order.get(at).copied()?, e.middle, Sum::one(&e));
+        }
+        let sort = |lights: &mut [(u32, [f32; 3], Sum)], axis: usize| {
+            lights.sort_unstable_by(|(i, a, _), (j, b, _)| a[axis].total_cmp(&b[axis]).then(i.cmp(j)));
+        };
+        let cost_of = |lights: &[(u32, [f32; 3], Sum)]| {
+            let mut sum = Sum::EMPTY;
+            lights.iter().for_each(|(_, _, one)| sum.add(one));
+            sum.cost()
+        };
+        let mut best: Option<(f32, usize, usize)> = None;
+        for axis in (0..3).filter(|a| side[*a] > 0.0) {
+            sort(lights, axis);
+            for place in (8..lights.len()).step_by(8) {
+                let (below, above) = lights.split_at_checked(place)?;
+                let cost = (cost_of(below) + cost_of(above)) * longest / side[axis];
+                if best.is_none_or(|(least, ..)| cost < least) {
+                    best = Some((cost, axis, place));
+                }
+            }
+        }
+        let (_, axis, place) = best?;
+        sort(lights, axis);
+        let order = self.tree.order.get_mut(from..upto)?;
+        order.iter_mut().zip(lights).for_each(|(place, (index, ..))| *place = *index);
+        Some(from + place)
     }
 }
 
