@@ -160,7 +160,7 @@ fn shapes_light_floors() {
 struct Never;
 
 impl LightSelector for Never {
-    fn select(&self, _: Vec3x8, _: Vec3x8, _: U32x8) -> (U32x8, F32x8) {
+    fn select(&self, _: Vec3x8, _: Vec3x8, _: U32x8, _: Mask8) -> (U32x8, F32x8) {
         (U32x8::splat(NONE), F32x8::ZERO)
     }
 

@@ -367,7 +367,7 @@ fn shadow_rays_see_what_is_not_occluded_through_instances() {
 struct Only(u32);
 
 impl croupier::unstable::light::LightSelector for Only {
-    fn select(&self, _: Vec3x8, _: Vec3x8, _: U32x8) -> (U32x8, F32x8) {
+    fn select(&self, _: Vec3x8, _: Vec3x8, _: U32x8, _: Mask8) -> (U32x8, F32x8) {
         (U32x8::splat(self.0), F32x8::ONE)
     }
 

@@ -2,7 +2,7 @@
 
 use croupier::unstable::learn::Guiding;
 use croupier::unstable::light::{LightSelector, TreeSelector};
-use croupier::unstable::simd::{F32x8, U32x8, Vec3x8};
+use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 use croupier::{Scene, Settings};
 use croupier_host::description::{Emitter, Model, Reflectance, SceneDescription};
 use croupier_tests::runner::{Image, Learned, Schedule, learning, settings};
@@ -46,7 +46,7 @@ fn lights_emit_that_the_middle_does_not_see() {
     let scene = blob(&s);
     let view = Scene::from_bytes(&scene).expect("a valid scene");
     let middle = Vec3x8::ZERO;
-    let (_, tree) = TreeSelector(view).select(middle, Vec3x8::ZERO, U32x8::splat(1 << 31));
+    let (_, tree) = TreeSelector(view).select(middle, Vec3x8::ZERO, U32x8::splat(1 << 31), Mask8::all_lanes());
     assert!(!view.light_nodes.is_empty() && tree.eq(F32x8::ZERO).all(), "the tree chooses a light: {tree:?}");
     let image = run(&scene, &guided(&scene, Guiding::On), &[1], &mut |_, _| ());
     assert!(image.counters.light_path_rays > 1000, "{:?}", image.counters);

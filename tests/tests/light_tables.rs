@@ -27,7 +27,9 @@ fn owner(weights: &[f64]) -> LightScene {
 /// Random numbers per item, counted: in each slot of the table they change item at most once, found by bisection.
 fn count(owner: &LightScene, n: usize) -> Vec<u64> {
     let selector = PowerSelector(owner.scene());
-    let pick = |r: u64| selector.select(Vec3x8::ZERO, Vec3x8::ZERO, U32x8::splat(r as u32)).0.lane(0) as usize;
+    let pick = |r: u64| {
+        selector.select(Vec3x8::ZERO, Vec3x8::ZERO, U32x8::splat(r as u32), Mask8::all_lanes()).0.lane(0) as usize
+    };
     let mut counts = vec![0; n];
     let mut start = 0u64;
     for slot in 0..n as u64 {
@@ -99,7 +101,7 @@ fn nothing_to_choose_gives_an_empty_table_and_no_light() {
     assert!(alias::build(&[0.0, -1.0, f64::NAN, f64::INFINITY]).is_empty());
     let s = owner(&[0.0, 0.0]);
     let selector = PowerSelector(s.scene());
-    let (light, p) = selector.select(Vec3x8::ZERO, Vec3x8::ZERO, U32x8::splat(77));
+    let (light, p) = selector.select(Vec3x8::ZERO, Vec3x8::ZERO, U32x8::splat(77), Mask8::all_lanes());
     assert_eq!(p.to_array(), [0.0; 8]);
     assert_eq!(selector.probability(Vec3x8::ZERO, Vec3x8::ZERO, light, Mask8::all_lanes()).to_array(), [0.0; 8]);
 }

@@ -43,8 +43,16 @@ fn assert_selector_follows(scene: &Scene<'_>, what: &str, seed: u64) {
         let sum: f64 = stated.iter().map(|x| f64::from(*x)).sum();
         assert!(sum <= 1.0 + 1e-5, "{what}, point {k}: {sum}");
         let (mut counts, mut none, draws) = (vec![0u64; lights + 1], 0, 1u64 << 18);
-        for _ in 0..draws / 8 {
-            let (light, probability) = selector.select(splat(p), splat(n), U32x8::from_fn(|_| rng.word()));
+        for k in 0..draws / 8 {
+            let r = U32x8::from_fn(|_| rng.word());
+            let (light, probability) = selector.select(splat(p), splat(n), r, Mask8::all_lanes());
+            if k < 100 {
+                // a lane does not depend on the others
+                let mask = Mask8::from_bits(rng.word() & 255);
+                let some = selector.select(splat(p), splat(n), r, mask);
+                let same = some.0.eq(light) & some.1.eq(probability);
+                assert!(mask.and_not(same).none(), "{what}: {some:?}, not {light:?}, {probability:?}");
+            }
             for (light, probability) in light.to_array().into_iter().zip(probability.to_array()) {
                 match stated.get(light as usize) {
                     Some(stated) if probability > 0.0 => {

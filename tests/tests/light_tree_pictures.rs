@@ -85,8 +85,8 @@ fn pictures_are_those_of_a_choice_by_power() {
 fn wrong_densities_show() {
     struct Wrong<'s>(TreeSelector<'s>);
     impl LightSelector for Wrong<'_> {
-        fn select(&self, p: Vec3x8, n: Vec3x8, r: U32x8) -> (U32x8, F32x8) {
-            let (light, probability) = self.0.select(p, n, r);
+        fn select(&self, p: Vec3x8, n: Vec3x8, r: U32x8, mask: Mask8) -> (U32x8, F32x8) {
+            let (light, probability) = self.0.select(p, n, r, mask);
             (light, probability * 1.2)
         }
         fn probability(&self, p: Vec3x8, n: Vec3x8, light: U32x8, mask: Mask8) -> F32x8 {

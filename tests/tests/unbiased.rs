@@ -183,7 +183,7 @@ struct Uniform {
 }
 
 impl LightSelector for Uniform {
-    fn select(&self, _: Vec3x8, _: Vec3x8, r: U32x8) -> (U32x8, F32x8) {
+    fn select(&self, _: Vec3x8, _: Vec3x8, r: U32x8, _: Mask8) -> (U32x8, F32x8) {
         let pick = |r: u32| ((u64::from(r) * u64::from(self.lights)) >> 32) as u32;
         (U32x8::new(r.to_array().map(pick)), F32x8::splat(self.stated / self.lights as f32))
     }

@@ -266,7 +266,7 @@ fn heuristic(k: &mut Kernels) -> Outcome {
     }
     let scene = leak(many.select_by(&weights)).scene();
     let words: Vec<U32x8> = (0..PACKETS).map(|_| U32x8::from_fn(|_| rng.word())).collect();
-    let select = move |r: &U32x8| PowerSelector(scene).select(Vec3x8::ZERO, UP, *r);
+    let select = move |r: &U32x8| PowerSelector(scene).select(Vec3x8::ZERO, UP, *r, Mask8::all_lanes());
     let total: f64 = weights.iter().sum();
     for r in &words {
         let (light, p) = select(r);

@@ -124,10 +124,10 @@ impl LightSample8 {
 /// struct Uniform(u32);
 ///
 /// impl LightSelector for Uniform {
-///     fn select(&self, point: Vec3x8, normal: Vec3x8, r: U32x8) -> (U32x8, F32x8) {
+///     fn select(&self, point: Vec3x8, normal: Vec3x8, r: U32x8, mask: Mask8) -> (U32x8, F32x8) {
 ///         let pick = |r: u32| ((u64::from(r) * u64::from(self.0)) >> 32) as u32;
 ///         let light = U32x8::new(r.to_array().map(pick));
-///         (light, self.probability(point, normal, light, Mask8::all_lanes()))
+///         (light, self.probability(point, normal, light, mask))
 ///     }
 ///
 ///     fn probability(&self, _: Vec3x8, _: Vec3x8, _: U32x8, mask: Mask8) -> F32x8 {
@@ -147,8 +147,8 @@ impl LightSample8 {
 pub trait LightSelector {
     /// Index in [`Records::lights`](crate::scene::Records::lights) and its probability from a 32-bit random number, for
     /// points with unit normals, world space; normals are 0 at points in media, where nothing may be left out for its
-    /// direction. No such light, or a probability of 0: no light is sampled.
-    fn select(&self, point: Vec3x8, normal: Vec3x8, r: U32x8) -> (U32x8, F32x8);
+    /// direction. No such light, or a probability of 0: no light is sampled. Lanes outside `mask` are not read.
+    fn select(&self, point: Vec3x8, normal: Vec3x8, r: U32x8, mask: Mask8) -> (U32x8, F32x8);
 
     /// Probability that [`Self::select`] picks `light` in the lanes of `mask`, 0 in the others.
     fn probability(&self, point: Vec3x8, normal: Vec3x8, light: U32x8, mask: Mask8) -> F32x8;
@@ -166,8 +166,8 @@ pub trait LightSelector {
 
 impl<S: LightSelector> LightSelector for &S {
     #[inline(always)]
-    fn select(&self, point: Vec3x8, normal: Vec3x8, r: U32x8) -> (U32x8, F32x8) {
-        (*self).select(point, normal, r)
+    fn select(&self, point: Vec3x8, normal: Vec3x8, r: U32x8, mask: Mask8) -> (U32x8, F32x8) {
+        (*self).select(point, normal, r, mask)
     }
 
     #[inline(always)]
@@ -385,7 +385,7 @@ pub fn sample_at<S: LightSelector>(
     words: [U32x8; 4],
     active: Mask8,
 ) -> LightSample8 {
-    let (light, probability) = selector.select(at.p, at.n, words[0]);
+    let (light, probability) = selector.select(at.p, at.n, words[0], active);
     // constant in profiles without instances
     let placed = profile.contains(Effects::INSTANCES) && scene.effects.contains(Effects::INSTANCES);
     let chosen = Chosen::gather(scene, light, at.time, placed, active);
@@ -414,7 +414,7 @@ pub fn emission_of<S: LightSelector>(
     active: Mask8,
 ) -> Emission8 {
     let sphere = SceneSphere::new(scene);
-    let (light, probability) = selector.select(sphere.centre(), Vec3x8::ZERO, choice);
+    let (light, probability) = selector.select(sphere.centre(), Vec3x8::ZERO, choice, active);
     let placed = profile.contains(Effects::INSTANCES) && scene.effects.contains(Effects::INSTANCES);
     let chosen = Chosen::gather(scene, light, F32x8::ZERO, placed, active);
     let possible = active & probability.gt(F32x8::ZERO);

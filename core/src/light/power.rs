@@ -26,10 +26,10 @@ pub struct PowerSelector<'s>(pub Scene<'s>);
 
 impl LightSelector for PowerSelector<'_> {
     #[inline(always)]
-    fn select(&self, point: Vec3x8, normal: Vec3x8, r: U32x8) -> (U32x8, F32x8) {
+    fn select(&self, point: Vec3x8, normal: Vec3x8, r: U32x8, mask: Mask8) -> (U32x8, F32x8) {
         let table = self.0.light_alias;
         let light = pick(table, U32x8::splat(0), table.len() as u32, r);
-        (light, self.probability(point, normal, light, Mask8::all_lanes()))
+        (light, self.probability(point, normal, light, mask))
     }
 
     #[inline(always)]

@@ -50,11 +50,11 @@ pub struct TreeSelector<'s>(pub Scene<'s>);
 
 impl LightSelector for TreeSelector<'_> {
     #[inline(always)]
-    fn select(&self, point: Vec3x8, normal: Vec3x8, r: U32x8) -> (U32x8, F32x8) {
+    fn select(&self, point: Vec3x8, normal: Vec3x8, r: U32x8, mask: Mask8) -> (U32x8, F32x8) {
         if self.0.light_nodes.is_empty() {
-            return PowerSelector(self.0).select(point, normal, r);
+            return PowerSelector(self.0).select(point, normal, r, mask);
         }
-        select(self.0.light_nodes, point, normal, r)
+        select(self.0.light_nodes, point, normal, r, mask)
     }
 
     #[inline(always)]
@@ -93,28 +93,26 @@ pub fn light_importance(node: &LightNode, p: [f32; 3], n: [f32; 3]) -> F32x8 {
     let d = rows(&node.middle) - splat(p);
     let (square, radius_square) = (d.dot(d), radius * radius);
     let inside = square.le(radius_square);
-    let distance = square.sqrt();
+    // roots of squares over squares, which need not wait for each other; what they are inside of the ball plays no part
+    let inv_square = F32x8::ONE / square.max(radius_square).max(F32x8::splat(MIN_SQUARE));
+    let inv = inv_square.sqrt();
+    let over_distance = |x: F32x8| ((1.0 - x * x * inv_square).safe_sqrt(), x * inv);
     // of the ball
-    let sin_ball = inside.select(F32x8::ZERO, radius / distance);
-    let cos_ball = inside.select(-F32x8::ONE, (1.0 - sin_ball * sin_ball).safe_sqrt());
+    let (cos_ball, sin_ball) = over_distance(radius);
+    let (cos_ball, sin_ball) = (inside.select(-F32x8::ONE, cos_ball), inside.select(F32x8::ZERO, sin_ball));
     // at the lights
     let along = -axis.dot(d);
-    let cos = (along / distance).clamp(-1.0, 1.0);
-    let sin = (1.0 - cos * cos).safe_sqrt();
+    let (sin, cos) = over_distance(along);
     let (sin, cos) = subtract(sin, cos, F32x8::new(node.sin), F32x8::new(node.cos));
     let (_, cos) = subtract(sin, cos, sin_ball, cos_ball);
     let at_light = inside.select(F32x8::ONE, cos);
     let seen = along.gt(F32x8::new(node.front)) & at_light.gt(F32x8::ZERO);
     // at the surface, whatever its side
-    let at_surface = if n == [0.0; 3] {
-        F32x8::ONE
-    } else {
-        let cos = (splat(n).dot(d).abs() / distance).min(F32x8::ONE);
-        let sin = (1.0 - cos * cos).safe_sqrt();
-        let (_, cos) = subtract(sin, cos, sin_ball, cos_ball);
-        inside.select(F32x8::ONE, cos) * (1.0 - SURFACE_FLOOR) + SURFACE_FLOOR
-    };
-    let near = weight * at_light * at_surface / square.max(radius_square).max(F32x8::splat(MIN_SQUARE));
+    let (sin, cos) = over_distance(splat(n).dot(d).abs());
+    let (_, cos) = subtract(sin, cos, sin_ball, cos_ball);
+    let any_side = inside | Mask8::splat(n == [0.0; 3]);
+    let at_surface = any_side.select(F32x8::ONE, cos) * (1.0 - SURFACE_FLOOR) + SURFACE_FLOOR;
+    let near = weight * at_light * at_surface * inv_square;
     let infinite = !radius.is_finite();
     let importance = infinite.select(weight, seen.zero_unless(near));
     (importance.gt(F32x8::ZERO) & importance.is_finite()).zero_unless(importance)
@@ -123,60 +121,85 @@ pub fn light_importance(node: &LightNode, p: [f32; 3], n: [f32; 3]) -> F32x8 {
 /// Largest number below 1.
 const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
 
-/// A light for one point, and its probability.
-#[inline(always)]
-fn select_one(nodes: &[LightNode], p: [f32; 3], n: [f32; 3], r: u32) -> (u32, f32) {
-    let mut u = f64::from(r) / 4_294_967_296.0;
-    let mut probability = 1.0f32;
-    let mut index = 0;
-    for _ in 0..MAX_LIGHT_DEPTH {
-        let Some(node) = nodes.get(index as usize) else { break };
-        let importance = light_importance(node, p, n);
-        let (upto, total) = sums(importance);
-        if total == 0.0 {
-            break;
-        }
-        let at = u * total;
-        // the first child that reaches beyond, all of which have importance; the last one that has if none does by rounding
-        let below = upto.iter().skip(1).filter(|sum| **sum <= at).count();
-        let last = importance.gt(F32x8::ZERO).bits().checked_ilog2().unwrap_or(0) as usize;
-        let k = below.min(last) & 7;
-        let (chosen, before, own) = (node.child[k], upto[k], importance.lane(k));
-        probability *= share(own, total);
-        if chosen & LEAF_BIT != 0 {
-            return (if chosen == NONE { NONE } else { chosen & CHILD_INDEX }, probability);
-        }
-        u = ((at - before) / f64::from(own)).clamp(0.0, BELOW_ONE);
-        index = chosen;
-    }
-    (NONE, 0.0)
+/// A child for each lane.
+struct Choice {
+    /// Its slot.
+    slot: [u32; 8],
+    /// Its probability, 0 where no child has importance.
+    share: F32x8,
+    /// The random number that is left.
+    rest: [f64; 8],
 }
 
-/// Sums of the importances before each child, in their order, and of all.
-#[inline(always)]
-fn sums(importance: F32x8) -> ([f64; 9], f64) {
-    let (mut upto, mut total) = ([0.0; 9], 0.0);
-    for (sum, x) in upto.iter_mut().skip(1).zip(importance.to_array()) {
-        total += f64::from(x);
-        *sum = total;
+impl Choice {
+    /// The children that the random numbers `u` pick, by the importances of the eight children of every lane's node.
+    #[inline(always)]
+    fn of(children: [F32x8; 8], u: &[f64; 8]) -> Self {
+        let rows = children.map(|c| c.to_array());
+        let total: [f64; 8] = core::array::from_fn(|i| total(rows.iter().map(|row| row[i])));
+        let at: [f64; 8] = core::array::from_fn(|i| u[i] * total[i]);
+        let (mut sum, mut before, mut own, mut slot) = ([0.0; 8], [0.0; 8], [0.0; 8], [0u64; 8]);
+        for (k, row) in (0..).zip(&rows) {
+            for i in 0..8 {
+                let x = f64::from(row[i]);
+                // the last one that does not begin behind: one without importance ends where it begins, so it is not the last
+                let taken = sum[i] <= at[i];
+                (before[i], own[i], slot[i]) = if taken { (sum[i], x, k) } else { (before[i], own[i], slot[i]) };
+                sum[i] += x;
+            }
+        }
+        Self {
+            slot: slot.map(|k| k as u32 & 7),
+            share: F32x8::from_fn(|i| if total[i] > 0.0 { share(own[i], total[i]) } else { 0.0 }),
+            rest: core::array::from_fn(|i| ((at[i] - before[i]) / own[i]).clamp(0.0, BELOW_ONE)),
+        }
     }
-    (upto, total)
+}
+
+/// Sum of the importances of a node's children, in their order.
+#[inline(always)]
+fn total(importances: impl Iterator<Item = f32>) -> f64 {
+    importances.fold(0.0, |sum, x| sum + f64::from(x))
 }
 
 /// The probability of a child.
 #[inline(always)]
-fn share(importance: f32, total: f64) -> f32 {
-    (f64::from(importance) / total) as f32
+fn share(importance: f64, total: f64) -> f32 {
+    (importance / total) as f32
 }
 
-/// A light per lane and its probability; [`NONE`] and 0 where no light has importance.
+/// A light per lane of `mask` and its probability; [`NONE`] and 0 where no light has importance. All lanes go down a level
+/// together: first the importances of every lane's children, which wait for divisions and roots but not for each other, then
+/// the choices of all lanes at once.
 #[inline(never)]
-fn select(nodes: &[LightNode], point: Vec3x8, normal: Vec3x8, r: U32x8) -> (U32x8, F32x8) {
-    let (r, mut light, mut probability) = (r.to_array(), [NONE; 8], [0.0; 8]);
-    for i in 0..8 {
-        (light[i], probability[i]) = select_one(nodes, point.lane(i), normal.lane(i), r[i]);
+fn select(nodes: &[LightNode], point: Vec3x8, normal: Vec3x8, r: U32x8, mask: Mask8) -> (U32x8, F32x8) {
+    let [points, normals] = [point, normal].map(|v| [v.x.to_array(), v.y.to_array(), v.z.to_array()]);
+    let mut u = r.to_array().map(|r| f64::from(r) / 4_294_967_296.0);
+    let mut node = U32x8::select(mask, U32x8::splat(0), U32x8::splat(NONE)).to_array();
+    let mut probability = mask.zero_unless(F32x8::ONE);
+    for _ in 0..MAX_LIGHT_DEPTH {
+        let left = (U32x8::new(node) & U32x8::splat(LEAF_BIT)).eq(U32x8::splat(0));
+        if left.none() {
+            break;
+        }
+        let mut rows = [F32x8::ZERO; 8];
+        for i in left.lanes() {
+            if let Some(node) = nodes.get(node[i] as usize) {
+                rows[i] = light_importance(node, points.map(|x| x[i]), normals.map(|x| x[i]));
+            }
+        }
+        let choice = Choice::of(F32x8::transpose(rows), &u);
+        let found = choice.share.gt(F32x8::ZERO);
+        for i in left.lanes() {
+            let child = nodes.get(node[i] as usize).map_or(NONE, |node| node.child[choice.slot[i] as usize & 7]);
+            node[i] = if found.lane(i) { child } else { NONE };
+        }
+        probability = left.select(probability * choice.share, probability);
+        u = choice.rest;
     }
-    (U32x8::new(light), F32x8::new(probability))
+    let node = U32x8::new(node);
+    let light = U32x8::select(node.eq(U32x8::splat(NONE)), node, node & U32x8::splat(CHILD_INDEX));
+    (light, probability)
 }
 
 /// The probabilities of lights along their trails.
@@ -198,13 +221,13 @@ fn along_trail(nodes: &[LightNode], p: [f32; 3], n: [f32; 3], trail: u32, light:
     for _ in 0..MAX_LIGHT_DEPTH {
         let Some(node) = nodes.get(index as usize).filter(|_| trail != NONE) else { return 0.0 };
         let importance = light_importance(node, p, n);
-        let (_, total) = sums(importance);
+        let total = total(importance.to_array().into_iter());
         let slot = rest as usize & 7;
         let own = importance.lane(slot);
         if own == 0.0 {
             return 0.0;
         }
-        probability *= share(own, total);
+        probability *= share(own.into(), total);
         let child = node.child[slot];
         if child & LEAF_BIT != 0 {
             return if child & CHILD_INDEX == light { probability } else { 0.0 };
