@@ -147,7 +147,8 @@ impl LightSample8 {
 pub trait LightSelector {
     /// Index in [`Records::lights`](crate::scene::Records::lights) and its probability from a 32-bit random number, for
     /// points with unit normals, world space; normals are 0 at points in media, where nothing may be left out for its
-    /// direction. No such light, or a probability of 0: no light is sampled. Lanes outside `mask` are not read.
+    /// direction. No such light, or a probability of 0: no light is sampled. What is said of
+    /// lanes outside `mask` is ignored.
     fn select(&self, point: Vec3x8, normal: Vec3x8, r: U32x8, mask: Mask8) -> (U32x8, F32x8);
 
     /// Probability that [`Self::select`] picks `light` in the lanes of `mask`, 0 in the others.

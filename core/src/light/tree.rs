@@ -17,7 +17,8 @@
 //! exactly that. What differs from there:
 //!
 //! 1. Nodes have eight children, so that a lane is a child: no gathers, and eight lights at once are weighed by what
-//!    they bring. Depth falls to a third, and 10,000 lights take five nodes.
+//!    they bring. Depth falls to a third, and 10,000 lights take five nodes. To choose, importances are transposed, so
+//!    that a lane is a point.
 //! 2. Balls bound places, not boxes: all that is asked of a box is a ball around it.
 //! 3. Lights at infinity are children like others, with an importance that is the same everywhere.
 //! 4. The cosine at the surface has a floor ([`SURFACE_FLOOR`]): n is the geometric normal, shading normals see lights
@@ -93,7 +94,8 @@ pub fn light_importance(node: &LightNode, p: [f32; 3], n: [f32; 3]) -> F32x8 {
     let d = rows(&node.middle) - splat(p);
     let (square, radius_square) = (d.dot(d), radius * radius);
     let inside = square.le(radius_square);
-    // roots of squares over squares, which need not wait for each other; what they are inside of the ball plays no part
+    // sqrt(1 - x^2 / d^2) and x / d: roots that depend on the division alone, not on each other; within the ball both are
+    // replaced below
     let inv_square = F32x8::ONE / square.max(radius_square).max(F32x8::splat(MIN_SQUARE));
     let inv = inv_square.sqrt();
     let over_distance = |x: F32x8| ((1.0 - x * x * inv_square).safe_sqrt(), x * inv);
@@ -142,14 +144,15 @@ impl Choice {
         for (k, row) in (0..).zip(&rows) {
             for i in 0..8 {
                 let x = f64::from(row[i]);
-                // the last one that does not begin behind: one without importance ends where it begins, so it is not the last
+                // the last child whose interval begins at `at` or before; that of one without importance is empty, so that a
+                // later child is taken
                 let taken = sum[i] <= at[i];
                 (before[i], own[i], slot[i]) = if taken { (sum[i], x, k) } else { (before[i], own[i], slot[i]) };
                 sum[i] += x;
             }
         }
         Self {
-            slot: slot.map(|k| k as u32 & 7),
+            slot: slot.map(|k| k as u32),
             share: F32x8::from_fn(|i| if total[i] > 0.0 { share(own[i], total[i]) } else { 0.0 }),
             rest: core::array::from_fn(|i| ((at[i] - before[i]) / own[i]).clamp(0.0, BELOW_ONE)),
         }
@@ -169,8 +172,8 @@ fn share(importance: f64, total: f64) -> f32 {
 }
 
 /// A light per lane of `mask` and its probability; [`NONE`] and 0 where no light has importance. All lanes go down a level
-/// together: first the importances of every lane's children, which wait for divisions and roots but not for each other, then
-/// the choices of all lanes at once.
+/// together: first the importances of every lane's children, which do not depend on each other, so that the processor works
+/// on several while it waits for roots and divisions, then the choices of all lanes at once.
 #[inline(never)]
 fn select(nodes: &[LightNode], point: Vec3x8, normal: Vec3x8, r: U32x8, mask: Mask8) -> (U32x8, F32x8) {
     let [points, normals] = [point, normal].map(|v| [v.x.to_array(), v.y.to_array(), v.z.to_array()]);
@@ -198,8 +201,9 @@ fn select(nodes: &[LightNode], point: Vec3x8, normal: Vec3x8, r: U32x8, mask: Ma
         u = choice.rest;
     }
     let node = U32x8::new(node);
-    let light = U32x8::select(node.eq(U32x8::splat(NONE)), node, node & U32x8::splat(CHILD_INDEX));
-    (light, probability)
+    // a tree that is too deep ends in no light
+    let none = node.eq(U32x8::splat(NONE)) | (node & U32x8::splat(LEAF_BIT)).eq(U32x8::splat(0));
+    (U32x8::select(none, U32x8::splat(NONE), node & U32x8::splat(CHILD_INDEX)), none.select(F32x8::ZERO, probability))
 }
 
 /// The probabilities of lights along their trails.

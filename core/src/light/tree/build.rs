@@ -1,12 +1,13 @@
 //! Light trees from lights, in the caller's memory.
 //!
-//! A node takes the range of lights that it was given and splits it in two, always the part that costs most, until
-//! there are eight parts. Splits are those with the least cost among twelve places on each axis: weight times surface
+//! A node takes the range of lights that it was given and splits it in two, always the part that costs most of those with
+//! more than eight lights, until there are eight parts or none is that large. If there is room left, lights of smaller parts
+//! become its children one by one, where all of a part find room. Splits are those with the least cost among twelve places on each axis: weight times surface
 //! area of the box times solid angle that the lights emit into, regularised by the shape of the box (Conty Estevez
-//! and Kulla 2018, section 4.1; equation 2). Parts that would make the tree too deep are halved. Near the lights nodes are
-//! kept full, which halves the tree: parts of few lights are split at multiples of eight, and parts that fit into one node
-//! are not split unless all their lights fit into this one. What the nodes say of their children is written afterwards
-//! ([`light_node_of`]), by what edits use, too.
+//! and Kulla 2018, section 4.1; equation 2). Parts of at most 64 lights are split at multiples of
+//! eight, counted from either end, so that most of the lowest nodes are full, which halves the tree. Parts that would make
+//! the tree too deep are halved. What the nodes say of their children is written afterwards ([`light_node_of`]), by what
+//! edits use, too.
 
 use super::extent::{Extent, Group, dot};
 use crate::scene::Scene;
@@ -131,7 +132,7 @@ impl Builder<'_, '_, '_> {
         let mut count = 1;
         parts[0] = (from, upto, 0.0);
         while count < 8 {
-            // first parts that do not fit into one node, then those whose lights all fit into this one
+            // parts that do not fit into one node, then those whose lights all find room in this one
             let large = parts.iter().take(count).any(|(a, b, _)| b - a > 8);
             let may_split = |n: usize| if large { n > 8 } else { n > 1 && count + n - 1 <= 8 };
             let candidates = parts.iter().take(count).enumerate().filter(|(_, (a, b, _))| may_split(b - a));
@@ -227,8 +228,8 @@ impl Builder<'_, '_, '_> {
         if middle > from && middle < upto { middle } else { half }
     }
 
-    /// Parts at most [`FEW`] lights at a multiple of eight, so that nodes below are full; where the second part begins.
-    /// `None` if all have one place.
+    /// Parts at most [`FEW`] lights at a multiple of eight from either end, so that nodes below are full; where the second
+    /// part begins. `None` if they fit into one node, or all have one place.
     fn split_few(&mut self, from: usize, upto: usize, side: [f32; 3], longest: f32) -> Option<usize> {
         let mut lights = [(0, [0.0; 3], Sum::EMPTY); FEW];
         let lights = lights.get_mut(..upto - from)?;
@@ -247,7 +248,8 @@ impl Builder<'_, '_, '_> {
         let mut best: Option<(f32, usize, usize)> = None;
         for axis in (0..3).filter(|a| side[*a] > 0.0) {
             sort(lights, axis);
-            for place in (8..lights.len()).step_by(8) {
+            let n = lights.len();
+            for place in (8..n).step_by(8).flat_map(|k| [k, n - k]) {
                 let (below, above) = lights.split_at_checked(place)?;
                 let cost = (cost_of(below) + cost_of(above)) * longest / side[axis];
                 if best.is_none_or(|(least, ..)| cost < least) {
