@@ -1,13 +1,13 @@
 //! Light trees from lights, in the caller's memory.
 //!
 //! A node takes the range of lights that it was given and splits it in two, always the part that costs most of those with
-//! more than eight lights, until there are eight parts or none is that large. If there is room left, lights of smaller parts
-//! become its children one by one, where all of a part find room. Splits are those with the least cost among twelve places on each axis: weight times surface
-//! area of the box times solid angle that the lights emit into, regularised by the shape of the box (Conty Estevez
-//! and Kulla 2018, section 4.1; equation 2). Parts of at most 64 lights are split at multiples of
-//! eight, counted from either end, so that most of the lowest nodes are full, which halves the tree. Parts that would make
-//! the tree too deep are halved. What the nodes say of their children is written afterwards ([`light_node_of`]), by what
-//! edits use, too.
+//! more than eight lights, until there are eight parts or none is that large. If there is room left, lights of smaller
+//! parts become its children one by one, where all of a part find room. Splits are those with the least cost among twelve
+//! places on each axis: weight times surface area of the box times solid angle that the lights emit into, regularised by
+//! the shape of the box (Conty Estevez and Kulla 2018, section 4.1; equation 2). Parts of at most 64 lights are split at
+//! multiples of eight, counted from either end, so that most of the lowest nodes are full, which halves the tree. Parts
+//! that would make the tree too deep are halved. What the nodes say of their children is written afterwards
+//! ([`light_node_of`]), by what edits use, too.
 
 use super::extent::{Extent, Group, dot};
 use crate::scene::Scene;
