@@ -141,7 +141,7 @@ pub mod unstable {
     pub use crate::record::ResumeError;
     pub use crate::sampler::{Numbers8, Sampler};
     pub use crate::scene::Effects;
-    pub use crate::session::Phase;
+    pub use crate::session::{Phase, Unguided};
     pub use crate::setting::{SettingInfo, SettingRange, SettingValue};
     pub use crate::settings::{MAX_PATH_LENGTH, MIN_RING};
     pub use crate::tracer::{BYTES_PER_PATH, MAX_PASSED};

@@ -34,6 +34,9 @@ pub trait Profile {
     const LIGHT_TREES: bool = true;
     /// Do the kernels contain path guiding ([`Learning::guiding`](crate::unstable::learn::Learning::guiding))?
     const GUIDING: bool = false;
+    /// The same kernels without path guiding. Shards run them in iterations in which they neither guide paths nor learn to,
+    /// so that both sets are compiled into a program.
+    type Unguided: Profile;
 }
 
 /// The profile `P` without [`Sampler::Sobol`](crate::unstable::Sampler::Sobol), the default: smaller code, for settings
@@ -47,6 +50,7 @@ impl<P: Profile> Profile for WithoutSobol<P> {
     const SOBOL: bool = false;
     const LIGHT_TREES: bool = P::LIGHT_TREES;
     const GUIDING: bool = P::GUIDING;
+    type Unguided = WithoutSobol<P::Unguided>;
 }
 
 /// The profile of exactly these effects, given by [`Effects`]' bits, without light trees.
@@ -57,6 +61,7 @@ impl<const EFFECTS: u32> Profile for Custom<EFFECTS> {
     const EFFECTS: Effects = Effects(EFFECTS);
     const NAME: &'static str = "custom";
     const LIGHT_TREES: bool = false;
+    type Unguided = Self;
 }
 
 /// The profile `P` with path guiding, in builds with the crate's feature `guiding`.
@@ -69,6 +74,7 @@ impl<P: Profile> Profile for Guided<P> {
     const SOBOL: bool = P::SOBOL;
     const LIGHT_TREES: bool = P::LIGHT_TREES;
     const GUIDING: bool = cfg!(feature = "guiding");
+    type Unguided = P::Unguided;
 }
 
 /// Code to run with a profile that is chosen at run time; see [`AnyProfile::dispatch`].
@@ -89,6 +95,7 @@ macro_rules! profiles {
 
             impl Profile for $profile {
                 const EFFECTS: Effects = $effects;
+                type Unguided = Self;
                 const NAME: &'static str = $name;
             }
         )*

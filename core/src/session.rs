@@ -103,6 +103,18 @@ pub struct SessionView<
     profile: PhantomData<P>,
 }
 
+/// What kernels without path guiding see of a session or its view; see [`World::unguided`].
+#[derive(Clone, Copy, Debug)]
+pub struct Unguided<'a, P: Profile, I: Intersector, L: LightSelector, X: Extension> {
+    scene: Scene<'a>,
+    intersector: &'a I,
+    selector: &'a L,
+    extension: &'a X,
+    state: &'a SessionState<'a>,
+    camera_media: u32,
+    profile: PhantomData<P>,
+}
+
 /// The replaceable parts of a session; see [`Session::builder`].
 #[derive(Clone, Copy, Debug)]
 pub struct SessionBuilder<
@@ -250,15 +262,14 @@ fn with_surfaces<I: Intersector>(scene: Scene<'_>) -> Scene<'_> {
 }
 
 fn check_effects<P: Profile, X: Extension>(scene: &Scene<'_>) -> Result<(), SessionError> {
-    let kernels = effects::<P, X>();
     let wanted = if X::POINTS { scene.effects.with(Effects::DIFFUSE) } else { scene.effects };
-    let missing = wanted.without(kernels);
-    if kernels.contains(wanted) { Ok(()) } else { Err(SessionError::Profile { missing }) }
+    let missing = wanted.without(effects::<P, X>()).with(wanted.without(effects::<P::Unguided, X>()));
+    if missing == Effects(0) { Ok(()) } else { Err(SessionError::Profile { missing }) }
 }
 
 fn check_sampler<P: Profile>(plan: &Plan) -> Result<(), SessionError> {
     match plan.settings().sampler {
-        missing @ Sampler::Sobol if !P::SOBOL => Err(SessionError::Sampler { missing }),
+        missing @ Sampler::Sobol if !(P::SOBOL && P::Unguided::SOBOL) => Err(SessionError::Sampler { missing }),
         _ => Ok(()),
     }
 }
@@ -298,9 +309,9 @@ impl<'s, 'm> Session<'s, 'm> {
     }
 }
 
-/// Both show shards the same.
+/// All show shards the same.
 macro_rules! worlds {
-    ($($World:ty, $camera_media:expr;)*) => {$(
+    ($($World:ty, $Unguided:ty, $camera_media:expr;)*) => {$(
         impl<P: Profile, I: Intersector, L: LightSelector, X: Extension> Sealed for $World {}
 
         impl<P: Profile, I: Intersector, L: LightSelector, X: Extension> World for $World {
@@ -310,6 +321,20 @@ macro_rules! worlds {
             type Intersector = I;
             type Lights = L;
             type Extension = X;
+            type Unguided<'w> = Unguided<'w, $Unguided, I, L, X> where Self: 'w;
+
+            #[inline(always)]
+            fn unguided(&self) -> Self::Unguided<'_> {
+                Unguided {
+                    scene: *self.scene(),
+                    intersector: &self.intersector,
+                    selector: &self.selector,
+                    extension: &self.extension,
+                    state: &self.state,
+                    camera_media: self.camera_media(),
+                    profile: PhantomData,
+                }
+            }
 
             #[inline(always)]
             fn scene(&self) -> &Scene<'_> {
@@ -365,8 +390,9 @@ macro_rules! worlds {
 }
 
 worlds! {
-    Session<'_, '_, P, I, L, X>, |s: &Self| s.state.camera_media;
-    SessionView<'_, '_, P, I, L, X>, |s: &Self| s.camera_media;
+    Session<'_, '_, P, I, L, X>, P::Unguided, |s: &Self| s.state.camera_media;
+    SessionView<'_, '_, P, I, L, X>, P::Unguided, |s: &Self| s.camera_media;
+    Unguided<'_, P, I, L, X>, P, |s: &Self| s.camera_media;
 }
 
 impl<'m, P: Profile, I: Intersector, L: LightSelector, X: Extension> Deref for Session<'_, 'm, P, I, L, X> {
@@ -524,9 +550,14 @@ impl<'m> SessionState<'m> {
         self.learned.guide_use()
     }
 
-    /// See [`Self::guide`]. Whatever is loaded changes efficiency only. Not while an iteration runs: `None` then.
+    /// See [`Self::guide`]. Whatever is loaded changes efficiency only; whether it pays is open again. Not while an iteration
+    /// runs: `None` then.
     pub fn guide_mut(&mut self) -> Option<&mut Guide<'m>> {
-        if self.running { None } else { self.learned.guide_mut() }
+        if self.running {
+            return None;
+        }
+        self.learned.forget_doubts();
+        self.learned.guide_mut()
     }
 
     /// The estimate of the pixels that the strategy works with, rgb planes; `None` if it needs none, or before the end

@@ -117,6 +117,7 @@ pub(crate) fn scene<R>(f: impl FnOnce(&Scene<'_>) -> R) -> R {
 }
 
 /// Every triangle against every ray, in f64.
+#[derive(Clone, Copy)]
 pub(crate) struct BruteForce<'a>(&'a Scene<'a>);
 
 impl BruteForce<'_> {
@@ -165,11 +166,12 @@ impl Intersector for BruteForce<'_> {
 }
 
 /// A world of all kernels over [`scene`].
+#[derive(Clone, Copy)]
 pub(crate) struct TestWorld<'a> {
     scene: &'a Scene<'a>,
     intersector: BruteForce<'a>,
     lights: PowerSelector<'a>,
-    learned: LearnedState<'a>,
+    learned: &'a LearnedState<'a>,
     iteration: Iteration,
     sampler: Sampler,
     max_depth: u32,
@@ -184,6 +186,14 @@ impl<'a> World for TestWorld<'a> {
     type Intersector = BruteForce<'a>;
     type Lights = PowerSelector<'a>;
     type Extension = ();
+    type Unguided<'w>
+        = Self
+    where
+        Self: 'w;
+
+    fn unguided(&self) -> Self {
+        *self
+    }
 
     fn scene(&self) -> &Scene<'_> {
         self.scene
@@ -202,7 +212,7 @@ impl<'a> World for TestWorld<'a> {
     }
 
     fn learned(&self) -> &LearnedState<'_> {
-        &self.learned
+        self.learned
     }
 
     fn iteration(&self) -> Iteration {
@@ -252,7 +262,7 @@ pub(crate) fn world<R>(change: impl FnOnce(&mut Settings), f: impl FnOnce(&TestW
             scene,
             intersector: BruteForce(scene),
             lights: PowerSelector(*scene),
-            learned,
+            learned: &learned,
             iteration: Iteration { number: 1, first_sample: 0, samples: 4 },
             sampler: settings.sampler,
             max_depth: settings.max_depth,

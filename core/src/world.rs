@@ -49,7 +49,15 @@ pub trait World: sealed::Sealed {
     type Lights: LightSelector;
     /// What the host computes.
     type Extension: Extension;
+    /// What [`Self::unguided`] gives.
+    type Unguided<'w>: World
+    where
+        Self: 'w;
 
+    /// The same for kernels without path guiding, of the profile
+    /// [`Profile::Unguided`](crate::profile::Profile::Unguided): what shards trace with that neither guide paths nor learn
+    /// to.
+    fn unguided(&self) -> Self::Unguided<'_>;
     /// The scene.
     fn scene(&self) -> &Scene<'_>;
     /// What finds hits.

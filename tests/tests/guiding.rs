@@ -202,6 +202,35 @@ fn all_pixels_are_learned_from_at_first() {
     assert!(all > 10_000.0 && (some / all - 1.0).abs() < 0.05, "{some} directions, not {all}");
 }
 
+/// Once some iterations have shown no gain, one of the shards trains the guide, another one in each iteration, until
+/// another guide is loaded; logs of few entries count what they are offered. Killed by: shards that all train, or none;
+/// doubts that outlive the guide; turns that depend on steps.
+#[test]
+fn shards_take_turns_where_guiding_does_not_pay() {
+    let scene = blob(&cornell([64, 64]));
+    let mut s = Settings { shards: 8, ..guided(&scene, "ears", 4) };
+    (s.learning.guiding, s.learning.guide_bytes) = (Guiding::Auto, 64 << 10);
+    let offered = |schedule| {
+        let mut all = vec![];
+        let image = learning(&scene, &s, &[16; 11], schedule, &mut |i, l| {
+            assert!(!l.guide_use().expect("a guide that is watched").enabled);
+            let (guide, _, thinned) = l.guide().expect("a guide");
+            all.push(thinned as f64);
+            if i == 9 {
+                l.load_guide(&guide).expect("a guide of this scene");
+            }
+        });
+        // from 0 again when a guide is loaded
+        let offered: Vec<_> = (1..11).map(|i| all[i] - if i == 10 { 0.0 } else { all[i - 1] }).collect();
+        (image.bits(), offered)
+    };
+    let (bits, some) = offered(IN_ORDER);
+    let all = some[0];
+    assert!(all > 50_000.0 && some[9] > 0.7 * all, "{some:?}");
+    assert!(some[3..9].iter().all(|n| (0.07..0.2).contains(&(n / all))), "{some:?}");
+    assert!(offered(Schedule::Threads(3, 64)) == (bits, some), "other bits");
+}
+
 /// Where light comes through glass the guide is enabled, and the mean stays. Killed by: a gain that no guide reaches, a
 /// decision that goes with the samples of the iteration that it is for.
 #[test]

@@ -162,6 +162,17 @@ impl<'m> LearnedState<'m> {
         (cache, self.guide.as_mut().filter(|_| COMPILED))
     }
 
+    /// Does shard `index` of `shards` guide paths, or learn to, in iteration `iteration`?
+    #[inline(always)]
+    pub(crate) fn trains(&self, iteration: u64, shard: [u32; 2]) -> bool {
+        self.guide().is_some() && (!self.watches() || self.watch.trains(iteration, shard))
+    }
+
+    /// The guide is another one now.
+    pub(crate) fn forget_doubts(&mut self) {
+        self.watch.forget_doubts();
+    }
+
     /// Is the guide watched, whether it pays?
     #[inline(always)]
     pub(crate) fn watches(&self) -> bool {
@@ -174,10 +185,10 @@ impl<'m> LearnedState<'m> {
         !self.watches() || self.watch.enabled()
     }
 
-    /// Does the guide learn from all samples with a record of a packet, the first of which has this key, guided or not?
+    /// Does the guide learn from all samples with a record, guided or not?
     #[inline(always)]
-    pub(crate) fn teaches(&self, key: [u32; 2]) -> bool {
-        self.watches() && self.watch.teaches(self.trial, key)
+    pub(crate) fn all_teach(&self) -> bool {
+        self.watches() && self.watch.all_teach(self.trial)
     }
 
     /// Are samples of the pixel in column and row `at` guided in iteration `iteration`?

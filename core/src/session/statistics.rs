@@ -22,15 +22,17 @@ impl<'m> SessionState<'m> {
         saved::save(self.cache(), self.guide(), out)
     }
 
-    /// Replaces what was learned of the scene by saved bytes; a guide with less room takes what fits. Whatever is loaded
-    /// changes efficiency only. After an error all is as before.
+    /// Replaces what was learned of the scene by saved bytes; a guide with less room takes what fits, and whether
+    /// guiding pays is open again. Whatever is loaded changes efficiency only. After an error all is as before.
     ///
     /// # Errors
     /// Bytes that are damaged, or of another scene or objective; [`CacheError::Absent`] if they hold nothing that this
     /// session learns, or an iteration runs.
     pub fn load_statistics(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
         let (cache, guide) = self.changed_statistics();
-        saved::load(cache, guide, bytes)
+        saved::load(cache, guide, bytes)?;
+        self.learned.forget_doubts();
+        Ok(())
     }
 
     /// Adds saved bytes to what was learned of the scene, and as much of their detail as there is room for.

@@ -75,10 +75,7 @@ pub(super) fn draw<'a, 'm: 'a, W: World>(
     world: &W,
     samples: &Samples8,
 ) -> Option<Guided8<'a, 'm>> {
-    // whole packets, because one lane costs what eight do
-    let first = samples.active.lanes().next().unwrap_or(0);
-    let teaches = world.learned().teaches([samples.key.lo, samples.key.hi].map(|w| w.lane(first)));
-    let learned = if teaches { samples.active } else { samples.guided };
+    let learned = if world.learned().all_teach() { samples.active } else { samples.guided };
     let recorded = learned.and_not(samples.path.record.eq(U32x8::splat(NO_RECORD)));
     let asked = samples.continues & (samples.guided | recorded);
     if samples.class.is_delta() || asked.none() {

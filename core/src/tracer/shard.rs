@@ -198,8 +198,22 @@ impl<'m> Shard<'m> {
             self.state.book.clear_some();
             cleared += 1;
         }
+        let (rays, iteration) = (budget.rays - cleared, world.iteration().number);
+        if W::GUIDING && world.learned().trains(iteration, [self.index, self.job.settings.shards]) {
+            self.trace(world, rays)
+        } else {
+            // one copy of the kernels for sessions and views, with a guide and without; light paths, which they do not
+            // trace, are left in forged records alone
+            self.state.light_packets = 0;
+            self.trace(&world.unguided(), rays)
+        }
+    }
+
+    /// Traces so many rays, or to the end of the iteration.
+    #[inline(always)]
+    fn trace<W: World>(&mut self, world: &W, rays: u64) -> StepResult {
         let start = self.state.book.counters.work();
-        while self.state.book.counters.work() - start + cleared < budget.rays {
+        while self.state.book.counters.work() - start < rays {
             if !turn(world, &self.job, self.index, &mut self.state) {
                 return StepResult::Done;
             }

@@ -100,6 +100,8 @@ impl<'m> State<'m> {
 mod tests {
     use super::*;
     use crate::testing::world;
+    use crate::world::World;
+    use crate::{Budget, StepResult};
 
     /// A record of a shard without a guide has no light paths left. Killed by: a number that is believed, which no step
     /// would ever work off.
@@ -114,6 +116,19 @@ mod tests {
                     shard.state.resume(&job, 0, world.iteration(), &forged).is_some()
                 };
                 assert!(resumes(0) && !resumes(1) && !resumes(1 << 32));
+            },
+        );
+    }
+
+    /// A shard whose kernels trace no light paths is done without them. Killed by: a shard that waits for them for ever.
+    #[test]
+    fn forged_light_paths_are_left_out() {
+        world(
+            |_| (),
+            |world, shard| {
+                shard.state.light_packets = 7;
+                while shard.step(world, Budget { rays: 1000 }) == StepResult::More {}
+                assert!(shard.is_done(world.identity()));
             },
         );
     }

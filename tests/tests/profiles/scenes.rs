@@ -16,6 +16,7 @@ struct Exactly<const EFFECTS: u32>;
 impl<const EFFECTS: u32> Profile for Exactly<EFFECTS> {
     const EFFECTS: Effects = Effects(EFFECTS);
     const NAME: &'static str = "exactly";
+    type Unguided = Self;
 }
 
 /// Renders a scene with a profile, settings and numbers of samples.

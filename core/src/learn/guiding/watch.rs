@@ -13,10 +13,9 @@
 //! the gain: they would not find what a guide would.
 //!
 //! The guide is disabled while no gain is proven: then the pixels of some blocks are guided, others in each iteration. In
-//! small pictures all packets teach it at first, so that it finds the sooner what it can gain, and one in four once a few
-//! iterations have shown none; in others, and once a gain is out of the question, the pixels of the blocks alone do.
-//! Packets that neither teach nor have guided samples cost what they cost without guiding. It is enabled while the gain
-//! lasts.
+//! small pictures all others teach it too, so that it finds the sooner what it can gain, unless a gain is out of the
+//! question. Once a few iterations have shown none, one shard in [`TURNS`] goes on so, another one in each iteration; the
+//! rest run kernels without guiding and cost what they cost without a guide. It is enabled while the gain lasts.
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing)]
 
 use crate::film::SqrtNewton;
@@ -33,13 +32,12 @@ const ENABLED_ABOVE: f64 = 1.08;
 const DOUBT: f64 = 0.25;
 /// Gain below which it is disabled again.
 const DISABLED_BELOW: f64 = 1.04;
-/// Pixels that are guided at first (in small pictures half as many), and after a gain is out of the question (in small
-/// pictures as soon as it is in doubt, [`PATIENCE`]), within the bounds [`MOST`] and [`LEAST`]. A guided pixel costs some of
-/// what Sobol' points gain, because its samples have a sequence of their own in each iteration; what they tell of the gain
-/// depends on their number, not on the size of the picture.
+/// Pixels that are guided at first (in small pictures half as many), and after a gain is out of the question, within the
+/// bounds [`MOST`] and [`LEAST`], were all shards to take part. A guided pixel costs some of what Sobol' points gain, because
+/// its samples have a sequence of their own in each iteration; what they tell of the gain depends on their number, not on
+/// the size of the picture.
 const WANTED: [u64; 2] = [4096, 1024];
-/// Most pixels of a small picture: at first all of them teach the guide (in doubt those of some packets, [`TEACHING`]), and
-/// half as many as [`WANTED`] are guided. In larger ones they would crowd out of the logs what guided pixels find, of which
+/// Most pixels of a small picture: all of them teach the guide, and half as many as [`WANTED`] are guided. In larger ones they would crowd out of the logs what guided pixels find, of which
 /// each contribution tells more: with a larger limit `render --size 960x540 --spp 12` of `pool` has more error.
 const SMALL: u64 = 65_536;
 /// Largest shares of the pixels that those may be, in 65536ths.
@@ -48,7 +46,7 @@ const MOST: [u32; 2] = [65_536 / 2, 65_536 / 32];
 const LEAST: u32 = 65_536 / 256;
 /// Binary logarithm of the edge of a block.
 const BLOCK_BITS: u32 = 3;
-/// Contributions, older ones discounted, that a guide has learned from before its gain is out of the question: some sixteen
+/// Contributions, older ones discounted, that a guide has learned from before its gain is in doubt: some sixteen
 /// leaves have been subdivided. Where light is found often that takes an iteration or two, where it is rare many, and there
 /// guides gain most.
 pub(crate) const ENOUGH: f32 = 65_536.0;
@@ -148,8 +146,8 @@ pub(crate) struct Watch {
     promise: Promise,
     /// Not 0: all pixels are guided.
     enabled: u32,
-    /// Iterations one after the other that have shown no gain, [`PATIENCE`] at most; [`UNPROMISING`] if one is out of the
-    /// question.
+    /// Iterations one after the other that have shown no gain, [`PATIENCE`] at most, one fewer while the guide knows little;
+    /// [`UNPROMISING`] if one is out of the question.
     doubts: u32,
 }
 
@@ -158,9 +156,9 @@ const UNPROMISING: u32 = u32::MAX;
 /// Iterations without a gain after which one is in doubt.
 const PATIENCE: u32 = 3;
 
-/// Part of the packets that teach the guide in a small picture while a gain is in doubt. With all of them, and twice the
-/// guided pixels, renders that are never guided take 4 % more time (mean of five scenes, `benches/EFFICIENCY.md`).
-const TEACHING: f32 = 0.25;
+/// In one of so many iterations, or of as many as there are shards, a shard goes on once a gain is in doubt. A shard that does
+/// may take a quarter more time: with 8, `veach_mis` took 3 % more than without guiding.
+const TURNS: u32 = 16;
 
 /// Shares of the blocks of pixels that are guided while the guide is disabled, in 65536ths: see [`WANTED`].
 #[derive(Clone, Copy, Debug)]
@@ -189,30 +187,32 @@ impl Watch {
         self.enabled != 0
     }
 
-    /// Part of the packets that teach the guide whether or not their pixels are guided; 0 in larger pictures, and unless it
-    /// is open whether the guide pays.
+    /// Does shard `index` of `shards` guide paths, or learn to, in iteration `iteration`? They take turns once a gain is in
+    /// doubt.
     #[inline(always)]
-    fn teaching(&self, shares: TrialShares) -> f32 {
-        match self.doubts {
-            _ if self.enabled() || !shares.small => 0.0,
-            UNPROMISING => 0.0,
-            PATIENCE.. => TEACHING,
-            _ => 1.0,
-        }
+    pub(crate) fn trains(&self, iteration: u64, [index, shards]: [u32; 2]) -> bool {
+        let turn = (iteration + u64::from(index)).is_multiple_of(shards.clamp(1, TURNS).into());
+        turn || self.enabled() || self.doubts < PATIENCE
     }
 
-    /// Is the packet with this key among those that teach the guide whether or not their pixels are guided?
+    /// The guide is another one now: what has not gained may.
+    pub(crate) fn forget_doubts(&mut self) {
+        self.doubts = 0;
+    }
+
+    /// Do shards that train the guide learn from all samples, guided or not? In small pictures only, and while it is open
+    /// whether the guide pays.
     #[inline(always)]
-    pub(crate) fn teaches(&self, shares: TrialShares, [lo, hi]: [u32; 2]) -> bool {
-        let random = mix(u64::from(hi) << 32 | u64::from(lo)) >> 40;
-        (random as f32) < self.teaching(shares) * 16_777_216.0
+    pub(crate) fn all_teach(&self, shares: TrialShares) -> bool {
+        shares.small && !self.enabled() && self.doubts != UNPROMISING
     }
 
     /// Part of the samples learned from that are guided, if so many of a guided pixel, and of another, are learned from.
     #[inline]
     pub(crate) fn guided_part(&self, shares: TrialShares, [guided, other]: [u32; 2]) -> f32 {
         let pixels = self.share(shares) as f32 / 65_536.0;
-        let (guided, other) = (pixels * guided as f32, (1.0 - pixels) * self.teaching(shares) * other as f32);
+        let other = if self.all_teach(shares) { other } else { 0 };
+        let (guided, other) = (pixels * guided as f32, (1.0 - pixels) * other as f32);
         guided / (guided + other).max(f32::MIN_POSITIVE)
     }
 
@@ -220,9 +220,7 @@ impl Watch {
     #[inline(always)]
     fn share(&self, shares: TrialShares) -> u32 {
         let [undecided, unpromising] = shares.shares;
-        // in larger pictures nothing but these pixels teaches the guide
-        let patience = if shares.small { PATIENCE } else { UNPROMISING };
-        if self.doubts < patience { undecided } else { unpromising }
+        if self.doubts == UNPROMISING { unpromising } else { undecided }
     }
 
     /// Is the pixel in this column and row guided in iteration `iteration`? Blocks, because samples of a
@@ -243,7 +241,7 @@ impl Watch {
         self.promise.gain()
     }
 
-    /// Decides about the next iteration. A gain is not out of the question before the guide has learned `enough`.
+    /// Decides about the next iteration. A gain is not in doubt before the guide has learned `enough`.
     pub(crate) fn decide(&mut self, decay: f64, enough: bool) {
         if let Some(GuideGain { gain, error }) = self.gain() {
             let least = if self.enabled() { DISABLED_BELOW } else { ENABLED_ABOVE };
@@ -252,7 +250,7 @@ impl Watch {
                 _ if self.enabled() => 0,
                 _ if enough && gain * (1.0 + 2.0 * error) < DISABLED_BELOW => UNPROMISING,
                 // one that was out of the question before is in doubt
-                n => n.saturating_add(1).min(PATIENCE),
+                n => n.saturating_add(1).min(if enough || n >= PATIENCE { PATIENCE } else { PATIENCE - 1 }),
             };
         }
         self.promise = self.promise.times(decay);
@@ -284,7 +282,7 @@ mod tests {
         for (enough, open) in [(false, true), (true, false), (true, false), (false, true)] {
             watch.add(&promise(100_000, 2.0));
             watch.decide(0.75, enough);
-            assert_eq!((watch.enabled(), watch.teaching(TrialShares::of([64, 64])) > 0.0), (false, open));
+            assert_eq!((watch.enabled(), watch.all_teach(TrialShares::of([64, 64]))), (false, open));
         }
     }
 
@@ -338,48 +336,70 @@ mod tests {
         }
     }
 
-    /// All packets of a small picture teach the guide at first, some while a gain is in doubt, none once it is found or out
-    /// of the question. Killed by: packets that are left out at first, or are not later, shares of guided samples that do
-    /// not know of them.
-    #[test]
-    fn fewer_packets_teach_a_guide_that_gains_nothing() {
-        let small = TrialShares::of([256, 256]);
-        let decided = |iterations, with, enough| {
-            let mut watch = Watch::default();
-            for _ in 0..iterations {
-                watch.add(&promise(100_000, with));
-                watch.decide(0.75, enough);
-            }
-            watch
-        };
-        for (watch, part) in [
-            (decided(2, 0.95, true), 1.0),
-            (decided(3, 0.95, true), 0.25),
-            (decided(1000, 0.95, false), 0.25),
-            (decided(3, 2.0, false), 0.25),
-            (decided(1, 2.0, true), 0.0),
-            (decided(1, 0.5, true), 0.0),
-        ] {
-            let teach = (0..1u32 << 16).filter(|&k| watch.teaches(small, [k.wrapping_mul(0x9e37_79b9), k])).count();
-            let (share, variance) = (teach as f64 / 65_536.0, part * (1.0 - part) / 65_536.0);
-            assert!((share - part).powi(2) <= 16.0 * variance, "{share}, not {part}: {watch:?}");
+    /// What is known after so many iterations, in each of which the guide has this promise.
+    fn after(iterations: u32, with: f32, enough: bool) -> Watch {
+        let mut watch = Watch::default();
+        for _ in 0..iterations {
+            watch.add(&promise(100_000, with));
+            watch.decide(0.75, enough);
         }
-        let mut again = decided(3, 2.0, true);
+        watch
+    }
+
+    /// All samples of a small picture teach the guide unless a gain is found or out of the question. Killed by: samples of
+    /// larger pictures that teach, some that do when all are guided, shares of guided samples that do not know of them.
+    #[test]
+    fn all_samples_of_small_pictures_teach_while_a_gain_is_open() {
+        let (small, large) = (TrialShares::of([256, 256]), TrialShares::of([512, 256]));
+        for (watch, teach) in [
+            (Watch::default(), true),
+            (after(3, 0.95, true), true),
+            (after(1000, 0.95, false), true),
+            (after(3, 2.0, false), true),
+            (after(1, 2.0, true), false),
+            (after(1, 0.5, true), false),
+        ] {
+            assert_eq!((watch.all_teach(small), watch.all_teach(large)), (teach, false), "{watch:?}");
+        }
+        let mut again = after(3, 2.0, true);
         again.add(&promise(100_000, 2.0));
         again.decide(0.75, false);
-        assert_eq!(again.teaching(small), 0.25, "a gain that was out of the question is in doubt");
-        // one pixel in 64 is guided; 32 of its samples are learned from, and 8 of each other pixel in one packet of four
-        let part = decided(3, 0.95, true).guided_part(small, [32, 8]);
-        assert!((part - 4.0 / (4.0 + 63.0 * 0.25)).abs() < 1e-6, "{part}");
-        // larger pictures, which no other pixels teach, guide as many as before
-        let large = TrialShares::of([512, 256]);
-        for (shares, fewer) in [(small, true), (large, false)] {
-            let [undecided, unpromising] = shares.shares;
-            let wanted = if fewer { unpromising } else { undecided };
-            assert_eq!(decided(3, 0.95, true).share(shares), wanted, "{shares:?}");
-        }
-        assert_eq!(Watch::default().teaching(large), 0.0);
+        assert!(again.all_teach(small), "a gain that was out of the question is in doubt");
+        // one pixel in 32 is guided; 32 of its samples are learned from, and 8 of each other pixel
+        let part = after(3, 0.95, true).guided_part(small, [32, 8]);
+        assert!((part - 4.0 / (4.0 + 31.0)).abs() < 1e-6, "{part}");
+        assert_eq!(after(1, 2.0, true).guided_part(small, [32, 8]), 1.0);
         assert_eq!(Watch::default().guided_part(large, [32, 8]), 1.0);
+    }
+
+    /// In doubt, and when a gain is out of the question, each shard trains in one of sixteen iterations, or of as many as
+    /// there are shards, and as many do in each iteration. Killed by: turns while it is open whether a guide pays, when it does, or
+    /// before it knows anything; shards that never have a turn, or all at once; a guide that is never tried again.
+    #[test]
+    fn shards_take_turns_once_a_gain_is_in_doubt() {
+        let open = [Watch::default(), after(2, 0.95, true), after(9, 0.5, true), after(1000, 0.95, false)];
+        let all = |watch: &Watch| (0..99).all(|i| watch.trains(i, [i as u32 % 16, 16]));
+        assert_eq!(open.each_ref().map(all), [true; 4], "{open:?}");
+        let mut another = after(3, 0.95, true);
+        another.forget_doubts();
+        assert!(all(&another), "another guide may pay");
+        let mut less = after(3, 0.95, true);
+        less.add(&promise(100_000, 0.95));
+        less.decide(0.75, false);
+        // of one that trains in turns older contributions are discounted faster than others come
+        for watch in [after(3, 0.95, true), after(1, 2.0, true), less] {
+            for (shards, turns) in [(1, 1), (2, 2), (5, 5), (16, 16), (32, 16), (64, 16)] {
+                let trains = |iteration, shard| watch.trains(iteration, [shard, shards]);
+                for shard in 0..shards {
+                    let times = (5..5 + u64::from(turns)).filter(|&i| trains(i, shard)).count();
+                    assert_eq!(times, 1, "shard {shard} of {shards}");
+                }
+                for iteration in 5..25 {
+                    let trained = (0..shards).filter(|&shard| trains(iteration, shard)).count();
+                    assert_eq!(trained as u32, shards / turns, "iteration {iteration} of {shards} shards");
+                }
+            }
+        }
     }
 
     /// Killed by: a bound that does not hold, pixels of the two exchanged, a product that overflows.
