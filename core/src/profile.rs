@@ -34,8 +34,8 @@ pub trait Profile {
     const LIGHT_TREES: bool = true;
     /// Do the kernels contain path guiding ([`Learning::guiding`](crate::unstable::learn::Learning::guiding))?
     const GUIDING: bool = false;
-    /// The same kernels without path guiding. Shards run them in iterations in which they neither guide paths nor learn to,
-    /// so that both sets are compiled into a program.
+    /// The same kernels without path guiding: `Self` for profiles that have none. Shards run them in iterations in which they
+    /// neither guide paths nor learn to, so that a program has both. Scenes and samplers outside either are refused.
     type Unguided: Profile;
 }
 

@@ -275,6 +275,7 @@ fn check_sampler<P: Profile>(plan: &Plan) -> Result<(), SessionError> {
 }
 
 fn check_guiding<P: Profile>(plan: &Plan) -> Result<(), SessionError> {
+    const { assert!(!P::Unguided::GUIDING, "the kernels without path guiding have path guiding") };
     if P::GUIDING || !plan.settings().guides() { Ok(()) } else { Err(SessionError::Guiding) }
 }
 
@@ -550,14 +551,9 @@ impl<'m> SessionState<'m> {
         self.learned.guide_use()
     }
 
-    /// See [`Self::guide`]. Whatever is loaded changes efficiency only; whether it pays is open again. Not while an iteration
-    /// runs: `None` then.
+    /// See [`Self::guide`]. Whatever is loaded changes efficiency only. Not while an iteration runs: `None` then.
     pub fn guide_mut(&mut self) -> Option<&mut Guide<'m>> {
-        if self.running {
-            return None;
-        }
-        self.learned.forget_doubts();
-        self.learned.guide_mut()
+        if self.running { None } else { self.learned.guide_mut() }
     }
 
     /// The estimate of the pixels that the strategy works with, rgb planes; `None` if it needs none, or before the end

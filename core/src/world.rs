@@ -56,7 +56,7 @@ pub trait World: sealed::Sealed {
 
     /// The same for kernels without path guiding, of the profile
     /// [`Profile::Unguided`](crate::profile::Profile::Unguided): what shards trace with that neither guide paths nor learn
-    /// to.
+    /// to, all of them where there is no guide.
     fn unguided(&self) -> Self::Unguided<'_>;
     /// The scene.
     fn scene(&self) -> &Scene<'_>;

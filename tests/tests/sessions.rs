@@ -1,9 +1,9 @@
 //! Memory, settings and the order of calls: what is wrong is an error with its number, and what was rendered stays.
 
-use croupier::unstable::Effects;
 use croupier::unstable::accel::WideBvh;
 use croupier::unstable::learn::Learning;
-use croupier::unstable::profile::{DiffuseOnly, Profile};
+use croupier::unstable::profile::{DiffuseOnly, Full, Profile, WithoutSobol};
+use croupier::unstable::{Effects, Sampler};
 use croupier::{
     BLOCK_ALIGN, Budget, MemoryError, Plan, Scene, Session, SessionError, Settings, SettingsError, Shard, ShardError,
     StepResult,
@@ -12,6 +12,7 @@ use croupier_host::blob::AlignedBytes;
 use croupier_host::description::{Emitter, Model};
 use croupier_tests::runner::{finish, render, settings};
 use croupier_tests::scenes::{add_quad, blob, cornell, everything, facing_y, spot};
+use std::marker::PhantomData;
 
 type Start<'s, 'm> = Result<Session<'s, 'm, DiffuseOnly, WideBvh<'s>>, SessionError>;
 
@@ -183,6 +184,35 @@ fn a_profile_without_an_effect_refuses_the_scene() {
     for name in ["roughplastic", "dielectric", "environment map", "thin lens", "null"] {
         assert!(text.contains(name), "{text}");
     }
+}
+
+/// What both of its kernels have, with path guiding and without, a profile has. Killed by: a profile of which one half is
+/// not asked.
+#[test]
+fn both_kernels_of_a_profile_must_have_what_a_scene_calls_for() {
+    struct Halves<P, Q>(PhantomData<(P, Q)>);
+    impl<P: Profile, Q: Profile> Profile for Halves<P, Q> {
+        const EFFECTS: Effects = P::EFFECTS;
+        const NAME: &'static str = "halves";
+        const SOBOL: bool = P::SOBOL;
+        type Unguided = Q;
+    }
+    fn built<P: Profile, Q: Profile>(bytes: &[u8]) -> Option<SessionError> {
+        let scene = Scene::from_bytes(bytes).unwrap();
+        let plan = Plan::new(&Settings { sampler: Sampler::Sobol, ..Settings::for_scene(&scene) }).unwrap();
+        let mut shared = AlignedBytes::zeroed(plan.session().size);
+        Session::builder(scene).profile::<Halves<P, Q>>().build(&plan, shared.as_mut()).err()
+    }
+    let mut glass = spot(0.5, [8, 8]);
+    let material = glass.add_material("glass", Model::Dielectric { int_ior: 1.5, ext_ior: 1.0 });
+    add_quad(&mut glass, "glass", material, facing_y(1.0, 0.5, 1.0));
+    let (plain, glass) = (blob(&cornell([8, 8])), blob(&glass));
+    assert_eq!(built::<Full, DiffuseOnly>(&plain), None);
+    let missing = Some(SessionError::Profile { missing: Effects::DIELECTRIC });
+    assert_eq!([built::<Full, DiffuseOnly>(&glass), built::<DiffuseOnly, Full>(&glass)], [missing, missing]);
+    let missing = Some(SessionError::Sampler { missing: Sampler::Sobol });
+    let without = [built::<Full, WithoutSobol<Full>>(&plain), built::<WithoutSobol<Full>, Full>(&plain)];
+    assert_eq!(without, [missing, missing]);
 }
 
 /// The pixels of a session's film as bytes.

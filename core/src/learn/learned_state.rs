@@ -162,15 +162,15 @@ impl<'m> LearnedState<'m> {
         (cache, self.guide.as_mut().filter(|_| COMPILED))
     }
 
-    /// Does shard `index` of `shards` guide paths, or learn to, in iteration `iteration`?
+    /// Does shard `index` of `shards` guide paths, or learn to, in the next iteration or the one that runs?
     #[inline(always)]
-    pub(crate) fn trains(&self, iteration: u64, shard: [u32; 2]) -> bool {
-        self.guide().is_some() && (!self.watches() || self.watch.trains(iteration, shard))
+    pub(crate) fn trains(&self, shard: [u32; 2]) -> bool {
+        self.guide().is_some() && (!self.watches() || self.watch.trains(shard))
     }
 
-    /// The guide is another one now.
-    pub(crate) fn forget_doubts(&mut self) {
-        self.watch.forget_doubts();
+    /// Statistics were loaded: whether guiding pays is open again.
+    pub(crate) fn forget_gain(&mut self) {
+        self.watch = Watch::default();
     }
 
     /// Is the guide watched, whether it pays?

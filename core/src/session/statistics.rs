@@ -31,7 +31,7 @@ impl<'m> SessionState<'m> {
     pub fn load_statistics(&mut self, bytes: &[u8]) -> Result<(), CacheError> {
         let (cache, guide) = self.changed_statistics();
         saved::load(cache, guide, bytes)?;
-        self.learned.forget_doubts();
+        self.learned.forget_gain();
         Ok(())
     }
 

@@ -17,7 +17,6 @@
 //! that nothing fails.
 #![deny(clippy::indexing_slicing, clippy::arithmetic_side_effects)]
 
-use super::camera_rays::CameraCursor;
 use super::job::Job;
 use super::shard::Shard;
 use crate::counters::Counters;
@@ -369,7 +368,7 @@ impl Shard<'_> {
         let saved = SavedShard::check(bytes, self, world)?;
         saved.check_numbers()?;
         self.begin(world);
-        self.state.cursor = CameraCursor::finished();
+        self.stop();
         let book = &mut self.state.book;
         let [pixels, rays, aovs, records, shadows, log] = saved.parts;
         book.load(saved.header.pixels as usize, [pixels, rays, aovs]);

@@ -198,12 +198,12 @@ impl<'m> Shard<'m> {
             self.state.book.clear_some();
             cleared += 1;
         }
-        let (rays, iteration) = (budget.rays - cleared, world.iteration().number);
-        if W::GUIDING && world.learned().trains(iteration, [self.index, self.job.settings.shards]) {
+        let rays = budget.rays - cleared;
+        if W::GUIDING && world.learned().trains([self.index, self.job.settings.shards]) {
             self.trace(world, rays)
         } else {
-            // one copy of the kernels for sessions and views, with a guide and without; light paths, which they do not
-            // trace, are left in forged records alone
+            // sessions, views and profiles with path guiding and without share these kernels, so that they are compiled
+            // once; light paths, which they do not trace, are left in forged records alone
             self.state.light_packets = 0;
             self.trace(&world.unguided(), rays)
         }
