@@ -22,7 +22,7 @@ use crate::film::SqrtNewton;
 use crate::rng::mix;
 use bytemuck::{Pod, Zeroable};
 
-/// Gain, less a quarter of its standard error, from which on the guide is enabled. Vertices of a path that could be guided
+/// Gain, less some of its standard error ([`DOUBT`]), from which on the guide is enabled. Vertices of a path that could be guided
 /// one after the other count apart, so that pictures gain more than this ratio says; guided samples take more time, most
 /// where rays are cheap. The benchmark `guiding` shows all three. Where guiding is left alone, scenes promise 1.06 at most.
 const ENABLED_ABOVE: f64 = 1.08;
@@ -38,8 +38,9 @@ const DISABLED_BELOW: f64 = 1.04;
 /// its samples have a sequence of their own in each iteration; what they tell of the gain depends on their number, not on
 /// the size of the picture.
 const WANTED: [u64; 2] = [4096, 1024];
-/// Most pixels of a small picture: all of them teach the guide, and half as many as [`WANTED`] are guided. In larger ones they would crowd out of the logs what guided pixels find, of which
-/// each contribution tells more: with a larger limit `render --size 960x540 --spp 12` of `pool` has more error.
+/// Most pixels of a small picture: all of them teach the guide, and half as many as [`WANTED`] are guided. In larger ones
+/// they would crowd out of the logs what guided pixels find, of which each contribution tells more: with a larger limit
+/// `render --size 960x540 --spp 12` of `pool` has more error.
 const SMALL: u64 = 65_536;
 /// Largest shares of the pixels that those may be, in 65536ths.
 const MOST: [u32; 2] = [65_536 / 2, 65_536 / 32];
@@ -378,8 +379,8 @@ mod tests {
     }
 
     /// In doubt, and when a gain is out of the question, each shard trains in one of sixteen iterations, or of as many as
-    /// there are shards, and as many do in each iteration. Killed by: turns while it is open whether a guide pays, when it does, or
-    /// before it knows anything; shards that never have a turn, or all at once; a guide that is never tried again.
+    /// there are shards, and as many do in each iteration. Killed by: turns while it is open whether a guide pays, when it
+    /// does, or before it knows anything; shards that never have a turn, or all at once; a guide that is never tried again.
     #[test]
     fn shards_take_turns_once_a_gain_is_in_doubt() {
         let open = [Watch::default(), after(2, 0.95, true), after(9, 0.5, true), after(11, 0.95, false)];
