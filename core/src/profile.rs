@@ -95,8 +95,8 @@ macro_rules! profiles {
 
             impl Profile for $profile {
                 const EFFECTS: Effects = $effects;
-                type Unguided = Self;
                 const NAME: &'static str = $name;
+                type Unguided = Self;
             }
         )*
 

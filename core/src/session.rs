@@ -103,7 +103,8 @@ pub struct SessionView<
     profile: PhantomData<P>,
 }
 
-/// What kernels without path guiding see of a session or its view; see [`World::unguided`].
+/// What kernels without path guiding see of a session or its view; see [`World::unguided`]. Unlike a view it borrows what
+/// finds hits and chooses lights, so that both give the same type, and so does this.
 #[derive(Clone, Copy, Debug)]
 pub struct Unguided<'a, P: Profile, I: Intersector, L: LightSelector, X: Extension> {
     scene: Scene<'a>,

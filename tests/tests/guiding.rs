@@ -234,6 +234,20 @@ fn shards_take_turns_where_guiding_does_not_pay() {
     assert!(offered(Schedule::Threads(3, 64)) == (bits, some), "other bits");
 }
 
+/// Without a cache nothing but the guide learns: shards without a turn open no records, of which a small ledger counts those
+/// that it has no room for. Killed by: records that nobody reads.
+#[test]
+fn shards_without_a_turn_open_no_records_without_a_cache() {
+    let scene = blob(&cornell([32, 32]));
+    let mut s = Settings { shards: 8, ..guided(&scene, "classic", 4) };
+    (s.learning.guiding, s.learning.ledger) = (Guiding::Auto, 16);
+    let mut full = vec![];
+    learning(&scene, &s, &[8; 18], IN_ORDER, &mut |_, l| full.push(l.counters().ledger_full));
+    let of = |i: usize| full[i + 1] - full[i];
+    // in doubt after twelve iterations at most
+    assert!(of(0) > 1000 && (12..17).all(|i| of(i) < of(0) / 4), "{full:?}");
+}
+
 /// Where light comes through glass the guide is enabled, and the mean stays. Killed by: a gain that no guide reaches, a
 /// decision that goes with the samples of the iteration that it is for.
 #[test]

@@ -181,7 +181,8 @@ pub(super) fn camera_samples<W: World>(
         let samples = learned.samples_of_tile(tile);
         [samples, in_first_half(before, samples)]
     };
-    let learning = learned.learned_samples(false);
+    // none without a cache: nothing but the guide learns then, and it is not asked here
+    let unguided = learned.learned_samples(false);
     let mut guided_lanes = 0;
     let (mut x, mut y, mut pixel, mut sample) = ([0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8]);
     let mut first_halves = [0u32; 8];
@@ -196,7 +197,7 @@ pub(super) fn camera_samples<W: World>(
         }
         let (error_weight, share) = learned.error_weight(film);
         let mut target = PixelTarget::numbered(error_weight, share, film, next.pixel, s).with_half(next.half);
-        let mut learning = learning;
+        let mut learning = unguided;
         if W::GUIDING {
             let guided = learned.is_guided(iteration.number, p);
             target = target.with_guiding(guided);

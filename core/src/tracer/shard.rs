@@ -203,7 +203,7 @@ impl<'m> Shard<'m> {
             self.trace(world, rays)
         } else {
             // sessions, views and profiles with path guiding and without share these kernels, so that they are compiled
-            // once; light paths, which they do not trace, are left in forged records alone
+            // once; they trace no light paths, and only a forged record can have any left here
             self.state.light_packets = 0;
             self.trace(&world.unguided(), rays)
         }

@@ -22,9 +22,10 @@ use crate::film::SqrtNewton;
 use crate::rng::mix;
 use bytemuck::{Pod, Zeroable};
 
-/// Gain, less some of its standard error ([`DOUBT`]), from which on the guide is enabled. Vertices of a path that could be guided
-/// one after the other count apart, so that pictures gain more than this ratio says; guided samples take more time, most
-/// where rays are cheap. The benchmark `guiding` shows all three. Where guiding is left alone, scenes promise 1.06 at most.
+/// Gain, less some of its standard error ([`DOUBT`]), from which on the guide is enabled. Vertices of a path that could be
+/// guided one after the other count apart, so that pictures gain more than this ratio says; guided samples take more time,
+/// most where rays are cheap. The benchmark `guiding` shows all three. Scenes whose guide is not enabled promise 1.06 at
+/// most.
 const ENABLED_ABOVE: f64 = 1.08;
 /// Standard errors that the gain must lie above a bound, at first and once it was in doubt. A ratio of which few samples,
 /// those that found rare light, make the most has a standard error of the same size, and is most likely too small; one that
@@ -48,9 +49,9 @@ const MOST: [u32; 2] = [65_536 / 2, 65_536 / 32];
 const LEAST: u32 = 65_536 / 256;
 /// Binary logarithm of the edge of a block.
 const BLOCK_BITS: u32 = 3;
-/// Contributions, older ones discounted, that a guide has learned from before its gain is in doubt: some sixteen
-/// leaves have been subdivided. Where light is found often that takes an iteration or two, where it is rare many, and there
-/// guides gain most.
+/// Contributions, older ones discounted, that a guide has learned from before its gain is in doubt: some sixteen leaves have
+/// been subdivided. Where light is found often that takes an iteration or two, where it is rare many, and there guides gain
+/// most.
 pub(crate) const ENOUGH: f32 = 65_536.0;
 /// Samples before which nothing is decided.
 const FEWEST: f64 = 256.0;
@@ -161,8 +162,8 @@ const UNPROMISING: u32 = u32::MAX;
 /// Iterations without a gain after which one is in doubt: of a guide that has learned enough, and of any.
 const PATIENCE: [u32; 2] = [3, 12];
 
-/// In one of so many iterations, or of as many as there are shards, a shard goes on once a gain is in doubt. A shard that does
-/// may take a quarter more time: with 8, `veach_mis` took 3 % more than without guiding.
+/// A shard goes on in one of so many iterations, or of as many as there are shards, once a gain is in doubt. It may take a
+/// quarter more time then: with 8, `veach_mis` took 3 to 6 % more than without guiding (`benches/EFFICIENCY.md`).
 const TURNS: u32 = 16;
 
 /// Shares of the blocks of pixels that are guided while the guide is disabled, in 65536ths: see [`WANTED`].
@@ -390,10 +391,10 @@ mod tests {
         (0..11).for_each(|_| unknown.decide(0.75, false));
         assert!(all(&unknown), "no sample that tells of a gain");
         unknown.decide(0.75, false);
+        // with turns contributions are discounted faster than new ones come
         let mut less = after(3, 0.95, true);
         less.add(&promise(100_000, 0.95));
         less.decide(0.75, false);
-        // of one that trains in turns older contributions are discounted faster than others come
         for start in [after(3, 0.95, true), after(12, 0.95, false), after(1, 2.0, true), less, unknown] {
             for (shards, turns) in [(1, 1), (2, 2), (5, 5), (16, 16), (32, 16), (64, 16)] {
                 let trains = |turn, shard| Watch { turn, ..start }.trains([shard, shards]);
