@@ -7,9 +7,12 @@
 //!
 //! for each of eight shares g_k, one vector of eight lanes. Where pixels that are not guided teach too, m is the one mixture
 //! that all samples count as (`tracer/guided.rs`, `as_one_mixture`). q is that of an earlier iteration, so what it promises is
-//! not what it was fitted to. The share with the least moment is taken. Where few samples tell (by their effective
-//! number, (sum X^2)^2 / sum X^4) the moments are shrunk towards those of a useless guide, 1 / (1 - g_k) of that
-//! without it: little knowledge means BSDF sampling.
+//! not what it was fitted to. Where few samples tell (by their effective number, (sum X^2)^2 / sum X^4) the moments are
+//! shrunk towards those of a useless guide, 1 / (1 - g_k) of that without it: little knowledge means BSDF sampling.
+//!
+//! Not the share with the least moment is taken, but the largest one whose moment is at most [`TOLERANCE`] above it. X^2 has
+//! the noise of the rest of the path in it, most of it where light is found after several bounces, and there a direction
+//! matters little as long as the rest is noisy: each leaf by itself would not be guided, and all of them together gain.
 
 use bytemuck::{Pod, Zeroable};
 use croupier_simd::F32x8;
@@ -30,8 +33,11 @@ const PER_ARRIVAL: f32 = 0.25;
 /// Most effective samples that all of them count for.
 const MOST_PRIOR: f32 = 32.0;
 
-/// Smallest gain for which a leaf is guided: a guided sample evaluates the BSDF once more.
-const LEAST_GAIN: f64 = 0.02;
+/// How much more than the least moment a larger share may have. Below 1/7, so that a useless guide gets less than [`LEAST_SHARE`].
+const TOLERANCE: f64 = 0.1;
+
+/// Index of the smallest share of [`SHARES`] that is guided; a useless guide would be given the one below.
+const LEAST_SHARE: usize = 2;
 
 /// What a leaf has learned besides its directions.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -126,15 +132,10 @@ impl LeafSums {
             return 0;
         }
         // moments over that of the samples as they were drawn; a guide that helped makes that without it large
-        let shrunk = |(g, m): (&f32, f32)| known * f64::from(m) / square + PRIOR / (1.0 - f64::from(*g));
-        let mut all = SHARES.iter().zip(self.moments);
-        let (mut best, mut least) = (0.0, all.next().map_or(0.0, shrunk) * (1.0 - LEAST_GAIN));
-        for (g, m) in all {
-            let moment = shrunk((g, m));
-            if moment < least {
-                (best, least) = (*g, moment);
-            }
-        }
-        (best * 65_536.0) as u16
+        let shrunk = |g: f32, m: f32| known * f64::from(m) / square + PRIOR / (1.0 - f64::from(g));
+        let all: [f64; 8] = core::array::from_fn(|k| shrunk(SHARES[k], self.moments[k]));
+        let least = all.into_iter().fold(f64::INFINITY, f64::min);
+        let best = all.iter().rposition(|m| *m <= least * (1.0 + TOLERANCE)).filter(|k| *k >= LEAST_SHARE);
+        (best.map_or(0.0, |k| SHARES[k]) * 65_536.0) as u16
     }
 }

@@ -1,16 +1,16 @@
 //! The first lesson: what light paths have found, before camera paths have found anything.
 //!
 //! An arrival of power says where light comes from, so the density of a cell is in proportion to the power in it, which is
-//! the same as the root of the moment that [`super::rebuild`] learns, but known sooner. Logs keep an arrival's place, not
+//! the same as the contributions that [`super::rebuild`] adds up, but known sooner. Logs keep an arrival's place, not
 //! its leaf: octrees are subdivided first, a level at a time, then the arrivals are distributed. In the end the sums of power
-//! become moments, so that camera paths go on from there. Units do not agree: of power it is not known what it contributes.
-//! Together the moments of a leaf, and the squares that its share of guided samples is computed from, become what a few
-//! contributions of the picture's camera paths would have been, so that the leaf's own soon outweigh them.
+//! become sums of contributions, so that camera paths go on from there. Units do not agree: of power it is not known what it
+//! contributes. Together the masses of a leaf's cells, and the squares that its share of guided samples is computed from,
+//! become what a few contributions of the picture's camera paths would have been, so that the leaf's own soon outweigh them.
 #![deny(clippy::unwrap_used, clippy::expect_used)]
 
 use super::fraction::LeafSums;
 use super::log::GuideHit;
-use super::node::{self, CELLS, LEVELS, UNIFORM};
+use super::node::{self, LEVELS, UNIFORM};
 use super::shared::{Guide, Rebuild, SeenSums, UNIFORM_PDF};
 
 /// What is learned from: contributions of camera paths.
@@ -55,10 +55,10 @@ impl Guide<'_> {
         let first = r.source == COUNT && r.level == 0;
         let Some(arrival) = hit.arrival() else {
             if first {
-                let [square, pdf] = hit.square_and_pdf();
+                let [square, _] = hit.square_and_pdf();
                 r.seen.contributions += weight;
                 r.seen.square = (r.seen.square + square * weight).min(f32::MAX);
-                r.seen.moment = (r.seen.moment + square * pdf * weight).min(f32::MAX);
+                r.seen.sum = (r.seen.sum + hit.contribution() * weight).min(f32::MAX);
             }
             return;
         };
@@ -94,36 +94,24 @@ impl Guide<'_> {
         }
     }
 
-    /// Makes the powers of a leaf's cells, from its node `root` on, moments.
-    pub(super) fn become_moments(&mut self, root: u16) {
+    /// Makes the powers of a leaf's cells, from its node `root` on, contributions.
+    pub(super) fn become_contributions(&mut self, root: u16) {
         let seen = self.scalars.rebuild.seen;
-        let power = self.moment(root, 0);
-        if !(power > 0.0 && power.is_finite()) {
-            return;
+        let power = self.mass(root, 0);
+        if power > 0.0 && power.is_finite() {
+            self.scale_masses(root, 0, seen.mean(seen.sum) * CONTRIBUTIONS / power);
         }
-        let sum = self.square_of(root, 0, power, None);
-        let _ = self.square_of(root, 0, power, Some(seen.mean(seen.moment) * CONTRIBUTIONS / sum));
     }
 
-    /// Sum over the cells from a node on of the moments that give densities in proportion to their power: the square of its
-    /// share in the `power` of the leaf, over the cell's area. With `by` they become that, times `by`.
-    fn square_of(&mut self, index: u16, level: usize, power: f32, by: Option<f32>) -> f32 {
-        let Some(n) = self.nodes.get(index as usize).copied() else { return 0.0 };
-        let per_area = (1u32 << (4 * (level + 1))) as f32;
-        let mut sum = 0.0;
-        for cell in 0..CELLS {
-            if level + 1 < LEVELS && n.child[cell] != UNIFORM {
-                sum += self.square_of(n.child[cell], level + 1, power, by);
-            } else if let Some(s) = self.sums.get_mut(index as usize) {
-                let share = s.moment[cell] / power;
-                let moment = share * share * per_area;
-                sum += moment;
-                if let Some(by) = by {
-                    s.moment[cell] = (moment * by).min(f32::MAX);
-                }
-            }
+    /// Multiplies the masses of the cells from a node on.
+    fn scale_masses(&mut self, index: u16, level: usize, by: f32) {
+        let Some(node) = self.nodes.get(index as usize).copied().filter(|_| index != UNIFORM) else { return };
+        if let Some(s) = self.sums.get_mut(index as usize) {
+            s.mass.iter_mut().for_each(|m| *m = (*m * by).min(f32::MAX));
         }
-        sum
+        if level + 1 < LEVELS {
+            node.child.into_iter().for_each(|c| self.scale_masses(c, level + 1, by));
+        }
     }
 }
 

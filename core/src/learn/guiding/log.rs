@@ -10,6 +10,7 @@ use super::size::GuideSize;
 use crate::memory::{Carver, Layout, Measure, MemoryError};
 use crate::rng::mix;
 use bytemuck::{Pod, Zeroable};
+use croupier_simd::F32x8;
 
 /// No leaf: of samples that are not learned from.
 pub const NO_LEAF: u32 = u32::MAX;
@@ -60,6 +61,12 @@ impl GuideHit {
     /// Square of the contribution, and the density of the direction, 1/sr, both within 2^-7.
     pub(super) fn square_and_pdf(&self) -> [f32; 2] {
         [f32::from_bits(self.value & 0xffff_0000), f32::from_bits(self.value << 16)]
+    }
+
+    /// What the bounce contributed, over its density.
+    pub(super) fn contribution(&self) -> f32 {
+        let [square, _] = self.square_and_pdf();
+        F32x8::splat(square).sqrt().lane(0)
     }
 
     /// The arrival of a light path, if it is none of a camera path's directions.

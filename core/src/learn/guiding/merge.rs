@@ -85,13 +85,13 @@ impl Guide<'_> {
             let known = self.nodes.get(index as usize).map_or(UNIFORM, |n| n.child[cell]);
             let child = if level + 1 < LEVELS { known } else { UNIFORM };
             if !node.is_inner(cell) {
-                self.spread(index, level, cell, theirs.moment[cell] * share, f32::from(theirs.hits[cell]) * share);
+                self.spread(index, level, cell, theirs.mass[cell] * share, f32::from(theirs.hits[cell]) * share);
                 continue;
             }
             let child = if child == UNIFORM { self.refine(index, cell) } else { child };
             if child == UNIFORM {
-                let (moment, hits) = SavedNode::total(saved);
-                self.spread(index, level, cell, moment * share, hits * share);
+                let (mass, hits) = SavedNode::total(saved);
+                self.spread(index, level, cell, mass * share, hits * share);
             } else {
                 self.add_nodes(child, level + 1, saved, share);
             }
@@ -99,24 +99,24 @@ impl Guide<'_> {
     }
 
     /// Adds to a cell, or evenly to those of the node in it.
-    fn spread(&mut self, index: u16, level: usize, cell: usize, moment: f32, hits: f32) {
+    fn spread(&mut self, index: u16, level: usize, cell: usize, mass: f32, hits: f32) {
         let child = self.nodes.get(index as usize).map_or(UNIFORM, |n| n.child[cell]);
         if child == UNIFORM || level + 1 >= LEVELS {
             if let Some(sums) = self.sums.get_mut(index as usize) {
-                sums.merge(cell, moment, hits);
+                sums.merge(cell, mass, hits);
             }
             return;
         }
         let part = 1.0 / CELLS as f32;
-        (0..CELLS).for_each(|c| self.spread(child, level + 1, c, moment * part, hits * part));
+        (0..CELLS).for_each(|c| self.spread(child, level + 1, c, mass * part, hits * part));
     }
 
     /// Makes a cell a node that has learned the same everywhere; [`UNIFORM`] if there is no room.
     fn refine(&mut self, index: u16, cell: usize) -> u16 {
         let Some(child) = self.take_node() else { return UNIFORM };
-        let known = self.sums.get(index as usize).map_or((0.0, 0), |s| (s.moment[cell], s.hits[cell]));
+        let known = self.sums.get(index as usize).map_or((0.0, 0), |s| (s.mass[cell], s.hits[cell]));
         if let Some(sums) = self.sums.get_mut(child as usize) {
-            sums.moment = [known.0 / CELLS as f32; CELLS];
+            sums.mass = [known.0 / CELLS as f32; CELLS];
             sums.hits = [known.1 / CELLS as u16; CELLS];
         }
         if let Some(n) = self.nodes.get_mut(index as usize) {

@@ -1,13 +1,13 @@
 //! Path guiding: distributions of directions by position, learned from paths, that scattering samples besides the BSDF
-//! (Müller et al., "Practical Path Guiding for Efficient Light-Transport Simulation", 2017; the target is that of Rath
-//! et al., "Variance-Aware Path Guiding", 2020).
+//! (Müller et al., "Practical Path Guiding for Efficient Light-Transport Simulation", 2017).
 //!
 //! An octree divides the scene, apart for the six directions that a shading normal may mainly point in: the light that
 //! counts at a floor is not that of the ceiling above it. Vertices in media, which have no normal, have an octree of
 //! their own. A leaf has a tree over the sphere ([`sphere`] maps it to a square and keeps areas): nodes of 4x4 cells,
 //! at most three levels, so that cells are 64 x 64 where there is much light and 4 x 4 elsewhere. The density of a cell
-//! is in proportion to the root of the mean of (f cos L)^2 in it, what the bounce contributes for each steradian: that
-//! makes the second moment of the samples least.
+//! is in proportion to the mean of f cos L in it, what the bounce contributes for each steradian. The root of the mean
+//! square (Rath et al., "Variance-Aware Path Guiding", 2020) would make the second moment of the samples least if the rest
+//! of the paths stayed as noisy as it is, and if few samples told it; benches/EFFICIENCY.md has what it costs.
 //!
 //! Whatever the trees hold, densities are those with which directions are sampled, and the BSDF is sampled too, so
 //! pictures stay unbiased.

@@ -6,7 +6,6 @@
 #![deny(clippy::unwrap_used, clippy::expect_used)]
 
 use bytemuck::{Pod, Zeroable};
-use croupier_simd::F32x8;
 
 /// Cells of a node.
 pub(super) const CELLS: usize = 16;
@@ -127,9 +126,9 @@ pub(super) fn find(nodes: &[GuideNode], root: u16, point: u32) -> Cell {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct NodeSums {
-    /// Sums of squares over densities: (f cos L)^2 integrated over the cell, times the number of samples. Of cells
+    /// Sums of contributions: f cos L integrated over the cell, times the number of samples; mass of the cell. Of cells
     /// with a node, as it was when the node was made.
-    pub(super) moment: [f32; CELLS],
+    pub(super) mass: [f32; CELLS],
     /// Contributions behind them, older ones discounted.
     pub(super) hits: [u16; CELLS],
     /// Not 0: made in this iteration, learns from its log only.
@@ -138,43 +137,28 @@ pub(super) struct NodeSums {
 
 impl NodeSums {
     /// Nothing learned.
-    pub(super) const EMPTY: Self = Self { moment: [0.0; CELLS], hits: [0; CELLS], fresh: 0 };
+    pub(super) const EMPTY: Self = Self { mass: [0.0; CELLS], hits: [0; CELLS], fresh: 0 };
 
     /// Adds a contribution to a cell.
-    pub(super) fn add(&mut self, cell: usize, moment: f32) {
-        let (sum, hits) = (&mut self.moment[cell & (CELLS - 1)], &mut self.hits[cell & (CELLS - 1)]);
+    pub(super) fn add(&mut self, cell: usize, mass: f32) {
+        let (sum, hits) = (&mut self.mass[cell & (CELLS - 1)], &mut self.hits[cell & (CELLS - 1)]);
         // sums of numbers that were loaded may overflow
-        *sum = (*sum + moment).min(f32::MAX);
+        *sum = (*sum + mass).min(f32::MAX);
         *hits = hits.saturating_add(1);
     }
 
     /// Adds to a cell what others have learned of it.
-    pub(super) fn merge(&mut self, cell: usize, moment: f32, hits: f32) {
-        let (sum, all) = (&mut self.moment[cell & (CELLS - 1)], &mut self.hits[cell & (CELLS - 1)]);
-        *sum = (*sum + moment).min(f32::MAX);
+    pub(super) fn merge(&mut self, cell: usize, mass: f32, hits: f32) {
+        let (sum, all) = (&mut self.mass[cell & (CELLS - 1)], &mut self.hits[cell & (CELLS - 1)]);
+        *sum = (*sum + mass).min(f32::MAX);
         *all = (f32::from(*all) + hits) as u16;
     }
 
     /// Multiplies what was learned by `keep`, 0 to 1.
     pub(super) fn scale(&mut self, keep: f32) {
-        for (m, h) in self.moment.iter_mut().zip(&mut self.hits) {
+        for (m, h) in self.mass.iter_mut().zip(&mut self.hits) {
             *m *= keep;
             *h = (f32::from(*h) * keep) as u16;
         }
-    }
-
-    /// Masses of the cells without a node, on level `level`: roots of integrals of squares, times areas. Of sums of power
-    /// these themselves.
-    pub(super) fn masses(&self, level: usize, of_power: bool) -> [f32; CELLS] {
-        if of_power {
-            return self.moment;
-        }
-        let root_of_area = 1.0 / (1u32 << (2 * (level + 1))) as f32;
-        let root = |from: usize| {
-            let moment = F32x8::from_fn(|i| self.moment[from + i]);
-            (moment.max(F32x8::ZERO).sqrt() * root_of_area).to_array()
-        };
-        let (low, high) = (root(0), root(8));
-        core::array::from_fn(|i| if i < 8 { low[i] } else { high[i - 8] })
     }
 }

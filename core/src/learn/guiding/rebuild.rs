@@ -191,7 +191,7 @@ impl Guide<'_> {
         }
         let root = if first.is_some() { self.root_of(leaf) } else { self.frozen[leaf].root };
         if root != UNIFORM {
-            self.add_to_cell(root, hit.point, square * pdf * weight, first.is_some());
+            self.add_to_cell(root, hit.point, hit.contribution() * weight, first.is_some());
         }
     }
 
@@ -206,7 +206,7 @@ impl Guide<'_> {
     }
 
     /// Adds to the cell around a point of the square, from a node on; if not `always`, to nodes that are new only.
-    pub(super) fn add_to_cell(&mut self, root: u16, point: u32, moment: f32, always: bool) {
+    pub(super) fn add_to_cell(&mut self, root: u16, point: u32, mass: f32, always: bool) {
         let mut node = root;
         for level in 0..LEVELS {
             let cell = cell_at(point, level);
@@ -214,7 +214,7 @@ impl Guide<'_> {
             let child = n.child[cell];
             if child == UNIFORM {
                 if always || sums.fresh != 0 {
-                    sums.add(cell, moment);
+                    sums.add(cell, mass);
                 }
                 return;
             }
@@ -256,13 +256,13 @@ impl Guide<'_> {
         }
     }
 
-    /// Sum of the moments below a node.
-    pub(super) fn moment(&self, index: u16, level: usize) -> f32 {
+    /// Sum of the masses below a node.
+    pub(super) fn mass(&self, index: u16, level: usize) -> f32 {
         let Some((n, s)) = self.nodes.get(index as usize).zip(self.sums.get(index as usize)) else { return 0.0 };
         let below = level + 1 < LEVELS;
-        let one = |(c, m): (&u16, &f32)| if below && *c != UNIFORM { self.moment(*c, level + 1) } else { *m };
+        let one = |(c, m): (&u16, &f32)| if below && *c != UNIFORM { self.mass(*c, level + 1) } else { *m };
         // sums of numbers that were loaded may overflow
-        n.child.iter().zip(&s.moment).map(one).sum::<f32>().min(f32::MAX)
+        n.child.iter().zip(&s.mass).map(one).sum::<f32>().min(f32::MAX)
     }
 
     /// Masses of the cells of a node on level `level`, those of nodes below included.
@@ -270,7 +270,7 @@ impl Guide<'_> {
         let Some((n, s)) = self.nodes.get(index as usize).zip(self.sums.get(index as usize)) else {
             return [0.0; CELLS];
         };
-        let mut masses = s.masses(level, self.scalars.rebuild.source == LIGHT);
+        let mut masses = s.mass;
         if level + 1 < LEVELS {
             for (mass, child) in masses.iter_mut().zip(n.child).filter(|(_, c)| *c != UNIFORM) {
                 *mass = self.masses(child, level + 1).iter().sum();
@@ -297,24 +297,24 @@ impl Guide<'_> {
         let mut visited = 0;
         self.freeze_node(root, 0, total, grow, &mut visited);
         if last_of_light {
-            self.become_moments(root);
+            self.become_contributions(root);
             visited *= 2;
         }
         4 * visited
     }
 
-    /// Gives nodes that are new the moment of the cell that they were.
+    /// Gives nodes that are new the mass of the cell that they were.
     fn settle(&mut self, index: u16, level: usize) {
         let Some(node) = self.nodes.get(index as usize).copied().filter(|_| level + 1 < LEVELS) else { return };
         for (cell, child) in node.child.into_iter().enumerate().filter(|(_, c)| *c != UNIFORM) {
-            let was = self.sums.get(index as usize).map_or(0.0, |s| s.moment[cell]);
+            let was = self.sums.get(index as usize).map_or(0.0, |s| s.mass[cell]);
             match self.sums.get_mut(child as usize) {
                 Some(s) if s.fresh != 0 => {
-                    let sum: f32 = s.moment.iter().sum();
+                    let sum: f32 = s.mass.iter().sum();
                     if sum > 0.0 && sum.is_finite() {
-                        s.moment.iter_mut().for_each(|m| *m = *m / sum * was);
+                        s.mass.iter_mut().for_each(|m| *m = *m / sum * was);
                     } else {
-                        s.moment = [was / CELLS as f32; CELLS];
+                        s.mass = [was / CELLS as f32; CELLS];
                     }
                     s.fresh = 0;
                 }
@@ -363,9 +363,9 @@ impl Guide<'_> {
     /// Makes the node in a cell a cell again.
     fn merge_node(&mut self, index: u16, cell: usize, level: usize) {
         let Some(child) = self.nodes.get(index as usize).map(|n| n.child[cell]) else { return };
-        let moment = self.moment(child, level + 1);
+        let mass = self.mass(child, level + 1);
         if let Some(s) = self.sums.get_mut(index as usize) {
-            s.moment[cell] = moment;
+            s.mass[cell] = mass;
             s.hits[cell] = 0;
         }
         if let Some(n) = self.nodes.get_mut(index as usize) {
@@ -391,7 +391,7 @@ impl Guide<'_> {
             }
             node.child[cell] = if level + 1 < LEVELS { self.copy_node(child, level + 1) } else { UNIFORM };
             if node.child[cell] == UNIFORM {
-                sums.moment[cell] = self.moment(child, level + 1);
+                sums.mass[cell] = self.mass(child, level + 1);
             }
         }
         if let (Some(n), Some(s)) = (self.nodes.get_mut(copy as usize), self.sums.get_mut(copy as usize)) {

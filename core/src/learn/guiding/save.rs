@@ -5,7 +5,7 @@
 //! | 64 | [`Header`] |
 //! | nodes of the octrees, padded to a multiple of 8 | shape, as that of a saved cache |
 //! | 56 per leaf, in the order of the shape | sums of the leaf, share of guided samples, is there a tree |
-//! | 100 per node, tree after tree, parents first | cells that are nodes, a bit each; moments; contributions |
+//! | 100 per node, tree after tree, parents first | cells that are nodes, a bit each; masses; contributions |
 //!
 //! All numbers are little-endian. There are no indices, so bytes cannot describe anything but trees. All bytes are
 //! checked before anything is changed; numbers that are not finite, or negative, are refused.
@@ -22,9 +22,9 @@ use bytemuck::{Pod, Zeroable};
 /// First bytes of a saved guide.
 const MAGIC: u64 = u64::from_le_bytes(*b"CRPGUIDE");
 /// Version of the format.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 // another number of octrees is another format
-const _: () = assert!(VERSION == 2 && ROOTS == 7);
+const _: () = assert!(VERSION == 3 && ROOTS == 7);
 
 const HEADER: usize = size_of::<Header>();
 const LEAF_BYTES: usize = size_of::<SavedLeaf>();
@@ -56,24 +56,24 @@ pub(super) struct SavedLeaf {
     tree: u32,
 }
 
-/// A node: cells that are nodes, bits of the moments, contributions.
+/// A node: cells that are nodes, bits of the masses, contributions.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct SavedNode {
     inner: u32,
-    moment: [u32; CELLS],
+    mass: [u32; CELLS],
     hits: [u16; CELLS],
 }
 
 impl SavedNode {
     fn to_little_endian(self) -> Self {
-        let Self { inner, moment, hits } = self;
-        Self { inner: inner.to_le(), moment: moment.map(u32::to_le), hits: hits.map(u16::to_le) }
+        let Self { inner, mass, hits } = self;
+        Self { inner: inner.to_le(), mass: mass.map(u32::to_le), hits: hits.map(u16::to_le) }
     }
 
     /// What it has learned.
     pub(super) fn sums(&self) -> NodeSums {
-        NodeSums { moment: self.moment.map(f32::from_bits), hits: self.hits, fresh: 0 }
+        NodeSums { mass: self.mass.map(f32::from_bits), hits: self.hits, fresh: 0 }
     }
 
     /// The next one of a tree.
@@ -89,16 +89,16 @@ impl SavedNode {
     /// Steps over the next node and those below it: what they have learned together.
     pub(super) fn total(saved: &mut &[u8]) -> (f32, f32) {
         let Some(node) = Self::next(saved) else { return (0.0, 0.0) };
-        let (mut moment, mut hits) = (0.0, 0.0);
+        let (mut mass, mut hits) = (0.0, 0.0);
         for cell in 0..CELLS {
             let (m, h) = if node.is_inner(cell) {
                 Self::total(saved)
             } else {
-                (f32::from_bits(node.moment[cell]), node.hits[cell].into())
+                (f32::from_bits(node.mass[cell]), node.hits[cell].into())
             };
-            (moment, hits) = (moment + m, hits + h);
+            (mass, hits) = (mass + m, hits + h);
         }
-        (moment, hits)
+        (mass, hits)
     }
 }
 
@@ -164,7 +164,7 @@ fn take<T: Pod>(rest: &mut &[u8]) -> Option<T> {
 /// Steps over the next saved node and those below it; the number of nodes, `None` if one is missing or too deep.
 fn check_node(rest: &mut &[u8], level: usize) -> Option<Result<u32, f32>> {
     let node = SavedNode::next(rest)?;
-    if let Some(bad) = node.sums().moment.into_iter().find(|m| !(0.0..=f32::MAX).contains(m)) {
+    if let Some(bad) = node.sums().mass.into_iter().find(|m| !(0.0..=f32::MAX).contains(m)) {
         return Some(Err(bad));
     }
     let below = if level + 1 < LEVELS { node.inner } else { 0 };
@@ -318,7 +318,7 @@ impl Guide<'_> {
         let (node, sums) = self.nodes.get(index as usize).zip(self.sums.get(index as usize))?;
         let inner = |c: usize| level + 1 < LEVELS && node.child[c] != UNIFORM;
         let bits = (0..CELLS).filter(|c| inner(*c)).fold(0, |b, c| b | 1 << c);
-        let saved = SavedNode { inner: bits, moment: sums.moment.map(f32::to_bits), hits: sums.hits };
+        let saved = SavedNode { inner: bits, mass: sums.mass.map(f32::to_bits), hits: sums.hits };
         let (head, tail) = core::mem::take(out).split_at_mut_checked(NODE_BYTES)?;
         head.copy_from_slice(bytemuck::bytes_of(&saved.to_little_endian()));
         *out = tail;

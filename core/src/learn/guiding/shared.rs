@@ -110,8 +110,8 @@ pub(super) struct SeenSums {
     pub(super) contributions: f32,
     /// Their squares.
     pub(super) square: f32,
-    /// Their squares times densities.
-    pub(super) moment: f32,
+    /// The contributions themselves.
+    pub(super) sum: f32,
 }
 
 /// All of a guide but its tables.

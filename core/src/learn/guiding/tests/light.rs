@@ -25,10 +25,9 @@ fn by_cell(guide: &Guide<'_>) -> [f64; 16] {
     sums
 }
 
-/// As many arrivals from each cell, from one of four times the power, have four times the density there: linear, not the
-/// root of squares, which camera paths learn. Units do not matter. Samples are guided, and have the density that the guide
-/// says. Killed by: the root of the power, power that counts squared, areas left out when it becomes moments, an octree of
-/// another normal or place, a share of guided samples that stays 0.
+/// As many arrivals from each cell, from one of four times the power, have four times the density there. Units do not
+/// matter. Samples are guided, and have the density that the guide says. Killed by: the root of the power, power that counts
+/// squared, an octree of another normal or place, a share of guided samples that stays 0.
 #[test]
 fn densities_go_with_power() {
     let mut random = Random(11);
@@ -58,7 +57,7 @@ fn densities_go_with_power() {
 }
 
 /// Camera paths go on from there: they soon outweigh what light paths have found, and keep where light comes from while
-/// they have found nothing. Killed by: light paths that are learned from again, moments that are forgotten or never
+/// they have found nothing. Killed by: light paths that are learned from again, masses that are forgotten or never
 /// outweighed.
 #[test]
 fn camera_paths_go_on() {
