@@ -230,7 +230,9 @@ fn shards_take_turns_where_guiding_does_not_pay() {
     let (bits, some) = offered(IN_ORDER);
     let all = some[0];
     assert!(all > 50_000.0 && some[9] > 0.7 * all, "{some:?}");
-    assert!(some[3..9].iter().all(|n| (0.07..0.2).contains(&(n / all))), "{some:?}");
+    // fewer while the guide is known to do harm
+    assert!(some[3..9].iter().all(|n| n / all < 0.2), "{some:?}");
+    assert!(some[3..9].iter().any(|n| n / all > 0.07), "{some:?}");
     assert!(offered(Schedule::Threads(3, 64)) == (bits, some), "other bits");
 }
 
@@ -245,7 +247,7 @@ fn shards_without_a_turn_open_no_records_without_a_cache() {
     learning(&scene, &s, &[8; 18], IN_ORDER, &mut |_, l| full.push(l.counters().ledger_full));
     let of = |i: usize| full[i + 1] - full[i];
     // in doubt after twelve iterations at most
-    assert!(of(0) > 1000 && (12..17).all(|i| of(i) < of(0) / 4), "{full:?}");
+    assert!(of(0) > 1000 && (12..17).map(of).sum::<u64>() < 5 * of(0) / 4, "{full:?}");
 }
 
 /// Where light comes through glass the guide is enabled, and the mean stays. Killed by: a gain that no guide reaches, a
@@ -446,7 +448,7 @@ fn damaged_statistics_change_nothing() {
         let mut newer = bytes.clone();
         newer[cache.len() + 16] = 9;
         let e = l.load_statistics(&newer).unwrap_err();
-        assert!(e.to_string().ends_with("version 9, only 2 is known"), "{e}");
+        assert!(e.to_string().ends_with("version 9, only 3 is known"), "{e}");
         assert!(l.saved_statistics() == before);
     });
 }
