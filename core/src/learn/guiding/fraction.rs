@@ -33,7 +33,8 @@ const PER_ARRIVAL: f32 = 0.25;
 /// Most effective samples that all of them count for.
 const MOST_PRIOR: f32 = 32.0;
 
-/// How much more than the least moment a larger share may have. Below 1/7, so that a useless guide gets less than [`LEAST_SHARE`].
+/// How much more than the least moment a larger share may have. Below 1/7, so that a useless guide gets less than
+/// [`LEAST_SHARE`].
 const TOLERANCE: f64 = 0.1;
 
 /// Index of the smallest share of [`SHARES`] that is guided; a useless guide would be given the one below.

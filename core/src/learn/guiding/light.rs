@@ -99,18 +99,8 @@ impl Guide<'_> {
         let seen = self.scalars.rebuild.seen;
         let power = self.mass(root, 0);
         if power > 0.0 && power.is_finite() {
-            self.scale_masses(root, 0, seen.mean(seen.sum) * CONTRIBUTIONS / power);
-        }
-    }
-
-    /// Multiplies the masses of the cells from a node on.
-    fn scale_masses(&mut self, index: u16, level: usize, by: f32) {
-        let Some(node) = self.nodes.get(index as usize).copied().filter(|_| index != UNIFORM) else { return };
-        if let Some(s) = self.sums.get_mut(index as usize) {
-            s.mass.iter_mut().for_each(|m| *m = (*m * by).min(f32::MAX));
-        }
-        if level + 1 < LEVELS {
-            node.child.into_iter().for_each(|c| self.scale_masses(c, level + 1, by));
+            let by = (seen.mean(seen.sum) * CONTRIBUTIONS / power).min(f32::MAX);
+            self.each_node(root, 0, &|s| s.mass.iter_mut().for_each(|m| *m = (*m * by).min(f32::MAX)));
         }
     }
 }

@@ -41,8 +41,8 @@ pub(super) struct GuideHit {
     leaf: u32,
     /// Point of the square, [`super::sphere::quantised`].
     pub(super) point: u32,
-    /// Upper halves of two floats: square of the contribution, and below it the density of the direction; of light paths
-    /// the power, and a density below 0.
+    /// Upper halves of two floats: square of the contribution, and below it the density of the direction, of which nothing
+    /// counts but whether it is 0, as in delta lobes; of light paths the power, and a density below 0.
     value: u32,
 }
 

@@ -400,14 +400,14 @@ impl Guide<'_> {
         copy
     }
 
-    /// Multiplies what a node and those below it have learned.
-    fn scale_node(&mut self, index: u16, level: usize, by: f32) {
+    /// Changes what a node and those below it have learned.
+    pub(super) fn each_node(&mut self, index: u16, level: usize, change: &impl Fn(&mut NodeSums)) {
         let Some(node) = self.nodes.get(index as usize).copied().filter(|_| index != UNIFORM) else { return };
         if let Some(s) = self.sums.get_mut(index as usize) {
-            s.scale(by);
+            change(s);
         }
         if level + 1 < LEVELS {
-            node.child.into_iter().for_each(|c| self.scale_node(c, level + 1, by));
+            node.child.into_iter().for_each(|c| self.each_node(c, level + 1, change));
         }
     }
 
@@ -436,7 +436,7 @@ impl Guide<'_> {
             return false;
         };
         let FrozenLeaf { root, fraction } = self.frozen[number as usize];
-        self.scale_node(root, 0, 0.125);
+        self.each_node(root, 0, &|s| s.scale(0.125));
         let part: LeafSums = leaf.eighth();
         self.leaves[number as usize] = part;
         for child in first as usize..first as usize + 7 {

@@ -25,8 +25,8 @@ use bytemuck::{Pod, Zeroable};
 /// Gain, less some of its standard error ([`DOUBT`]), from which on the guide is enabled. Vertices of a path that could be
 /// guided one after the other count apart, so that pictures gain more than this ratio says; guided samples take more time,
 /// most where rays are cheap, and lose what Sobol' points gain. The benchmark `guiding` shows all but the last. `veach_mis`
-/// promises 1.18 and would have 1.09 times the error (24 million rays); `volumetric_caustic` promises
-/// 1.25 and has 0.93, `living_room` 1.31 and 0.96.
+/// promises 1.18 and would have 1.09 times the error x rays; `volumetric_caustic` promises 1.25 and has 0.93, `living_room`
+/// 1.31 and 0.96 (by hand, 24 million rays; benches/EFFICIENCY.md).
 const ENABLED_ABOVE: f64 = 1.2;
 /// Standard errors that the gain must lie above a bound, at first and once it was in doubt. A ratio of which few samples,
 /// those that found rare light, make the most has a standard error of the same size, and is most likely too small; one that
