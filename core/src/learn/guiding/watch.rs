@@ -24,9 +24,10 @@ use bytemuck::{Pod, Zeroable};
 
 /// Gain, less some of its standard error ([`DOUBT`]), from which on the guide is enabled. Vertices of a path that could be
 /// guided one after the other count apart, so that pictures gain more than this ratio says; guided samples take more time,
-/// most where rays are cheap, and lose what Sobol' points gain. The benchmark `guiding` shows all but the last. `veach_mis`
-/// promises 1.18 and would have 1.09 times the error x rays; `volumetric_caustic` promises 1.25 and has 0.93, `living_room`
-/// 1.31 and 0.96 (by hand, 24 million rays; benches/EFFICIENCY.md).
+/// most where rays are cheap, and lose what Sobol' points gain. The benchmark `guiding` shows all but the last. With a bound
+/// of 1.08 `veach_mis`, which then promises 1.18, has 1.09 times the error x rays. With 1.2 the
+/// guide is not enabled by 24 million rays in `living_room` and `volumetric_caustic` either, which would have 0.96 and 0.93
+/// and promise 1.31 and 1.25 once it is (by hand; benches/EFFICIENCY.md).
 const ENABLED_ABOVE: f64 = 1.2;
 /// Standard errors that the gain must lie above a bound, at first and once it was in doubt. A ratio of which few samples,
 /// those that found rare light, make the most has a standard error of the same size, and is most likely too small; one that
