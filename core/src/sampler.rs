@@ -17,13 +17,15 @@
 //! go on from iteration to iteration, so that an iteration fills what those before left open. What iterations learn may
 //! decide how many samples roulette and splitting take, whose numbers belong to no sequence: expectations stay what
 //! they are for any such decision. It must not decide what a number means, or how many points a pixel takes: its next
-//! points depend on those before. So pixels that are guided have sequences of their own in each iteration
-//! ([`Origin::apart`]), and so have all of them with adaptive sampling.
+//! points depend on those before. So all pixels have sequences of their own in each iteration with adaptive sampling
+//! ([`Origin::apart`]), and guided ones have them from the first bounce on that a guide may decide about
+//! ([`Key8::of_iteration`]). What a guided sample draws before that bounce goes on, the light sample at its vertex too: it
+//! must not be weighted by what the guide knows then.
 
 mod sobol;
 
 use crate::names::names;
-use crate::rng::Key8;
+use crate::rng::{Key8, mix};
 use croupier_simd::{F32x8, Mask8, U32x8};
 
 /// Where the numbers of paths come from.
@@ -59,6 +61,8 @@ const SOBOL_DEPTH: u32 = 4;
 
 /// Bit of a high word with which a key belongs to no sequence.
 const HASHED: u32 = 1 << 31;
+/// Bit of a high word whose key belongs to a sequence of one iteration alone.
+const APART: u32 = 1 << 30;
 
 /// Dimension blocks of a camera sample's key.
 const PIXEL_BLOCK: u32 = 0;
@@ -86,14 +90,13 @@ pub(crate) const MAX_TRANSMITTANCE_STEPS: u32 = 4096;
 
 impl Key8 {
     /// Key of the camera samples `sample` of an iteration, of which the first `in_first_half` belong to the first half
-    /// of their pixel; in the lanes of `apart` with sequences of this iteration alone.
+    /// of their pixel.
     #[inline(always)]
     pub(crate) fn camera_sample(
         sampler: Sampler,
         origin: Origin,
         pixel: U32x8,
         [sample, in_first_half]: [U32x8; 2],
-        apart: Option<Mask8>,
     ) -> Self {
         match sampler {
             Sampler::Hashed => Self::camera(origin.seed, pixel, sample + U32x8::splat(origin.first)),
@@ -103,13 +106,28 @@ impl Key8 {
                 let sequence = |seed| Self::camera(seed, pixel, half).lo;
                 let within = U32x8::select(first, sample, sample - in_first_half);
                 let before = halves(origin.first).map(U32x8::splat);
-                let (mut lo, mut hi) = (sequence(origin.seed), within + U32x8::select(first, before[0], before[1]));
-                if let Some(apart) = apart.filter(|lanes| lanes.any()) {
-                    lo = U32x8::select(apart, sequence(origin.apart().seed), lo);
-                    hi = U32x8::select(apart, within, hi);
-                }
-                Self { lo, hi: hi & U32x8::splat(!HASHED) }
+                let (lo, hi) = (sequence(origin.seed), within + U32x8::select(first, before[0], before[1]));
+                Self { lo, hi: hi & U32x8::splat(!(HASHED | APART)) }
             }
+        }
+    }
+
+    /// Lanes of keys of sequences that go on from iteration to iteration.
+    #[inline(always)]
+    pub(crate) fn goes_on(self, sampler: Sampler) -> Mask8 {
+        match sampler {
+            Sampler::Hashed => Mask8::NONE,
+            Sampler::Sobol => self.hi.lt(U32x8::splat(APART)),
+        }
+    }
+
+    /// In these lanes, of [`Self::goes_on`], keys of sequences of iteration `number` alone.
+    #[inline(always)]
+    pub(crate) fn of_iteration(self, number: u64, lanes: Mask8) -> Self {
+        let seed = U32x8::splat((mix(number) >> 32) as u32);
+        Self {
+            lo: U32x8::select(lanes, self.lo ^ seed, self.lo),
+            hi: U32x8::select(lanes, self.hi | U32x8::splat(APART), self.hi),
         }
     }
 
@@ -382,8 +400,9 @@ mod tests {
     /// Keys of the first vertices of camera samples.
     fn vertex(sampler: Sampler, iteration: u64, pixel: U32x8, sample: U32x8) -> Key8 {
         let origin = Origin { seed: 9, iteration, first: 0 };
-        Key8::camera_sample(sampler, origin, pixel, [sample, U32x8::splat(64)], Some(Mask8::all_lanes()))
-            .next_vertex(sampler, U32x8::splat(1))
+        let key = Key8::camera_sample(sampler, origin, pixel, [sample, U32x8::splat(64)]);
+        let key = key.next_vertex(sampler, U32x8::splat(1));
+        key.of_iteration(iteration, key.goes_on(sampler))
     }
 
     /// What 64 samples of a pixel draw with Sobol' points at vertex `depth`: sample number `n` of each.
@@ -496,33 +515,42 @@ mod tests {
     }
 
     /// The sequence of each half goes on from iteration to iteration: its 64 samples fill all 64 cells, however they
-    /// are divided, but not in the lanes that are apart, where those of an iteration are independent of those before.
-    /// Killed by: an iteration that begins anew, one that repeats points, lanes that are apart and others exchanged,
-    /// halves of other sizes.
+    /// are divided, and so do what goes before a bounce that is guided, but not that bounce, whose numbers are independent
+    /// of those of iterations before. Killed by: an iteration that begins anew, one that repeats points, lanes that are
+    /// guided and others exchanged, halves of other sizes.
     #[test]
     fn sequences_go_on_in_each_half() {
         let s = Sampler::Sobol;
         for (lengths, odd) in
             [(&[128][..], false), (&[1, 1, 2, 4, 8, 112], false), (&[3, 5, 50, 70], false), (&[60, 68], true)]
         {
-            let mut cells = [(); 2].map(|()| std::collections::HashSet::new());
+            let mut cells = [(); 2].map(|()| [(); 3].map(|()| std::collections::HashSet::new()));
             let (mut before, mut counts) = (0, [0; 2]);
             for (iteration, &samples) in lengths.iter().enumerate() {
                 let origin = Origin { seed: 9, iteration: iteration as u64 + 1, first: before };
                 let first = in_first_half(before, samples);
                 for sample in 0..samples {
-                    let (numbers, apart) = ([sample, first].map(U32x8::splat), Some(Mask8::from_bits(0b1010_1010)));
-                    let key = Key8::camera_sample(s, origin, U32x8::splat(3), numbers, apart);
-                    let [u, v, ..] = key.pixel_and_lens(s).map(|x| x.lane(usize::from(odd)));
+                    let numbers = [sample, first].map(U32x8::splat);
+                    let key = Key8::camera_sample(s, origin, U32x8::splat(3), numbers);
+                    let vertex = key.next_vertex(s, U32x8::splat(1)).sample(s, ZERO);
+                    let guided = Mask8::from_bits(0b1010_1010) & vertex.goes_on(s);
+                    let bounce = vertex.of_iteration(origin.iteration, guided);
+                    assert!(vertex.goes_on(s).all() && bounce.goes_on(s).bits() == 0b0101_0101);
                     let half = usize::from(sample >= first);
-                    cells[half].insert((u * 8.0) as usize * 8 + (v * 8.0) as usize);
+                    let [pixel, light] = [key.pixel_and_lens(s), vertex.light(s).map(U32x8::to_unit)];
+                    let direction = bounce.scattering(s);
+                    let lane = usize::from(odd);
+                    let drawn = [[pixel[0], pixel[1]], [light[1], light[2]], [direction[0], direction[1]]];
+                    for (cells, [u, v]) in cells[half].iter_mut().zip(drawn) {
+                        cells.insert((u.lane(lane) * 8.0) as usize * 8 + (v.lane(lane) * 8.0) as usize);
+                    }
                     counts[half] += 1;
                 }
                 before += samples;
                 assert!(counts[0] == counts[1] || counts[0] == counts[1] + 1, "{counts:?} of {before}");
             }
-            for cells in cells {
-                assert_eq!(cells.len() == 64, !odd, "{lengths:?}: {} cells", cells.len());
+            for [pixel, light, bounce] in cells.map(|half| half.map(|cells| cells.len())) {
+                assert_eq!((pixel, light, bounce == 64), (64, 64, !odd), "{lengths:?}: {bounce} cells");
             }
         }
     }
@@ -536,7 +564,7 @@ mod tests {
         for n in [0, 1, 5] {
             let product = |pixel: u32| {
                 let sample = U32x8::from_fn(|i| n + 8 * (i as u32 & 1));
-                let key = Key8::camera_sample(s, origin, U32x8::splat(pixel), [sample, U32x8::splat(8)], None);
+                let key = Key8::camera_sample(s, origin, U32x8::splat(pixel), [sample, U32x8::splat(8)]);
                 let [u, ..] = key.pixel_and_lens(s);
                 12.0 * f64::from(u.lane(0) - 0.5) * f64::from(u.lane(1) - 0.5)
             };
@@ -550,7 +578,8 @@ mod tests {
     fn hashed_keys_are_hashes() {
         let (pixel, sample) = (U32x8::from_fn(|i| i as u32), U32x8::splat(5));
         let origin = Origin { seed: 9, iteration: 3, first: 40 };
-        let key = Key8::camera_sample(Sampler::Hashed, origin, pixel, [sample, sample], Some(Mask8::all_lanes()));
+        let key = Key8::camera_sample(Sampler::Hashed, origin, pixel, [sample, sample]);
+        assert!(key.goes_on(Sampler::Hashed).none());
         let wanted = Key8::camera(9, pixel, U32x8::splat(45));
         assert_eq!((key.lo, key.hi), (wanted.lo, wanted.hi));
         let (a, b) = (key.next_vertex(Sampler::Hashed, ZERO), wanted.child(ZERO));

@@ -169,14 +169,14 @@ fn narrow_phase_functions_are_not_guided() {
 fn watched_guides_do_not_bias() {
     let scene = blob(&cornell([32, 32]));
     let reference = run(&scene, &plain(&guided(&scene, "none", 5)), &mut |_, _| ());
-    // misled again in each iteration, or once: then shards take turns
+    // misled again in each iteration, or once: then shards take turns, until it pays after all
     for (strategy, again) in [("classic", true), ("ears", true), ("ears", false)] {
         let mut s = guided(&scene, strategy, 5);
         s.learning.guiding = Guiding::Auto;
         let (mut rng, mut least) = (SplitMix(11), f64::INFINITY);
         let image = run(&scene, &s, &mut |i, l| {
             let u = l.guide_use().expect("a guide that is watched");
-            assert!(!u.enabled, "{strategy}: {u:?}");
+            assert!(!u.enabled || !again && i > 8, "{strategy}, iteration {i}: {u:?}");
             least = least.min(u.gain.map_or(f64::INFINITY, |g| g.gain));
             if again || i == 0 {
                 l.load_guide(&adversarial(&scene, &s, 3, &mut rng)).expect("a guide of this scene");

@@ -260,12 +260,13 @@ impl<'m> LearnedState<'m> {
     }
 
     /// Goes on to learn where no logs are wanted; work done, in units of about a ray, and `true` after the last.
-    pub(crate) fn learn_guide(&mut self) -> (u64, bool) {
+    /// `independence` as of [`Watch::decide`].
+    pub(crate) fn learn_guide(&mut self, independence: Option<f64>) -> (u64, bool) {
         let Some(guide) = self.guide_mut() else { return (0, true) };
         let (work, done) = guide.learn_some();
         if done && self.watches() {
             let enough = self.guide().is_some_and(|g| g.has_learned_from(ENOUGH));
-            self.watch.decide(self.learning.decay.into(), enough);
+            self.watch.decide(self.learning.decay.into(), enough, independence);
         }
         (work, done)
     }
@@ -312,6 +313,12 @@ impl<'m> LearnedState<'m> {
     pub(crate) fn error_weight(&self, film: u32) -> ([f32; 3], f32) {
         let share = self.allocation.share(film) as f32;
         (self.pixels.error_weight(film).map(|x| x / (share * share)), share)
+    }
+
+    /// Estimate of a pixel, rgb; 0 while unknown.
+    #[inline]
+    pub(crate) fn expected(&self, film: u32) -> [f32; 3] {
+        self.pixels.value(film)
     }
 
     /// Bins of other directions; see [`Cache::bins_towards`].

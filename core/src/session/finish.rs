@@ -55,6 +55,9 @@ const RAYS_PER_ESTIMATED: u64 = 4;
 /// in that of one ray.
 const RAYS_PER_ESTIMATE: u64 = 8;
 
+/// Samples per pixel from which on it is known how far they are from independent ones.
+const FEWEST_TOLD: u32 = 3;
+
 /// Shards as callers give them.
 pub(super) trait Shards<'a, 'b: 'a>: IntoIterator<Item = &'a Shard<'b>> + Clone {}
 
@@ -344,7 +347,10 @@ impl SessionState<'_> {
     /// Learns the distributions of path guiding from the logs of the shards.
     fn learn_guide<'a, 'b: 'a>(&mut self, shards: &mut Walk<'a, 'b, impl Shards<'a, 'b>>, rays: u64) -> u64 {
         if !self.learned.guide_wants_logs() {
-            let (work, done) = self.learned.learn_guide();
+            // as of the iteration before
+            let told = self.iteration.first_sample >= FEWEST_TOLD;
+            let independence = told.then(|| self.film.error_estimate().independence);
+            let (work, done) = self.learned.learn_guide(independence);
             if done {
                 self.next_stage();
             }

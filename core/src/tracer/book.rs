@@ -12,7 +12,7 @@
 use super::guide_notes::{GuideNote8, GuideNotes};
 use super::job::Job;
 use super::ledger::{Finished, Ledger, NO_RECORD};
-use super::packets::{Contribution8, Samples8, ShadowRays8};
+use super::packets::{Contribution8, Emission8, Samples8, ShadowRays8};
 use super::path::Path8;
 use super::root::{PixelTarget, Roots};
 use super::vertex::PathVertex;
@@ -23,6 +23,7 @@ use crate::learn::LearnedState;
 use crate::learn::cache::NO_BIN;
 use crate::learn::cache::Training;
 use crate::learn::guiding::GuideLog;
+use crate::light::{LightSample8, power_heuristic};
 use crate::memory::{Carver, Measure, MemoryError};
 use crate::rrs::Norm;
 use crate::settings::{MAX_PATH_LENGTH, Settings};
@@ -260,6 +261,8 @@ impl<'m> Bookkeeping<'m> {
                     self.counters.ledger_full += 1;
                     self.ledger.mark_incomplete(parent);
                     self.close_record::<W>(parent);
+                } else if W::GUIDING && self.guide.promises_anything() {
+                    self.guide.open(*record);
                 }
             }
         }
@@ -301,6 +304,30 @@ impl<'m> Bookkeeping<'m> {
             for i in mask.and_not(good).lanes() {
                 self.ledger.mark_incomplete(record[i]);
             }
+        }
+    }
+
+    /// Adds emission that rays met, and tells path guiding with which weights.
+    #[inline(always)]
+    pub(super) fn accumulate_emission<W: World>(&mut self, mask: Mask8, path: &Path8, e: &Emission8) {
+        self.accumulate(mask, path, &e.found, Beyond::Ray);
+        if W::GUIDING && self.guide.promises_anything() {
+            self.note_emission(mask, path, e);
+        }
+    }
+
+    /// See [`GuideNotes::met`].
+    #[inline(never)]
+    fn note_emission(&mut self, mask: Mask8, path: &Path8, e: &Emission8) {
+        let found = &e.found;
+        let logged = mask.and_not(path.record.eq(U32x8::splat(NO_RECORD)));
+        let good = logged & found.local.any_positive() & found.pixel.is_finite() & e.weight.lt(F32x8::ONE);
+        if good.none() {
+            return;
+        }
+        let local = (found.local * self.firefly_scale(good, found.pixel, path.root)).mean();
+        for i in good.lanes() {
+            self.guide.met(path.record.lane(i), local.lane(i), e.weight.lane(i));
         }
     }
 
@@ -400,16 +427,26 @@ impl<'m> Bookkeeping<'m> {
 
     /// Notes the directions that the bounces of eight samples took, after their next event estimation.
     #[inline(never)]
-    pub(super) fn note_directions(&mut self, note: &GuideNote8, samples: &Samples8) {
-        let (path, v) = (&samples.path, &samples.vertex);
+    pub(super) fn note_directions(
+        &mut self,
+        note: &GuideNote8,
+        samples: &Samples8,
+        light: Option<&LightSample8>,
+        nee_pdf: F32x8,
+    ) {
+        let path = &samples.path;
         let lanes = note.lanes.and_not(path.record.eq(U32x8::splat(NO_RECORD)));
         if lanes.none() {
             return;
         }
-        let importance = self.guide.importance(v.beta, v.error_weight);
+        // without the guide the light sample has another weight, where the densities of both are not those of delta lights
+        let ratio = light.map_or(F32x8::ONE, |l| {
+            let [with, without] = [nee_pdf, note.nee_pdf].map(|pdf| power_heuristic(l.pdf, pdf));
+            (l.delta | !with.gt(F32x8::ZERO)).select(F32x8::ONE, without / with)
+        });
         for i in lanes.lanes() {
             let slot = path.record.lane(i);
-            self.guide.note(slot, note, i, self.ledger.radiance(slot), importance.lane(i));
+            self.guide.note(slot, note, i, self.ledger.radiance(slot), ratio.lane(i));
             self.ledger.mark_noted(slot);
         }
     }
@@ -460,12 +497,16 @@ impl<'m> Bookkeeping<'m> {
         if !W::GUIDING || guide.log().is_none() {
             self.ledger.close(record, |f| log(training, counters, &f));
         } else {
-            self.ledger.close(record, |f| {
-                if f.noted {
-                    guide.close(f.slot, f.radiance);
+            let promising = guide.promises_anything();
+            let whole = self.ledger.close(record, |f| {
+                if promising || f.noted {
+                    guide.close(&f);
                 }
                 log(training, counters, &f);
             });
+            if let Some(f) = whole {
+                guide.close_camera_sample(&f);
+            }
         }
     }
 }

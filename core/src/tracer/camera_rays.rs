@@ -15,6 +15,7 @@ use crate::camera;
 use crate::extension::{Extension, PixelSamples8, SourceRays8};
 use crate::film::Half;
 use crate::geometry::Ray8;
+use crate::learn::guiding::Guide;
 use crate::rng::Key8;
 use crate::sampler::{Origin, in_first_half};
 use crate::scene::Effects;
@@ -183,7 +184,6 @@ pub(super) fn camera_samples<W: World>(
     };
     // none without a cache: nothing but the guide learns then, and it is not asked here
     let unguided = learned.learned_samples(false);
-    let mut guided_lanes = 0;
     let (mut x, mut y, mut pixel, mut sample) = ([0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8]);
     let mut first_halves = [0u32; 8];
     let (mut root, mut record, mut weight) = ([0u32; 8], [NO_RECORD; 8], [[1.0; 3]; 8]);
@@ -198,13 +198,18 @@ pub(super) fn camera_samples<W: World>(
         let (error_weight, share) = learned.error_weight(film);
         let mut target = PixelTarget::numbered(error_weight, share, film, next.pixel, s).with_half(next.half);
         let mut learning = unguided;
+        let mut guided = false;
         if W::GUIDING {
-            let guided = learned.is_guided(iteration.number, p);
+            guided = learned.is_guided(iteration.number, p);
             target = target.with_guiding(guided);
-            guided_lanes |= u32::from(guided && learned.guide().is_some()) << lanes;
             learning = learned.learned_samples(guided);
         }
         let Some(opened) = book.open_camera_sample(target, s < learning) else { break };
+        if W::GUIDING && book.guide.promises_anything() {
+            let tells = guided && learned.guide().is_some_and(Guide::knows_directions);
+            let counts = if tells { error_weight } else { [0.0; 3] };
+            book.guide.open_camera_sample(opened.1, learned.expected(film), counts);
+        }
         [x[lanes], y[lanes]] = p;
         pixel[lanes] = film;
         (sample[lanes], first_halves[lanes]) = (s, next.in_first_half);
@@ -212,9 +217,7 @@ pub(super) fn camera_samples<W: World>(
         (root[lanes], record[lanes]) = opened;
         lanes += 1;
     }
-    // the profile once more: compilers for wasm do not compute lanes of constant masks
-    let apart = W::GUIDING.then(|| Mask8::from_bits(guided_lanes));
-    let key = Key8::camera_sample(sampler, origin, U32x8::new(pixel), [sample, first_halves].map(U32x8::new), apart);
+    let key = Key8::camera_sample(sampler, origin, U32x8::new(pixel), [sample, first_halves].map(U32x8::new));
     let [u0, u1, u2, u3] = key.pixel_and_lens(sampler);
     let px = F32x8::from_fn(|i| x[i] as f32) + u0;
     let py = F32x8::from_fn(|i| y[i] as f32) + u1;

@@ -1,7 +1,6 @@
 //! Emission that rays meet, weighted against the light sample that could have found it.
 
-use super::packets::Contribution8;
-use super::packets::RayState8;
+use super::packets::{Contribution8, Emission8, RayState8};
 use crate::geometry::SurfaceHit8;
 use crate::light::{self, LightSelector, ShapeRays8, TEXTURED_EMISSION, power_heuristic};
 use crate::scene::{Effects, Scene};
@@ -10,7 +9,7 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Radiance of the environment along the rays that `escaped`; `None` without one.
 #[inline(always)]
-pub(crate) fn environment<W: World>(world: &W, rays: &RayState8, escaped: Mask8) -> Option<Contribution8> {
+pub(crate) fn environment<W: World>(world: &W, rays: &RayState8, escaped: Mask8) -> Option<Emission8> {
     let scene = world.scene();
     let any = Effects::ENVIRONMENT.with(Effects::CONSTANT);
     if !W::EFFECTS.intersects(any) || scene.environment.is_none() {
@@ -28,7 +27,7 @@ pub(crate) fn environment<W: World>(world: &W, rays: &RayState8, escaped: Mask8)
 /// Radiance of the hit emitters, in the lanes of [`SurfaceHit8::emitters`]; `ng` are the normals by winding. `None` if
 /// there is no emitter.
 #[inline(always)]
-pub(crate) fn area<W: World>(world: &W, rays: &RayState8, hit: &SurfaceHit8, ng: Vec3x8) -> Option<Contribution8> {
+pub(crate) fn area<W: World>(world: &W, rays: &RayState8, hit: &SurfaceHit8, ng: Vec3x8) -> Option<Emission8> {
     let emitters = hit.emitters();
     if !W::EFFECTS.contains(Effects::AREA_LIGHTS) || emitters.none() {
         return None;
@@ -40,7 +39,7 @@ pub(crate) fn area<W: World>(world: &W, rays: &RayState8, hit: &SurfaceHit8, ng:
     }
     let sampled = emitters.and_not(rays.skip_mis);
     if sampled.none() {
-        return Some(Contribution8 { pixel: rays.beta * radiance, local: rays.weight * radiance });
+        return Some(counted(rays, radiance, F32x8::ONE));
     }
     let (from, n, d) = (rays.from, rays.normal, rays.ray.d);
     let pdf = if W::LIGHT_TREES {
@@ -73,12 +72,15 @@ pub(crate) fn nearest_shape<W: World>(world: &W, rays: &RayState8, upto: F32x8, 
 
 /// Radiance of all lights with shapes that the rays in `mask` meet on their parts up to `upto`.
 #[inline(never)]
-pub(crate) fn shapes<W: World>(world: &W, rays: &RayState8, upto: F32x8, mask: Mask8) -> Contribution8 {
-    let mut sum = Vec3x8::ZERO;
+pub(crate) fn shapes<W: World>(world: &W, rays: &RayState8, upto: F32x8, mask: Mask8) -> Emission8 {
+    let (mut sum, mut all) = (Vec3x8::ZERO, F32x8::ZERO);
     let part = part(rays, upto, mask);
     let met = |met: Mask8, radiance: Vec3x8, pdf: F32x8| {
         let weight = rays.skip_mis.select(F32x8::ONE, power_heuristic(rays.pdf, pdf));
         sum += radiance * met.zero_unless(weight);
+        if W::GUIDING {
+            all += met.zero_unless(radiance.mean());
+        }
     };
     let (scene, n, sampled) = (world.scene(), rays.normal, !rays.skip_mis);
     if W::LIGHT_TREES {
@@ -86,12 +88,19 @@ pub(crate) fn shapes<W: World>(world: &W, rays: &RayState8, upto: F32x8, mask: M
     } else {
         light::meet_shapes(scene, &world.lights().without_tree(), &part, n, sampled, met);
     }
-    Contribution8 { pixel: rays.beta * sum, local: rays.weight * sum }
+    let weight = if W::GUIDING { all.gt(F32x8::ZERO).select(sum.mean() / all, F32x8::ONE) } else { F32x8::ONE };
+    Emission8 { weight, ..counted(rays, sum, F32x8::ONE) }
 }
 
 /// `radiance` times the MIS weight of rays whose directions light sampling has with density `pdf`.
 #[inline(always)]
-fn weighted(rays: &RayState8, radiance: Vec3x8, pdf: F32x8) -> Contribution8 {
-    let weight = rays.skip_mis.select(F32x8::ONE, power_heuristic(rays.pdf, pdf));
-    Contribution8 { pixel: rays.beta * radiance * weight, local: rays.weight * radiance * weight }
+fn weighted(rays: &RayState8, radiance: Vec3x8, pdf: F32x8) -> Emission8 {
+    counted(rays, radiance, rays.skip_mis.select(F32x8::ONE, power_heuristic(rays.pdf, pdf)))
+}
+
+/// `radiance` times a weight.
+#[inline(always)]
+fn counted(rays: &RayState8, radiance: Vec3x8, weight: F32x8) -> Emission8 {
+    let found = Contribution8 { pixel: rays.beta * radiance * weight, local: rays.weight * radiance * weight };
+    Emission8 { found, weight }
 }

@@ -3,9 +3,12 @@
 //!
 //! A sample comes from the guide with probability g, from the BSDF else, and counts f cos / (g q + (1 - g) p) with
 //! both densities q and p at its direction, whichever it came from (Veach's balance heuristic for one sample). Next
-//! event estimation is weighted against the mixture too. Delta lobes, which no guide can find, count 1 / (1 - g)
-//! times. g is 0 at materials and in media that scatter into narrow lobes, and where the guide's statistics promise
-//! nothing. In media the phase function has the place of the BSDF.
+//! event estimation is weighted against the mixture too, but for the first bounce of a path that is guided: its light
+//! sample belongs to a sequence that goes on from iteration to iteration ([`crate::sampler`]), whose points depend on
+//! each other, so that weights by what was learned from some would bias the others. It is weighted against the BSDF, and
+//! so is the emission that the bounce meets, which is right with any weights that add up to 1. Delta lobes, which no guide
+//! can find, count 1 / (1 - g) times. g is 0 at materials and in media that scatter into narrow lobes, and where the
+//! guide's statistics promise nothing. In media the phase function has the place of the BSDF.
 
 use super::class::Kernel as ClassKernel;
 use super::guide_notes::GuideNote8;
@@ -14,7 +17,7 @@ use super::packets::Samples8;
 use crate::bsdf::{self, Bsdf, Eval8, Inputs8, Sample8, Visitor, folded};
 use crate::extension::Extension;
 use crate::learn::guiding::{Guide, Guide8, NO_LEAF, UNKNOWN_SHARE, sphere};
-use crate::sampler::Sampler;
+use crate::rng::Key8;
 use crate::scene::{Effects, Scene};
 use crate::world::World;
 use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
@@ -46,6 +49,10 @@ pub(super) struct Guided8<'a, 'm> {
     overall: F32x8,
     /// Lanes that may be guided.
     guided: Mask8,
+    /// See [`Turn8::first`].
+    first: Mask8,
+    /// Numbers of the BSDF's own samples.
+    u: [F32x8; 3],
 }
 
 /// Lanes whose materials, or media, scatter into lobes that are wide enough for a guide.
@@ -67,6 +74,31 @@ pub(super) fn wide_lobes<W: World>(scene: &Scene<'_>, kernel: ClassKernel, mater
     }
 }
 
+/// The samples of a packet that a guide may decide about.
+pub(super) struct Turn8 {
+    /// Lanes with lobes that are wide enough, at vertices where paths go on.
+    wide: Mask8,
+    /// Those of guided samples whose numbers belonged to sequences that go on.
+    first: Mask8,
+    /// Keys of the bounces: in `first` of sequences of this iteration alone.
+    pub(super) key: Key8,
+}
+
+/// What a guide may decide about, whatever it has learned.
+#[inline(never)]
+pub(super) fn turn<W: World>(world: &W, samples: &Samples8) -> Turn8 {
+    let mut turn = Turn8 { wide: Mask8::NONE, first: Mask8::NONE, key: samples.key };
+    if samples.class.is_delta() || samples.continues.none() {
+        return turn;
+    }
+    turn.wide = samples.continues & wide_lobes::<W>(world.scene(), samples.class.kernel(), samples.vertex.material);
+    turn.first = turn.wide & samples.guided & turn.key.goes_on(world.sampler());
+    if turn.first.any() {
+        turn.key = turn.key.of_iteration(world.iteration().number, turn.first);
+    }
+    turn
+}
+
 /// Draws from the guide for a packet of one class; `None` if guiding is off or of no use. Lanes that are learned
 /// from and not guided have a leaf and no direction.
 #[inline(never)]
@@ -74,18 +106,15 @@ pub(super) fn draw<'a, 'm: 'a, W: World>(
     guide: &'a Guide<'m>,
     world: &W,
     samples: &Samples8,
+    turn: &Turn8,
 ) -> Option<Guided8<'a, 'm>> {
     let learned = if world.learned().all_teach() { samples.active } else { samples.guided };
     let recorded = learned.and_not(samples.path.record.eq(U32x8::splat(NO_RECORD)));
-    let asked = samples.continues & (samples.guided | recorded);
-    if samples.class.is_delta() || asked.none() {
-        return None;
-    }
-    let v = &samples.vertex;
-    let lanes = asked & wide_lobes::<W>(world.scene(), samples.class.kernel(), v.material);
+    let lanes = turn.wide & (samples.guided | recorded);
     if lanes.none() {
         return None;
     }
+    let v = &samples.vertex;
     // by the vertex's key: if the leaf went with the light sample's numbers, the weights of MIS would be biased
     let normal = (samples.class.kernel() != ClassKernel::Phase).then_some(v.ns);
     let at = guide.at(v.p, normal, v.key.cache_jitter(world.sampler()), lanes);
@@ -94,14 +123,15 @@ pub(super) fn draw<'a, 'm: 'a, W: World>(
     if recorded.none() && !at.fraction.gt(F32x8::ZERO).any() {
         return None;
     }
-    let words = samples.key.guided_direction(world.sampler());
+    let words = turn.key.guided_direction(world.sampler());
     let chosen = lanes & at.chosen(&words);
     let (mut dir, mut pdf) = (v.ns, F32x8::ZERO);
     if chosen.any() {
         let (d, q) = guide.sample(&at, words, chosen);
         (dir, pdf) = (Vec3x8::select(chosen, d, v.ns), chosen.zero_unless(q));
     }
-    Some(Guided8 { guide, at, chosen, dir, pdf, recorded, overall, guided: samples.guided })
+    let u = turn.key.scattering(world.sampler());
+    Some(Guided8 { guide, at, chosen, dir, pdf, recorded, overall, guided: samples.guided, first: turn.first, u })
 }
 
 /// One class's kernel on a packet, with the BSDF in the guide's directions.
@@ -117,13 +147,8 @@ pub(super) struct GuidedKernel<'a, 's> {
 }
 
 impl<'a, 's> GuidedKernel<'a, 's> {
-    pub(super) fn new(
-        (scene, sampler): (&'a Scene<'s>, Sampler),
-        samples: &'a Samples8,
-        nee: Option<Vec3x8>,
-        g: &Guided8<'_, '_>,
-    ) -> Self {
-        Self { scene, samples, nee, u: samples.key.scattering(sampler), dir: g.dir, chosen: g.chosen }
+    pub(super) fn new(scene: &'a Scene<'s>, samples: &'a Samples8, nee: Option<Vec3x8>, g: &Guided8<'_, '_>) -> Self {
+        Self { scene, samples, nee, u: g.u, dir: g.dir, chosen: g.chosen }
     }
 }
 
@@ -191,7 +216,8 @@ pub(super) fn mix(g: &Guided8<'_, '_>, both: &Both8, nee_direction: Option<Vec3x
     let (chosen, s) = (g.chosen, &both.own);
     let mut nee = both.nee;
     if let Some(wi) = nee_direction.filter(|_| used.any()) {
-        nee.pdf = own * nee.pdf + share * g.guide.pdf(&g.at, wi, used & nee.f.any_positive());
+        let asked = (used & nee.f.any_positive()).and_not(g.first);
+        nee.pdf = g.first.select(nee.pdf, own * nee.pdf + share * g.guide.pdf(&g.at, wi, asked));
     }
     let wi = Vec3x8::select(chosen, g.dir, both.frame.to_world(s.wi));
     let delta = s.delta.and_not(chosen);
@@ -207,24 +233,77 @@ pub(super) fn mix(g: &Guided8<'_, '_>, both: &Both8, nee_direction: Option<Vec3x
     let [all, ratio] = as_one_mixture(g.overall, delta.select(own, pdf), [p, q], delta);
     let known = g.at.known.select(q / (q + p) * 254.99, F32x8::splat(UNKNOWN_SHARE as f32));
     let unguided = delta.select(own, pdf / p).min(F32x8::splat(MOST));
+    // what is not guided is as it would be without the guide
     let promised = g.at.known & g.guided;
     let note = GuideNote8 {
         lanes: g.recorded,
         leaf: U32x8::select(learned, g.at.leaf, U32x8::splat(NO_LEAF)),
-        promised,
         unguided: (promised & learned).select(unguided, F32x8::ONE),
+        nee_pdf: promised.select(both.nee.pdf, nee.pdf),
         share: (!delta).zero_unless(known).to_i32().to_u32(),
         point: if learned.any() { sphere::quantised(wi) } else { U32x8::splat(0) },
         pdf: (!delta).zero_unless(g.at.known.select(all, pdf)),
         ratio: g.at.known.select(ratio, F32x8::ONE),
+        weighted_as_bsdf: g.first,
     };
+    let pdf = g.first.select(p, pdf);
     let sample = Sample8 { wi: s.wi, weight: weight.zero_unless(valid), pdf, delta: delta & valid, valid };
     Mixed8 { nee, wi, sample, note }
 }
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
     use super::*;
+    use crate::learn::guiding::GuideSize;
+
+    /// At the first bounce of a path that is guided light samples and bounces are weighted by the BSDF's density, elsewhere by
+    /// the mixture's, and what was sampled counts by the mixture's everywhere. Killed by: weights by what a guide has learned
+    /// from points of the same sequence.
+    #[test]
+    fn first_bounces_are_weighted_as_without_the_guide() {
+        let size = GuideSize::within(1 << 16, 1).expect("a size");
+        let layout = Guide::layout(size).expect("a layout");
+        let mut block = std::vec![0u8; layout.size + layout.align];
+        let at = block.as_ptr().align_offset(layout.align);
+        let bounds = [[-1.0; 3], [1.0; 3]];
+        let mut guide = Guide::new(size, bounds, &mut block[at..at + layout.size]).expect("a guide");
+        guide.reset();
+        let (all, up) = (Mask8::all_lanes(), Vec3x8::splat(0.0, 0.0, 1.0));
+        let first = Mask8::from_bits(0b0000_1111);
+        let chosen = Mask8::from_bits(0b0011_0011);
+        let uniform = 0.25 / core::f32::consts::PI;
+        // a guide that knows nothing is uniform
+        let g = Guided8 {
+            guide: &guide,
+            at: Guide8 { fraction: F32x8::splat(0.5), known: all, ..Guide8::NONE },
+            chosen,
+            dir: up,
+            pdf: F32x8::splat(uniform),
+            recorded: all,
+            overall: F32x8::splat(0.5),
+            guided: all,
+            first,
+            u: [F32x8::ZERO; 3],
+        };
+        let eval = |f: f32, pdf: f32| Eval8 { f: Vec3x8::splat(f, f, f), pdf: F32x8::splat(pdf) };
+        let weight = Vec3x8::splat(0.8, 0.8, 0.8);
+        let own = Sample8 { wi: up, weight, pdf: F32x8::splat(0.3), delta: Mask8::NONE, valid: all };
+        let both = Both8 { nee: eval(0.1, 0.2), own, guided: eval(0.4, 0.5), frame: Frame8::from_normal(up) };
+        let m = mix(&g, &both, Some(up));
+        let mixture = |p: f32| 0.5 * p + 0.5 * uniform;
+        for i in 0..8 {
+            let (p, is_first) = (if chosen.lane(i) { 0.5 } else { 0.3 }, first.lane(i));
+            let want = |p: f32| if is_first { p } else { mixture(p) };
+            let close = |x: f32, want: f32| assert!((x / want - 1.0).abs() < 1e-5, "lane {i}: {x} for {want}");
+            close(m.nee.pdf.lane(i), want(0.2));
+            close(m.sample.pdf.lane(i), want(p));
+            close(m.sample.weight.lane(i)[0], if chosen.lane(i) { 0.4 } else { 0.8 * 0.3 } / mixture(p));
+            close(m.note.unguided.lane(i), mixture(p) / p);
+            close(m.note.nee_pdf.lane(i), 0.2);
+            assert_eq!(m.note.weighted_as_bsdf.lane(i), is_first);
+        }
+    }
 
     /// A tenth of the samples are guided, with share 0.4: what both kinds draw has one density together, the mean of theirs,
     /// so that a direction counts the same whichever kind found it; against f64. Killed by: densities exchanged, the guided

@@ -59,6 +59,10 @@ pub struct Finished {
     pub slot: u32,
     /// Whether path guiding has a note on it.
     pub noted: bool,
+    /// Slot of the sample that it is part of.
+    pub parent: u32,
+    /// What its estimate adds to that of this sample, rgb.
+    pub added: [f32; 3],
     /// Where it is logged.
     pub bin: u32,
     /// Estimate, rgb.
@@ -71,6 +75,17 @@ pub struct Finished {
     /// drawn for both or for neither. How many are drawn hardly varies, so the difference between those with and those
     /// without is no noise.
     pub pair: Option<[f32; 3]>,
+}
+
+/// A camera sample that is finished.
+#[derive(Clone, Copy, Debug)]
+pub struct FinishedCameraSample {
+    /// Slot that it had.
+    pub slot: u32,
+    /// Estimate, rgb.
+    pub radiance: [f32; 3],
+    /// Whether nothing of it is missing.
+    pub complete: bool,
 }
 
 /// A fixed slab of records of unfinished samples; no slot at all if nothing learns. Slots are numbers that [`Self::open`]
@@ -195,17 +210,20 @@ impl<'m> Ledger<'m> {
     }
 
     /// Closes a lane or a drained vertex of a sample. If that finishes it, and perhaps the samples it is part of, `log`
-    /// is called for each.
+    /// is called for each; the camera sample, if it is among them, comes back.
     #[inline]
-    pub fn close(&mut self, mut slot: u32, mut log: impl FnMut(Finished)) {
+    pub fn close(&mut self, mut slot: u32, mut log: impl FnMut(Finished)) -> Option<FinishedCameraSample> {
         while let Some(r) = self.records.get_mut(slot as usize) {
             r.open = r.open.wrapping_sub(1);
             if r.open & OPEN > 0 {
-                return;
+                return None;
             }
             let done = *r;
             self.free.give(slot);
-            let Some(p) = self.records.get_mut(done.parent as usize) else { return };
+            let Some(p) = self.records.get_mut(done.parent as usize) else {
+                let complete = done.open & INCOMPLETE == 0;
+                return Some(FinishedCameraSample { slot, radiance: done.radiance, complete });
+            };
             p.cost += done.cost;
             if done.open & INCOMPLETE != 0 {
                 p.open |= INCOMPLETE;
@@ -221,14 +239,24 @@ impl<'m> Ledger<'m> {
                 });
                 p.last = value;
                 p.open = p.open & !LAST_WITH_NEE | HAS_LAST | if with_nee { LAST_WITH_NEE } else { 0 };
-                for c in 0..3 {
-                    p.radiance[c] += p.inner[c] * done.radiance[c];
-                }
-                let noted = done.open & NOTED != 0;
-                log(Finished { slot, noted, bin: p.bin, radiance: done.radiance, value, cost: done.cost, pair });
+                let added: [f32; 3] = core::array::from_fn(|c| p.inner[c] * done.radiance[c]);
+                p.radiance.iter_mut().zip(added).for_each(|(sum, x)| *sum += x);
+                let (noted, parent, bin) = (done.open & NOTED != 0, done.parent, p.bin);
+                log(Finished {
+                    slot,
+                    noted,
+                    parent,
+                    added,
+                    bin,
+                    radiance: done.radiance,
+                    value,
+                    cost: done.cost,
+                    pair,
+                });
             }
             slot = done.parent;
         }
+        None
     }
 }
 

@@ -65,7 +65,7 @@ pub(crate) fn cross_media<W: World>(
     let stopped = reached & stops;
     if reached.any() {
         let found = emission::shapes(world, rays, stops.select(light, rays.travelled + end), reached);
-        book.accumulate(reached, &rays.path, &found, Beyond::Ray);
+        book.accumulate_emission::<W>(reached, &rays.path, &found);
         wait(ring, rays, stopped, (rays.ray.o + rays.ray.d * tmax, light, rays.media), world.sampler());
     }
     let unfinished = inside & flight.unfinished & goes_on;

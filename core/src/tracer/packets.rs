@@ -91,6 +91,15 @@ pub(crate) struct ShadowRays8 {
     pub towards: U32x8,
 }
 
+/// Emission that eight rays met.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Emission8 {
+    /// Radiance found.
+    pub found: Contribution8,
+    /// MIS weight that it was counted with; of several lights, what was counted over what was met.
+    pub weight: F32x8,
+}
+
 /// Radiance found by eight lanes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Contribution8 {

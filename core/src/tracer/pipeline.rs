@@ -81,16 +81,16 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
             let light = sample_lights(world, &samples);
             let mut note = GuideNote8::NONE;
             let scattered = scatter(world, &samples, light.as_ref().map(|l| l.wi), &mut note);
-            if let Some(light) = light {
+            if let Some(light) = &light {
                 let roulette = settings.shadow_roulette;
-                if let Some(mut shadow) = shadow_rays(world, book, &samples, &light, &scattered.nee, roulette) {
+                if let Some(mut shadow) = shadow_rays(world, book, &samples, light, &scattered.nee, roulette) {
                     let visible = occlude(world, book, &samples, &mut shadow);
                     book.learn_shadow_rays(&samples, &shadow, visible);
                     book.accumulate(visible, &shadow.path, &shadow.found, Beyond::ShadowRay);
                 }
             }
             if W::GUIDING {
-                book.note_directions(&note, &samples);
+                book.note_directions(&note, &samples, light.as_ref(), scattered.nee.pdf);
             }
             book.break_lanes(scattered.broken, &samples.path);
             book.close_lanes::<W>(samples.active.and_not(scattered.rays.active), &samples.path);
@@ -112,7 +112,7 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
     if emission::has_shapes::<W>(world.scene()) {
         let (clear, upto) = (rays.active.and_not(inside), rays.travelled + traced.hit.select(traced.t, rays.ray.tmax));
         let found = emission::shapes(world, &rays, upto, clear);
-        book.accumulate(clear, &rays.path, &found, Beyond::Ray);
+        book.accumulate_emission::<W>(clear, &rays.path, &found);
         if in_media {
             light = emission::nearest_shape(world, &rays, upto, inside);
         }
@@ -122,7 +122,7 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
     let escaped = rays.active.and_not(traced.hit | collision.mask);
     if escaped.any() {
         if let Some(found) = emission::environment(world, &rays, escaped) {
-            book.accumulate(escaped, &rays.path, &found, Beyond::Ray);
+            book.accumulate_emission::<W>(escaped, &rays.path, &found);
         }
         book.close_lanes::<W>(escaped, &rays.path);
     }
@@ -138,7 +138,7 @@ pub(super) fn turn<W: World>(world: &W, job: &Job, index: u32, state: &mut State
     }
     book.counters.surface.count(hit.mask.count());
     if let Some(found) = emission::area(world, &rays, &hit, point.ng) {
-        book.accumulate(hit.emitters(), &rays.path, &found, Beyond::Ray);
+        book.accumulate_emission::<W>(hit.emitters(), &rays.path, &found);
     }
 
     // segments may end here, and camera samples are looked at all the same

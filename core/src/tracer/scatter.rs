@@ -8,6 +8,7 @@ use super::packets::{RayState8, Samples8};
 use super::shading::dispatch;
 use crate::bsdf::{Bsdf, Eval8, HenyeyGreenstein, Inputs8, Sample8, Visitor, folded};
 use crate::geometry::{self, Ray8};
+use crate::rng::Key8;
 use crate::scene::{Effects, Scene};
 use crate::world::World;
 use croupier_simd::{F32x8, Frame8, Mask8, U32x8, Vec3x8};
@@ -64,19 +65,24 @@ pub(crate) fn scatter<W: World>(
     nee: Option<Vec3x8>,
     note: &mut GuideNote8,
 ) -> Scattered8 {
+    let mut key = samples.key;
     if W::GUIDING
         && let Some(guide) = world.learned().guide()
-        && let Some(guided) = guided::draw(guide, world, samples)
-        && let kernel = GuidedKernel::new((world.scene(), world.sampler()), samples, nee, &guided)
-        && let Some(both) = visit::<W, _>(samples, kernel)
     {
-        let m = guided::mix(&guided, &both, nee);
-        *note = m.note;
-        return onwards(world, samples, m.nee, &m.sample, m.wi);
+        let turn = guided::turn(world, samples);
+        key = turn.key;
+        if let Some(guided) = guided::draw(guide, world, samples, &turn)
+            && let kernel = GuidedKernel::new(world.scene(), samples, nee, &guided)
+            && let Some(both) = visit::<W, _>(samples, kernel)
+        {
+            let m = guided::mix(&guided, &both, nee);
+            *note = m.note;
+            return onwards(world, samples, key, m.nee, &m.sample, m.wi);
+        }
     }
-    let kernel = Kernel { scene: world.scene(), samples, nee, u: samples.key.scattering(world.sampler()) };
+    let kernel = Kernel { scene: world.scene(), samples, nee, u: key.scattering(world.sampler()) };
     let (nee, s, frame) = visit::<W, _>(samples, kernel).unwrap_or_else(nothing);
-    onwards(world, samples, nee, &s, frame.to_world(s.wi))
+    onwards(world, samples, key, nee, &s, frame.to_world(s.wi))
 }
 
 /// Calls `kernel` with what scatters the samples. `None` for a class outside the profile, which cannot be: sessions refuse
@@ -90,9 +96,9 @@ fn visit<'s, W: World, V: Visitor<'s>>(samples: &Samples8, kernel: V) -> Option<
     }
 }
 
-/// The rays of the samples `s` in the world directions `wi`.
+/// The rays of the samples `s`, which were drawn with `key`, in the world directions `wi`.
 #[inline(always)]
-fn onwards<W: World>(world: &W, samples: &Samples8, nee: Eval8, s: &Sample8, wi: Vec3x8) -> Scattered8 {
+fn onwards<W: World>(world: &W, samples: &Samples8, key: Key8, nee: Eval8, s: &Sample8, wi: Vec3x8) -> Scattered8 {
     let v = &samples.vertex;
     let beta = v.beta * s.weight;
     let valid = samples.continues & s.valid;
@@ -113,7 +119,7 @@ fn onwards<W: World>(world: &W, samples: &Samples8, nee: Eval8, s: &Sample8, wi:
             pdf: s.pdf,
             skip_mis: s.delta,
             path: super::path::Path8 { depth, ..samples.path },
-            key: samples.key.next_vertex(world.sampler(), depth),
+            key: key.next_vertex(world.sampler(), depth),
             albedo_product: v.albedo_product,
             error_weight: v.error_weight,
         },

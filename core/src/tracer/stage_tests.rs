@@ -374,9 +374,13 @@ fn emission_is_weighted_against_light_samples() {
                 r.skip_mis = if skip_mis { Mask8::all_lanes() } else { Mask8::NONE };
                 let area = emission::area(world, &r, &hit, ng).expect("an emitter");
                 let far = emission::environment(world, &r, escaped).expect("an environment");
+                let weights = [area.weight.lane(4), far.weight.lane(7)];
+                let (area, far) = (area.found, far.found);
                 let weight = |other: f32| if skip_mis { 1.0 } else { 0.0625 / (0.0625 + other * other) };
                 // r^2 / (A cos) and 1 / (4 pi), each chosen with probability 1/2
                 let (w_area, w_far) = (weight(0.5 * 0.25 / 0.5), weight(0.5 * 0.25 / PI));
+                close(weights[0], w_area);
+                close(weights[1], w_far);
                 for c in 0..3 {
                     let (beta, bounce) = ([0.5, 1.0, 2.0][c], [1.0, 0.5, 0.25][c]);
                     close(area.pixel.lane(4)[c], beta * EMISSION[c] * w_area);

@@ -187,7 +187,8 @@ pub struct Guide8 {
     pub fraction: F32x8,
     /// Lanes whose leaf has learned anything.
     pub known: Mask8,
-    root: [u16; 8],
+    /// Nodes of the leaves' directions.
+    pub(crate) root: [u16; 8],
 }
 
 /// Distributions of directions by position, as all shards sample them.
@@ -327,6 +328,12 @@ impl<'m> Guide<'m> {
     /// Number of nodes in use, of all leaves.
     pub fn nodes(&self) -> u32 {
         self.scalars.used.saturating_sub(self.scalars.free_nodes)
+    }
+
+    /// Does it know any directions?
+    #[inline(always)]
+    pub(crate) fn knows_directions(&self) -> bool {
+        self.nodes() > 1
     }
 
     /// Number of subdivisions, of leaves or cells, that found no room.

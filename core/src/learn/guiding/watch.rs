@@ -1,16 +1,23 @@
-//! Is path guiding worth its cost? Predicted from the samples that are guided: with p the density of the BSDF and m that
-//! of the mixture that was sampled, a sample whose bounce gave X, and its light sample Z, has the second moment
+//! Is path guiding worth its cost? Predicted from camera samples of guided pixels. With p the density of the BSDF at a bounce,
+//! m that of the mixture that was sampled, X what the bounce gave and Z what its light sample gave, the second moment of a
+//! sample of a vertex with the guide, and what it would be without it, on average, are
 //!
 //! ```text
-//! w (X + Z)^2                      as it is
-//! w ((X + Z)^2 + X^2 (m / p - 1))  as it would be without the guide
+//! T^2 = (Z + X)^2
+//! N   = Z'^2 + 2 Z' X' + m / p (X'^2 + sum of N_i - T_i^2)
 //! ```
 //!
-//! on average (`fraction.rs`). w is what a squared error of the vertex counts in the error of the picture: the squared
-//! weight of the path so far, times the error weight of its pixel. The gain is the sum of the latter over that of the
-//! former. Both are of the same samples, so what is rare and large is in both, and their ratio is known much better than
-//! either: errors of guided samples and of others would need far more. Samples that are not guided are not asked for
-//! the gain: they would not find what a guide would.
+//! because E_p[(f / p)^2] = E_m[(f / m)^2 m / p] for what the BSDF f brings, and E_p[f / p] = E_m[f / m]. The sum is over the
+//! samples of the vertex that the bounce led to, times what they count, squared: all vertices of a path are without the guide
+//! together, so that a gain at each of many bounces is a large one of the path. Z' and X' are weighted against each other as
+//! without the guide (`tracer/guide_notes.rs`). A camera sample T of a pixel that is expected to be I has the squared error
+//! (T - I)^2 with the guide and (T - I)^2 + N - T^2 without it, each times the error weight of its pixel. The gain is the sum
+//! of the latter over that of the former. Both are of the same samples, so what is rare and large is in both, and their ratio
+//! is known much better than either: errors of guided samples and of others would need far more. Samples that are not guided
+//! are not asked for the gain: they would not find what a guide would.
+//!
+//! It is that of independent samples, at equal numbers of samples as roulette and splitting are now. Some of what Sobol'
+//! points gain is lost ([`crate::sampler`]), so the gain must be larger the more that is.
 //!
 //! The guide is disabled while no gain is proven: then the pixels of some blocks are guided, others in each iteration. In
 //! small pictures all others teach it too, so that it finds the sooner what it can gain, unless a gain is out of the
@@ -22,22 +29,25 @@ use crate::film::SqrtNewton;
 use crate::rng::mix;
 use bytemuck::{Pod, Zeroable};
 
-/// Gain, less some of its standard error ([`DOUBT`]), from which on the guide is enabled. Vertices of a path that could be
-/// guided one after the other count apart, so that pictures gain more than this ratio says; guided samples take more time,
-/// most where rays are cheap, and lose what Sobol' points gain. The benchmark `guiding` shows all but the last. With a bound
-/// of 1.08 `veach_mis`, which then promises 1.18, has 1.09 times the error x rays. With 1.2 the
-/// guide is not enabled by 24 million rays in `living_room` and `volumetric_caustic` either, which would have 0.96 and 0.93
-/// and promise 1.31 and 1.25 once it is (by hand; benches/EFFICIENCY.md).
-const ENABLED_ABOVE: f64 = 1.2;
-/// Standard errors that the gain must lie above a bound, at first and once it was in doubt. A ratio of which few samples,
-/// those that found rare light, make the most has a standard error of the same size, and is most likely too small; one that
-/// turns out to be too large soon disables the guide again. Later iterations are longer, and few samples tell of the gain
-/// in each, so that one that is too large costs more.
+/// Gain times the variance of the picture over that of independent samples, less some of its standard error ([`DOUBT`]),
+/// from which on the guide is enabled. The factor is more than what Sobol' points lose by it, as some of them go on: in
+/// `veach_mis`, whose factor is a half, 1.03 times, in `cbox`, where it is 0.6, 1.2 times. And pictures gain less than is
+/// predicted, because roulette and splitting would be others without the guide, and guided samples take more time
+/// (benches/EFFICIENCY.md; the benchmark `guiding` shows errors and seconds).
+const ENABLED_ABOVE: f64 = 1.08;
+/// Standard errors that the gain must lie above a bound, at first, and once it was in doubt or all pixels are guided. A ratio
+/// of which few samples, those that found rare light, make the most has a standard error of the same size, and is most likely
+/// too small; one that turns out to be too large soon disables the guide again. Later iterations are longer, and few samples
+/// tell of the gain in each, so that one that is too large costs more. When all pixels are guided many samples tell of it: a
+/// gain that has still such an error is that of a few long paths whose ratios of densities are huge.
 const DOUBT: [f64; 2] = [0.25, 1.0];
-/// Gain below which it is disabled again.
-const DISABLED_BELOW: f64 = 1.08;
-/// Gain that is out of the question if it lies two standard errors above what is known.
-const UNPROMISING_BELOW: f64 = 1.04;
+/// The same product below which it is disabled again.
+const DISABLED_BELOW: f64 = 1.04;
+/// Product that is out of the question if it lies two standard errors above what is known.
+const UNPROMISING_BELOW: f64 = 1.0;
+/// Variance of the picture over that of independent samples that is assumed before it is known. Of nine scenes eight have
+/// more after two or three samples per pixel, `smoke` has 0.65.
+const ASSUMED: f64 = 0.85;
 /// Pixels that are guided at first (in small pictures half as many), and after a gain is out of the question, within the
 /// bounds [`MOST`] and [`LEAST`], were all shards to take part. A guided pixel costs some of what Sobol' points gain, because
 /// its samples have a sequence of their own in each iteration; what they tell of the gain depends on their number, not on
@@ -75,19 +85,19 @@ pub struct GuideUse {
 /// Predicted gain of path guiding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuideGain {
-    /// Squared error of the picture without guiding, over that with it, at equal samples.
+    /// Squared error of the picture without guiding, over that with it, at equal numbers of samples that are independent.
     pub gain: f64,
     /// Its relative standard error.
     pub error: f64,
 }
 
-/// Second moments of guided samples, and as they would be without the guide.
+/// Squared errors of guided camera samples, and as they would be without the guide.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Promise {
     /// Number of samples.
     samples: f64,
-    /// Sum of those without the guide.
+    /// Sum of those without the guide; single ones may be negative.
     without: f64,
     /// Sum of those with it.
     with: f64,
@@ -96,7 +106,7 @@ pub(crate) struct Promise {
 }
 
 impl Promise {
-    /// Adds a sample; none whose moments are not finite.
+    /// Adds a sample; none whose errors are not finite.
     #[inline]
     pub(crate) fn add(&mut self, without: f32, with: f32) {
         if !(without.is_finite() && with.is_finite()) {
@@ -109,6 +119,12 @@ impl Promise {
         for (sum, x) in self.squares.iter_mut().zip([a * a, b * b, a * b]) {
             *sum += x;
         }
+    }
+
+    /// Sums without the guide and with it.
+    #[cfg(test)]
+    pub(crate) fn sums(&self) -> [f64; 2] {
+        [self.without, self.with]
     }
 
     /// Sums of both.
@@ -130,19 +146,22 @@ impl Promise {
 
     /// Ratio of the sums and its relative standard error; `None` before enough samples.
     fn gain(&self) -> Option<GuideGain> {
-        if !(self.samples >= FEWEST && self.without > 0.0 && self.with > 0.0) {
+        if !(self.samples >= FEWEST && self.with > 0.0) {
             return None;
         }
         let gain = self.without / self.with;
         let [a, b, ab] = self.squares;
         let variance = (a - 2.0 * gain * ab + gain * gain * b).max(0.0);
-        Some(GuideGain { gain, error: variance.sqrt_newton() / self.without })
+        // a guide that does much harm may leave less than nothing
+        Some(GuideGain { gain: gain.max(0.0), error: variance.sqrt_newton() / self.without.max(self.with * 1e-3) })
     }
 
     /// Are these sums that samples may have?
     pub(crate) fn is_sound(&self) -> bool {
         let [a, b, c] = self.squares;
-        [self.samples, self.without, self.with, a, b, c].into_iter().all(|x| (0.0..f64::INFINITY).contains(&x))
+        [self.samples, self.with, a, b].into_iter().all(|x| (0.0..f64::INFINITY).contains(&x))
+            && self.without.is_finite()
+            && c.is_finite()
     }
 }
 
@@ -163,8 +182,9 @@ pub(crate) struct Watch {
 const IN_DOUBT: u32 = u32::MAX - 1;
 /// The same: one is out of the question.
 const UNPROMISING: u32 = u32::MAX;
-/// Iterations without a gain after which one is in doubt: of a guide that has learned enough, and of any.
-const PATIENCE: [u32; 2] = [3, 12];
+/// Iterations without a gain after which one is in doubt: of a guide that has learned enough, the same while a standard
+/// error more would be a gain, and of any.
+const PATIENCE: [u32; 3] = [3, 6, 12];
 
 /// A shard goes on in one of so many iterations, or of as many as there are shards, once a gain is in doubt. It may take a
 /// quarter more time then: with 8, `veach_mis` took 3 to 6 % more than without guiding (`benches/EFFICIENCY.md`).
@@ -247,20 +267,29 @@ impl Watch {
     }
 
     /// Decides about the next iteration. A gain is not out of the question before the guide has learned `enough`.
-    pub(crate) fn decide(&mut self, decay: f64, enough: bool) {
-        let (gain, doubted) = (self.gain(), self.doubts >= IN_DOUBT);
+    /// `independence`: variance of the picture over that of independent samples, `None` while unknown.
+    pub(crate) fn decide(&mut self, decay: f64, enough: bool, independence: Option<f64>) {
+        let (doubted, was_enabled) = (self.doubts >= IN_DOUBT, self.enabled());
+        let left = independence.unwrap_or(ASSUMED).min(1.0);
+        let gain = self.gain().map(|g| GuideGain { gain: g.gain * left, ..g });
         if let Some(GuideGain { gain, error }) = gain {
-            let least = if self.enabled() { DISABLED_BELOW } else { ENABLED_ABOVE };
+            let least = if was_enabled { DISABLED_BELOW } else { ENABLED_ABOVE };
             let [at_first, in_doubt] = DOUBT;
-            let doubt = if doubted { in_doubt } else { at_first };
+            let doubt = if doubted || was_enabled { in_doubt } else { at_first };
             self.enabled = (gain * (1.0 - doubt * error) > least).into();
         }
-        let [informed, longest] = PATIENCE;
+        let [informed, unclear, longest] = PATIENCE;
+        let hopeful = gain.is_some_and(|g| g.gain * (1.0 + g.error) > ENABLED_ABOVE);
+        let patience = match (enough, hopeful) {
+            (false, _) => longest,
+            (true, true) => unclear,
+            (true, false) => informed,
+        };
         self.doubts = match gain {
             _ if self.enabled() => 0,
             Some(g) if enough && g.gain * (1.0 + 2.0 * g.error) < UNPROMISING_BELOW => UNPROMISING,
             None if doubted => self.doubts,
-            _ if doubted || self.doubts + 1 >= if enough { informed } else { longest } => IN_DOUBT,
+            _ if doubted || was_enabled && enough || self.doubts + 1 >= patience => IN_DOUBT,
             _ => self.doubts + 1,
         };
         self.promise = self.promise.times(decay);
@@ -280,10 +309,82 @@ mod tests {
     }
 
     fn decided(start: Watch, p: &Promise) -> Watch {
+        decided_of(Some(1.0), start, p)
+    }
+
+    /// In a picture whose variance is so much of that of independent samples.
+    fn decided_of(independence: Option<f64>, start: Watch, p: &Promise) -> Watch {
         let mut watch = start;
         watch.add(p);
-        watch.decide(0.75, true);
+        watch.decide(0.75, true, independence);
         watch
+    }
+
+    /// Killed by: a gain that pays no heed to what Sobol' points gain, pictures of which nothing is known that count as of
+    /// independent samples, factors above 1.
+    #[test]
+    fn what_sobol_points_gain_counts_against_the_guide() {
+        for (gain, independence, enabled) in [
+            (1.5, Some(1.0), true),
+            (1.5, Some(0.6), false),
+            (2.0, Some(0.6), true),
+            (1.2, None, false),
+            (1.5, None, true),
+            (0.9, Some(1.5), false),
+        ] {
+            for start in [Watch::default(), decided(Watch::default(), &promise(100, 0.1))] {
+                let watch = decided_of(independence, start, &promise(4000, 1.0 / gain));
+                assert_eq!(watch.enabled(), enabled, "{gain} {independence:?}");
+            }
+        }
+    }
+
+    /// Samples that would have less error than nothing without the guide, as few may. Killed by: no gain in place of a bad one.
+    #[test]
+    fn a_guide_that_does_great_harm_is_disabled() {
+        let enabled = decided(Watch::default(), &promise(4000, 0.5));
+        let mut harm = promise(40_000, 1.0);
+        (0..40_000).for_each(|_| harm.add(-2.0, 1.0));
+        assert!(harm.is_sound() && harm.gain().is_some_and(|g| g.gain == 0.0 && g.error > 0.0));
+        let watch = decided(enabled, &harm);
+        assert!(!watch.enabled() && watch.promise.is_sound(), "{watch:?}");
+    }
+
+    /// A gain of single samples enables the guide for an iteration, and is in doubt then. Killed by: as few standard errors when
+    /// all pixels are guided, a guide that has all iterations of before to show a gain again.
+    #[test]
+    fn gains_of_few_samples_do_not_last() {
+        // 2 with a standard error of a half
+        let mut lucky = promise(4000, 1.0);
+        lucky.add(lucky.with as f32, 0.0);
+        let enabled = decided(Watch::default(), &lucky);
+        assert!(enabled.enabled(), "{:?}", lucky.gain());
+        let again = decided(Watch { promise: Promise::default(), ..enabled }, &lucky);
+        assert!(!again.enabled() && again.doubts == IN_DOUBT, "{again:?}");
+        // a guide that knows little goes on
+        let mut early = Watch { promise: Promise::default(), ..enabled };
+        early.add(&lucky);
+        early.decide(0.75, false, Some(1.0));
+        assert!(!early.enabled() && early.doubts == 1, "{early:?}");
+    }
+
+    /// Killed by: a gain in doubt as soon as a clear one would be, though more samples would tell, one that never is.
+    #[test]
+    fn gains_that_are_unclear_are_in_doubt_later() {
+        // 1.1 with a standard error of a third or so at first
+        let unclear = |n: u32| {
+            let mut p = promise(n, 1.0);
+            p.add(p.with as f32 * 0.3, p.with as f32 * 0.2);
+            p
+        };
+        let (mut watch, mut iterations) = (Watch::default(), 0);
+        while watch.doubts < IN_DOUBT && iterations < 20 {
+            watch = Watch { promise: Promise::default(), ..watch };
+            watch = decided_of(Some(1.0), watch, &unclear(400));
+            assert!(!watch.enabled(), "{:?}", unclear(400).gain());
+            iterations += 1;
+        }
+        assert_eq!(iterations, 6);
     }
 
     /// Killed by: a gain that is ruled out before anything is known.
@@ -292,7 +393,7 @@ mod tests {
         let mut watch = Watch::default();
         for (enough, open) in [(false, true), (true, false), (true, false), (false, true)] {
             watch.add(&promise(100_000, 2.0));
-            watch.decide(0.75, enough);
+            watch.decide(0.75, enough, Some(1.0));
             assert_eq!((watch.enabled(), watch.all_teach(TrialShares::of([64, 64]))), (false, open));
         }
     }
@@ -352,7 +453,7 @@ mod tests {
         let mut watch = Watch::default();
         for _ in 0..iterations {
             watch.add(&promise(100_000, with));
-            watch.decide(0.75, enough);
+            watch.decide(0.75, enough, Some(1.0));
         }
         watch
     }
@@ -374,7 +475,7 @@ mod tests {
         }
         let mut again = after(3, 2.0, true);
         again.add(&promise(100_000, 2.0));
-        again.decide(0.75, false);
+        again.decide(0.75, false, Some(1.0));
         assert!(again.all_teach(small), "a gain that was out of the question is in doubt");
         // one pixel in 32 is guided; 32 of its samples are learned from, and 8 of each other pixel
         let part = after(3, 0.95, true).guided_part(small, [32, 8]);
@@ -392,13 +493,13 @@ mod tests {
         let all = |watch: &Watch| (0..16).all(|shard| watch.trains([shard, 16]));
         assert_eq!(open.each_ref().map(all), [true; 4], "{open:?}");
         let mut unknown = Watch::default();
-        (0..11).for_each(|_| unknown.decide(0.75, false));
+        (0..11).for_each(|_| unknown.decide(0.75, false, Some(1.0)));
         assert!(all(&unknown), "no sample that tells of a gain");
-        unknown.decide(0.75, false);
+        unknown.decide(0.75, false, Some(1.0));
         // with turns contributions are discounted faster than new ones come
         let mut less = after(3, 0.95, true);
         less.add(&promise(100_000, 0.95));
-        less.decide(0.75, false);
+        less.decide(0.75, false, Some(1.0));
         for start in [after(3, 0.95, true), after(12, 0.95, false), after(1, 2.0, true), less, unknown] {
             for (shards, turns) in [(1, 1), (2, 2), (5, 5), (16, 16), (32, 16), (64, 16)] {
                 let trains = |turn, shard| Watch { turn, ..start }.trains([shard, shards]);
@@ -413,7 +514,7 @@ mod tests {
                 assert!((0..shards).any(|shard| trains(u64::MAX, shard)), "no overflow");
             }
             let mut next = start;
-            next.decide(0.75, true);
+            next.decide(0.75, true, Some(1.0));
             assert!(next.turn == start.turn + 1 && !all(&next), "{next:?}");
         }
     }
@@ -421,14 +522,14 @@ mod tests {
     /// In doubt a gain must be clearer to enable the guide. Killed by: the bound of before.
     #[test]
     fn gains_in_doubt_must_be_clear() {
-        // a gain of 1.27 with an error of 0.09, which one sample makes
+        // a gain of 1.27 with an error of 0.09, which one sample makes, nine tenths of which are left
         let mut unclear = promise(400, 1.0 / 1.15);
         unclear.add(unclear.with as f32 * 0.1, 0.0);
         let gain = unclear.gain();
         assert!(gain.is_some_and(|g| (1.24..1.29).contains(&g.gain) && (0.07..0.1).contains(&g.error)), "{gain:?}");
-        assert!(decided(Watch::default(), &unclear).enabled());
+        assert!(decided_of(Some(0.9), Watch::default(), &unclear).enabled());
         let doubted = Watch { promise: Promise::default(), ..after(3, 0.95, true) };
-        assert!(!decided(doubted, &unclear).enabled());
+        assert!(!decided_of(Some(0.9), doubted, &unclear).enabled());
         assert!(decided(doubted, &promise(4000, 0.5)).enabled(), "one that is clear");
     }
 
