@@ -498,13 +498,13 @@ impl<'m> Bookkeeping<'m> {
             self.ledger.close(record, |f| log(training, counters, &f));
         } else {
             let promising = guide.promises_anything();
-            let whole = self.ledger.close(record, |f| {
+            let camera_sample = self.ledger.close(record, |f| {
                 if promising || f.noted {
                     guide.close(&f);
                 }
                 log(training, counters, &f);
             });
-            if let Some(f) = whole {
+            if promising && let Some(f) = self.ledger.camera_sample(camera_sample) {
                 guide.close_camera_sample(&f);
             }
         }

@@ -79,13 +79,13 @@ pub struct Finished {
 
 /// A camera sample that is finished.
 #[derive(Clone, Copy, Debug)]
-pub struct FinishedCameraSample {
+pub(crate) struct FinishedCameraSample {
     /// Slot that it had.
-    pub slot: u32,
+    pub(crate) slot: u32,
     /// Estimate, rgb.
-    pub radiance: [f32; 3],
+    pub(crate) radiance: [f32; 3],
     /// Whether nothing of it is missing.
-    pub complete: bool,
+    pub(crate) complete: bool,
 }
 
 /// A fixed slab of records of unfinished samples; no slot at all if nothing learns. Slots are numbers that [`Self::open`]
@@ -210,20 +210,17 @@ impl<'m> Ledger<'m> {
     }
 
     /// Closes a lane or a drained vertex of a sample. If that finishes it, and perhaps the samples it is part of, `log`
-    /// is called for each; the camera sample, if it is among them, comes back.
+    /// is called for each, but not for a camera sample: its slot comes back if it is among them, else [`NO_RECORD`].
     #[inline]
-    pub fn close(&mut self, mut slot: u32, mut log: impl FnMut(Finished)) -> Option<FinishedCameraSample> {
+    pub fn close(&mut self, mut slot: u32, mut log: impl FnMut(Finished)) -> u32 {
         while let Some(r) = self.records.get_mut(slot as usize) {
             r.open = r.open.wrapping_sub(1);
             if r.open & OPEN > 0 {
-                return None;
+                return NO_RECORD;
             }
             let done = *r;
             self.free.give(slot);
-            let Some(p) = self.records.get_mut(done.parent as usize) else {
-                let complete = done.open & INCOMPLETE == 0;
-                return Some(FinishedCameraSample { slot, radiance: done.radiance, complete });
-            };
+            let Some(p) = self.records.get_mut(done.parent as usize) else { return slot };
             p.cost += done.cost;
             if done.open & INCOMPLETE != 0 {
                 p.open |= INCOMPLETE;
@@ -256,7 +253,13 @@ impl<'m> Ledger<'m> {
             }
             slot = done.parent;
         }
-        None
+        NO_RECORD
+    }
+
+    /// The camera sample whose slot [`Self::close`] has just given back.
+    pub(crate) fn camera_sample(&self, slot: u32) -> Option<FinishedCameraSample> {
+        let r = self.records.get(slot as usize)?;
+        Some(FinishedCameraSample { slot, radiance: r.radiance, complete: r.open & INCOMPLETE == 0 })
     }
 }
 
