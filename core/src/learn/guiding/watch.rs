@@ -45,12 +45,12 @@ const DOUBT: [f64; 2] = [0.25, 1.0];
 const DISABLED_BELOW: f64 = 1.04;
 /// Product that is out of the question if it lies two standard errors above what is known.
 const UNPROMISING_BELOW: f64 = 1.0;
-/// Variance of the picture over that of independent samples that is assumed before it is known. Of nine scenes eight have
-/// more after two or three samples per pixel, `smoke` has 0.65.
+/// Variance of the picture over that of independent samples that is assumed before it is known: most scenes have 0.87 to 1
+/// after two or three samples per pixel, `smoke` has 0.65.
 const ASSUMED: f64 = 0.85;
 /// Pixels that are guided at first (in small pictures half as many), and after a gain is out of the question, within the
 /// bounds [`MOST`] and [`LEAST`], were all shards to take part. A guided pixel costs some of what Sobol' points gain, because
-/// its samples have a sequence of their own in each iteration; what they tell of the gain depends on their number, not on
+/// its bounces have sequences of their own in each iteration; what they tell of the gain depends on their number, not on
 /// the size of the picture.
 const WANTED: [u64; 2] = [4096, 1024];
 /// Most pixels of a small picture: all of them teach the guide, and half as many as [`WANTED`] are guided. In larger ones
