@@ -176,7 +176,7 @@ fn watched_guides_do_not_bias() {
         let (mut rng, mut least) = (SplitMix(11), f64::INFINITY);
         let image = run(&scene, &s, &mut |i, l| {
             let u = l.guide_use().expect("a guide that is watched");
-            assert!(!u.enabled || !again && i > 8, "{strategy}, iteration {i}: {u:?}");
+            assert!(!u.enabled || !again && i > 3, "{strategy}, iteration {i}: {u:?}");
             least = least.min(u.gain.map_or(f64::INFINITY, |g| g.gain));
             if again || i == 0 {
                 l.load_guide(&adversarial(&scene, &s, 3, &mut rng)).expect("a guide of this scene");

@@ -138,7 +138,7 @@ settings! {
             "norm", "Norm of the errors of the three channels";
         guiding: Guiding = Guiding::Off =>
             "guiding", "Path guiding: scattering by learned distributions of directions, besides those of materials and media";
-        /// Shards also need the ledger then, with 24 bytes more for each record, whatever the strategy.
+        /// Shards also need the ledger then, with 36 bytes more for each record, whatever the strategy.
         guide_bytes: usize = 8 << 20 =>
             "guide-bytes", "Memory for path guiding, the session's and the logs of all shards together";
         factors: [f32; 2] = [MIN_FACTOR, MAX_FACTOR] =>
