@@ -1,5 +1,4 @@
-//! Path guiding in stage `scatter`: the BSDF and the guide are sampled as one mixture, whose density is used
-//! everywhere.
+//! Path guiding in stage `scatter`: the BSDF and the guide are sampled as one mixture, by whose density samples count.
 //!
 //! A sample comes from the guide with probability g, from the BSDF else, and counts f cos / (g q + (1 - g) p) with
 //! both densities q and p at its direction, whichever it came from (Veach's balance heuristic for one sample). Next
@@ -188,7 +187,7 @@ impl<'s> Visitor<'s> for GuidedKernel<'_, 's> {
 
 /// A sample of the mixture.
 pub(super) struct Mixed8 {
-    /// Towards the light sample, with the mixture's density.
+    /// Towards the light sample, with the density that MIS weighs it against.
     pub(super) nee: Eval8,
     /// World direction.
     pub(super) wi: Vec3x8,

@@ -51,7 +51,7 @@ pub(crate) struct RayState8 {
     pub beta: Vec3x8,
     /// Weight of the bounce alone, `f cos / pdf`.
     pub weight: Vec3x8,
-    /// Solid-angle density of the direction.
+    /// Solid-angle density by which MIS weighs what the direction meets.
     pub pdf: F32x8,
     /// Lanes that light sampling cannot reach (camera rays, specular bounces): emission counts in full.
     pub skip_mis: Mask8,
