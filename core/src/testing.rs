@@ -236,7 +236,8 @@ impl<'a> World for TestWorld<'a> {
     }
 }
 
-fn block(size: usize) -> (Vec<u8>, usize) {
+/// Memory of `size` bytes, aligned as blocks are, from an offset on.
+pub(crate) fn block(size: usize) -> (Vec<u8>, usize) {
     let block = std::vec![0xA5; size + BLOCK_ALIGN];
     let offset = block.as_ptr().align_offset(BLOCK_ALIGN);
     (block, offset)

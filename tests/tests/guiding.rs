@@ -173,9 +173,10 @@ fn watched_guides_do_not_bias() {
     for (strategy, again) in [("classic", true), ("ears", true), ("ears", false)] {
         let mut s = guided(&scene, strategy, 5);
         s.learning.guiding = Guiding::Auto;
-        let (mut rng, mut least) = (SplitMix(11), f64::INFINITY);
+        let (mut rng, mut least, mut enabled) = (SplitMix(11), f64::INFINITY, false);
         let image = run(&scene, &s, &mut |i, l| {
             let u = l.guide_use().expect("a guide that is watched");
+            enabled |= u.enabled;
             assert!(!u.enabled || !again && i > 3, "{strategy}, iteration {i}: {u:?}");
             least = least.min(u.gain.map_or(f64::INFINITY, |g| g.gain));
             if again || i == 0 {
@@ -183,6 +184,10 @@ fn watched_guides_do_not_bias() {
             }
         });
         assert!(least < 0.95, "{strategy}: adversarial guides promise {least}");
+        assert_eq!(
+            enabled, !again,
+            "{strategy}: a guide that is misled no more is enabled in the middle of the render"
+        );
         assert_equivalent(&format!("{strategy}, watched"), &image, &reference);
     }
 }

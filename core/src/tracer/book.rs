@@ -439,8 +439,8 @@ impl<'m> Bookkeeping<'m> {
         if lanes.none() {
             return;
         }
-        // without the guide the light sample has another weight, where the densities of both are not those of delta lights
-        let ratio = light.map_or(F32x8::ONE, |l| {
+        // without the guide the light sample has another weight, but that of a delta light
+        let ratio = light.filter(|_| self.guide.promises_anything()).map_or(F32x8::ONE, |l| {
             let [with, without] = [nee_pdf, note.nee_pdf].map(|pdf| power_heuristic(l.pdf, pdf));
             (l.delta | !with.gt(F32x8::ZERO)).select(F32x8::ONE, without / with)
         });

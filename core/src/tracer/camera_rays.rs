@@ -184,6 +184,8 @@ pub(super) fn camera_samples<W: World>(
     };
     // none without a cache: nothing but the guide learns then, and it is not asked here
     let unguided = learned.learned_samples(false);
+    let promising = W::GUIDING && book.guide.promises_anything();
+    let known = promising && learned.guide().is_some_and(Guide::knows_directions);
     let (mut x, mut y, mut pixel, mut sample) = ([0u32; 8], [0u32; 8], [0u32; 8], [0u32; 8]);
     let mut first_halves = [0u32; 8];
     let (mut root, mut record, mut weight) = ([0u32; 8], [NO_RECORD; 8], [[1.0; 3]; 8]);
@@ -205,9 +207,8 @@ pub(super) fn camera_samples<W: World>(
             learning = learned.learned_samples(guided);
         }
         let Some(opened) = book.open_camera_sample(target, s < learning) else { break };
-        if W::GUIDING && book.guide.promises_anything() {
-            let tells = guided && learned.guide().is_some_and(Guide::knows_directions);
-            let counts = if tells { error_weight } else { [0.0; 3] };
+        if promising && opened.1 != NO_RECORD {
+            let counts = if guided && known { error_weight } else { [0.0; 3] };
             book.guide.open_camera_sample(opened.1, learned.expected(film), counts);
         }
         [x[lanes], y[lanes]] = p;

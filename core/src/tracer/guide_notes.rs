@@ -238,21 +238,18 @@ impl<'m> GuideNotes<'m> {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
-
     use super::super::ledger::NO_RECORD;
     use super::*;
     use crate::learn::guiding::GuideSize;
+    use crate::testing::block;
 
     /// What the bounce gave, by the ratio of densities and squared, and the density, within the 2^-7 of the log. Killed by:
     /// halves exchanged, a ratio that is left out, the light sample counted.
     #[test]
     fn contributions_count_by_the_ratio_of_densities() {
         let size = GuideSize::within(1 << 16, 1).expect("a size");
-        let layout = GuideLog::layout(size).expect("a layout");
-        let mut block = std::vec![0u8; layout.size + layout.align];
-        let at = block.as_ptr().align_offset(layout.align);
-        let mut log = GuideLog::new(size, &mut block[at..at + layout.size]).expect("a log");
+        let (mut memory, at) = block(GuideLog::layout(size).expect("a layout").size);
+        let mut log = GuideLog::new(size, &mut memory[at..]).expect("a log");
         log.clear();
         let mut notes = [GuideNote::zeroed(); 2];
         let mut all = GuideNotes { notes: &mut notes, log: Some(log), promise: &mut [] };
@@ -356,9 +353,7 @@ mod tests {
     fn the_promise_is_the_error_of_paths_without_the_guide() {
         let direction = |[f, p, m, emission, l]: [f32; 5]| Direction { f, p, m, emission, l };
         let size = GuideSize::within(1 << 16, 1).expect("a size");
-        let layout = GuideLog::layout(size).expect("a layout");
-        let mut block = std::vec![0u8; layout.size + layout.align];
-        let at = block.as_ptr().align_offset(layout.align);
+        let (mut memory, at) = block(GuideLog::layout(size).expect("a layout").size);
         for first in [false, true] {
             let world = World {
                 first,
@@ -370,7 +365,7 @@ mod tests {
             let (expected, weight) = (1.3, 2.0);
             let (mut promised, mut want) = ([0.0; 2], [0.0; 2]);
             for way in ways() {
-                let mut log = GuideLog::new(size, &mut block[at..at + layout.size]).expect("a log");
+                let mut log = GuideLog::new(size, &mut memory[at..]).expect("a log");
                 log.clear();
                 let (mut notes, mut promise) = ([GuideNote::zeroed(); 3], [Promise::default()]);
                 let mut all = GuideNotes { notes: &mut notes, log: Some(log), promise: &mut promise };

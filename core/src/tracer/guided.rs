@@ -48,7 +48,7 @@ pub(super) struct Guided8<'a, 'm> {
     overall: F32x8,
     /// Lanes that may be guided.
     guided: Mask8,
-    /// See [`Turn8::first`].
+    /// See [`Guidable8::first`].
     first: Mask8,
     /// Numbers of the BSDF's own samples.
     u: [F32x8; 3],
@@ -74,7 +74,7 @@ pub(super) fn wide_lobes<W: World>(scene: &Scene<'_>, kernel: ClassKernel, mater
 }
 
 /// The samples of a packet that a guide may decide about.
-pub(super) struct Turn8 {
+pub(super) struct Guidable8 {
     /// Lanes with lobes that are wide enough, at vertices where paths go on.
     wide: Mask8,
     /// Those of guided samples whose numbers belonged to sequences that go on.
@@ -85,17 +85,17 @@ pub(super) struct Turn8 {
 
 /// What a guide may decide about, whatever it has learned.
 #[inline(never)]
-pub(super) fn turn<W: World>(world: &W, samples: &Samples8) -> Turn8 {
-    let mut turn = Turn8 { wide: Mask8::NONE, first: Mask8::NONE, key: samples.key };
+pub(super) fn guidable<W: World>(world: &W, samples: &Samples8) -> Guidable8 {
+    let mut g = Guidable8 { wide: Mask8::NONE, first: Mask8::NONE, key: samples.key };
     if samples.class.is_delta() || samples.continues.none() {
-        return turn;
+        return g;
     }
-    turn.wide = samples.continues & wide_lobes::<W>(world.scene(), samples.class.kernel(), samples.vertex.material);
-    turn.first = turn.wide & samples.guided & turn.key.goes_on(world.sampler());
-    if turn.first.any() {
-        turn.key = turn.key.of_iteration(world.iteration().number, turn.first);
+    g.wide = samples.continues & wide_lobes::<W>(world.scene(), samples.class.kernel(), samples.vertex.material);
+    g.first = g.wide & samples.guided & g.key.goes_on(world.sampler());
+    if g.first.any() {
+        g.key = g.key.of_iteration(world.iteration().number, g.first);
     }
-    turn
+    g
 }
 
 /// Draws from the guide for a packet of one class; `None` if guiding is off or of no use. Lanes that are learned
@@ -105,11 +105,11 @@ pub(super) fn draw<'a, 'm: 'a, W: World>(
     guide: &'a Guide<'m>,
     world: &W,
     samples: &Samples8,
-    turn: &Turn8,
+    guidable: &Guidable8,
 ) -> Option<Guided8<'a, 'm>> {
     let learned = if world.learned().all_teach() { samples.active } else { samples.guided };
     let recorded = learned.and_not(samples.path.record.eq(U32x8::splat(NO_RECORD)));
-    let lanes = turn.wide & (samples.guided | recorded);
+    let lanes = guidable.wide & (samples.guided | recorded);
     if lanes.none() {
         return None;
     }
@@ -122,15 +122,15 @@ pub(super) fn draw<'a, 'm: 'a, W: World>(
     if recorded.none() && !at.fraction.gt(F32x8::ZERO).any() {
         return None;
     }
-    let words = turn.key.guided_direction(world.sampler());
+    let words = guidable.key.guided_direction(world.sampler());
     let chosen = lanes & at.chosen(&words);
     let (mut dir, mut pdf) = (v.ns, F32x8::ZERO);
     if chosen.any() {
         let (d, q) = guide.sample(&at, words, chosen);
         (dir, pdf) = (Vec3x8::select(chosen, d, v.ns), chosen.zero_unless(q));
     }
-    let u = turn.key.scattering(world.sampler());
-    Some(Guided8 { guide, at, chosen, dir, pdf, recorded, overall, guided: samples.guided, first: turn.first, u })
+    let u = guidable.key.scattering(world.sampler());
+    Some(Guided8 { guide, at, chosen, dir, pdf, recorded, overall, guided: samples.guided, first: guidable.first, u })
 }
 
 /// One class's kernel on a packet, with the BSDF in the guide's directions.
@@ -252,9 +252,9 @@ pub(super) fn mix(g: &Guided8<'_, '_>, both: &Both8, nee_direction: Option<Vec3x
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use crate::learn::guiding::GuideSize;
+    use crate::testing::block;
 
     /// At the first bounce of a path that is guided light samples and bounces are weighted by the BSDF's density, elsewhere by
     /// the mixture's, and what was sampled counts by the mixture's everywhere. Killed by: weights by what a guide has learned
@@ -262,20 +262,18 @@ mod tests {
     #[test]
     fn first_bounces_are_weighted_as_without_the_guide() {
         let size = GuideSize::within(1 << 16, 1).expect("a size");
-        let layout = Guide::layout(size).expect("a layout");
-        let mut block = std::vec![0u8; layout.size + layout.align];
-        let at = block.as_ptr().align_offset(layout.align);
-        let bounds = [[-1.0; 3], [1.0; 3]];
-        let mut guide = Guide::new(size, bounds, &mut block[at..at + layout.size]).expect("a guide");
-        guide.reset();
+        let (mut memory, offset) = block(Guide::layout(size).expect("a layout").size);
+        // one that knows nothing is uniform
+        let guide = Guide::new(size, [[-1.0; 3], [1.0; 3]], &mut memory[offset..]).expect("a guide");
         let (all, up) = (Mask8::all_lanes(), Vec3x8::splat(0.0, 0.0, 1.0));
         let first = Mask8::from_bits(0b0000_1111);
         let chosen = Mask8::from_bits(0b0011_0011);
         let uniform = 0.25 / core::f32::consts::PI;
-        // a guide that knows nothing is uniform
+        let mut at = Guide8::NONE;
+        (at.fraction, at.known) = (F32x8::splat(0.5), all);
         let g = Guided8 {
             guide: &guide,
-            at: Guide8 { fraction: F32x8::splat(0.5), known: all, ..Guide8::NONE },
+            at,
             chosen,
             dir: up,
             pdf: F32x8::splat(uniform),

@@ -69,9 +69,9 @@ pub(crate) fn scatter<W: World>(
     if W::GUIDING
         && let Some(guide) = world.learned().guide()
     {
-        let turn = guided::turn(world, samples);
-        key = turn.key;
-        if let Some(guided) = guided::draw(guide, world, samples, &turn)
+        let guidable = guided::guidable(world, samples);
+        key = guidable.key;
+        if let Some(guided) = guided::draw(guide, world, samples, &guidable)
             && let kernel = GuidedKernel::new(world.scene(), samples, nee, &guided)
             && let Some(both) = visit::<W, _>(samples, kernel)
         {

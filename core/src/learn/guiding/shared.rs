@@ -187,8 +187,7 @@ pub struct Guide8 {
     pub fraction: F32x8,
     /// Lanes whose leaf has learned anything.
     pub known: Mask8,
-    /// Nodes of the leaves' directions.
-    pub(crate) root: [u16; 8],
+    root: [u16; 8],
 }
 
 /// Distributions of directions by position, as all shards sample them.

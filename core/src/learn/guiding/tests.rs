@@ -10,9 +10,9 @@ mod saved;
 use super::node::UNIFORM;
 use super::sphere::{from_square, quantised, to_square};
 use super::*;
-use crate::memory::BLOCK_ALIGN;
 use crate::rng::Key8;
 use crate::sampler::Sampler;
+use crate::testing::block;
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 use std::vec::Vec;
 
@@ -39,12 +39,6 @@ impl Random {
     fn words(&mut self) -> [U32x8; 4] {
         [(); 4].map(|()| U32x8::from_fn(|_| self.next()))
     }
-}
-
-fn block(size: usize) -> (Vec<u8>, usize) {
-    let bytes: Vec<u8> = std::vec![0xa5; size + BLOCK_ALIGN];
-    let offset = bytes.as_ptr().align_offset(BLOCK_ALIGN);
-    (bytes, offset)
 }
 
 /// A guide and a log of `bytes` in all.

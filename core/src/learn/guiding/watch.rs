@@ -31,7 +31,7 @@ use bytemuck::{Pod, Zeroable};
 
 /// Gain times the variance of the picture over that of independent samples, less some of its standard error ([`DOUBT`]),
 /// from which on the guide is enabled. The factor is more than what Sobol' points lose by it, as some of them go on: in
-/// `veach_mis`, whose factor is a half, 1.03 times, in `cbox`, where it is 0.6, 1.2 times. And pictures gain less than is
+/// `veach_mis`, whose factor is a half, 1.03 times, in `cbox`, where it is 0.6, 1.16 times. And pictures gain less than is
 /// predicted, because roulette and splitting would be others without the guide, and guided samples take more time
 /// (benches/EFFICIENCY.md; the benchmark `guiding` shows errors and seconds).
 const ENABLED_ABOVE: f64 = 1.08;
