@@ -165,7 +165,7 @@ fn shards_that_do_not_belong_are_refused_by_name() {
             other
         };
         assert!(matches!(refused(&mut shards[1], session, &changed(0, 1)), E::Magic(_)));
-        assert_eq!(refused(&mut shards[1], session, &changed(VERSION, 1)), E::Version(7));
+        assert_eq!(refused(&mut shards[1], session, &changed(VERSION, 1)), E::Version(6));
         for at in (8..bytes.len()).step_by(97).filter(|at| !(16..20).contains(at) && !(24..32).contains(at)) {
             assert!(matches!(refused(&mut shards[1], session, &changed(at, 4)), E::Hash { .. }), "byte {at}");
         }

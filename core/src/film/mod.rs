@@ -207,6 +207,11 @@ impl<'m> Film<'m> {
         VarianceFactors::told(&self.scalars.independence)
     }
 
+    /// [`ErrorEstimate::independence`] as of the end of the last iteration; `None` while the samples do not tell it.
+    pub(crate) fn independence(&self) -> Option<f64> {
+        Some(self.scalars.error.independence).filter(|x| *x != Independence::UNKNOWN.ratio)
+    }
+
     /// Adds the sums of an iteration to a pixel, each sample with weight `w` if samples have weights.
     #[inline]
     pub(crate) fn merge(&mut self, pixel: usize, sums: &PixelSums, rays: u32, aov: &[f32], w: f64) {
@@ -372,24 +377,52 @@ mod tests {
     use crate::memory::BLOCK_ALIGN;
     use std::vec;
 
-    /// What an end that was abandoned has gathered of the correlation does not count in the next one. Killed by: sums that
-    /// are forgotten at the end of a merge only.
-    #[test]
-    fn an_abandoned_merge_is_forgotten() {
-        let layout = FilmLayout { size: [1, 1], weights: false, rays: false, aovs: AovSet::NONE };
+    fn with_film(pixels: u32, check: impl FnOnce(&mut Film<'_>)) {
+        let layout = FilmLayout { size: [pixels, 1], weights: false, rays: false, aovs: AovSet::NONE };
         let needed = Film::measure(Measure::new(), &layout).layout().expect("a small film");
         let mut memory = vec![0u8; needed.size + BLOCK_ALIGN];
         let from = memory.as_ptr().align_offset(BLOCK_ALIGN);
         let mut c = Carver::new(&mut memory[from..], needed).expect("room");
-        let mut film = Film::carve(&mut c, &layout, FilmScalars::new()).expect("room");
+        check(&mut Film::carve(&mut c, &layout, FilmScalars::new()).expect("room"));
+    }
+
+    /// Four samples, half of them in each half of the pixel.
+    fn four_samples() -> PixelSums {
         let mut sums = PixelSums::default();
         (0..4u8).for_each(|i| sums.add([f64::from(i); 3], if i < 2 { Half::First } else { Half::Second }, 0));
-        let nothing = |film: &Film<'_>| bytemuck::bytes_of(&film.scalars.differences).iter().all(|b| *b == 0);
-        film.merge(0, &sums, 0, &[], 1.0);
-        film.end_merge();
-        film.merge(0, &sums, 0, &[], 1.0);
-        assert!(!nothing(&film));
-        film.begin_merge();
-        assert!(nothing(&film));
+        sums
+    }
+
+    /// What an end that was abandoned has gathered of the correlation does not count in the next one. Killed by: sums that
+    /// are forgotten at the end of a merge only.
+    #[test]
+    fn an_abandoned_merge_is_forgotten() {
+        with_film(1, |film| {
+            let sums = four_samples();
+            let nothing = |film: &Film<'_>| bytemuck::bytes_of(&film.scalars.differences).iter().all(|b| *b == 0);
+            film.merge(0, &sums, 0, &[], 1.0);
+            film.end_merge();
+            film.merge(0, &sums, 0, &[], 1.0);
+            assert!(!nothing(film));
+            film.begin_merge();
+            assert!(nothing(film));
+        });
+    }
+
+    /// Killed by: a ratio of 1 before any samples tell it, one that stays unknown.
+    #[test]
+    fn independence_is_unknown_until_samples_tell_it() {
+        with_film(64, |film| {
+            let mut sums = TrimmedSums::default();
+            sums.count = 64;
+            (sums.sums[0], sums.sums[5]) = (64.0, 32.0);
+            film.set_error(&sums);
+            assert_eq!((film.independence(), film.error_estimate().independence), (None, 1.0));
+            (0..64).for_each(|i| film.merge(i, &four_samples(), 0, &[], 1.0));
+            film.end_merge();
+            assert_eq!(film.independence(), None, "as of the last end");
+            film.set_error(&sums);
+            assert_eq!(film.independence(), Some(2.0));
+        });
     }
 }

@@ -16,6 +16,7 @@
 use super::{Phase, SessionError, SessionState};
 use crate::learn::LearnedState;
 use crate::record::Finishing;
+use crate::sampler::Sampler;
 use crate::tracer::{Budget, Shard, ShardCursor, StepResult};
 use core::iter::Fuse;
 
@@ -344,12 +345,20 @@ impl SessionState<'_> {
         1 + n as u64 / ABSORBED_PER_RAY
     }
 
+    /// Variance of the picture over that of independent samples, as of the iteration before; `None` while unknown.
+    fn independence(&self) -> Option<f64> {
+        match self.plan.settings().sampler {
+            // no point of a sequence is lost by guiding
+            Sampler::Hashed => Some(1.0),
+            // parts of a picture may begin with many samples that others have
+            Sampler::Sobol => self.film.independence().filter(|_| self.iteration.first_sample >= FEWEST_TOLD),
+        }
+    }
+
     /// Learns the distributions of path guiding from the logs of the shards.
     fn learn_guide<'a, 'b: 'a>(&mut self, shards: &mut Walk<'a, 'b, impl Shards<'a, 'b>>, rays: u64) -> u64 {
         if !self.learned.guide_wants_logs() {
-            // as of the iteration before
-            let told = self.iteration.first_sample >= FEWEST_TOLD;
-            let independence = told.then(|| self.film.error_estimate().independence);
+            let independence = self.independence();
             let (work, done) = self.learned.learn_guide(independence);
             if done {
                 self.next_stage();

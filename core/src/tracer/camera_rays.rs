@@ -170,7 +170,8 @@ pub(super) fn camera_samples<W: World>(
 ) -> CameraSamples8 {
     let (settings, tiles, learned, iteration) = (&job.settings, &job.tiles, world.learned(), world.iteration());
     let sampler = world.sampler();
-    let mut origin = Origin { seed: settings.seed, iteration: iteration.number, first: iteration.first_sample };
+    let (seed, first) = (settings.seed, iteration.first_sample);
+    let mut origin = Origin { seed, iteration: iteration.number, first, alone: false };
     let mut before = origin.first;
     if settings.adaptive {
         // numbers of one pixel must not come back in another iteration, however many samples it had

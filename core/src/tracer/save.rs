@@ -30,9 +30,9 @@ use core::fmt;
 
 /// First bytes of a saved shard.
 const MAGIC: u64 = u64::from_ne_bytes(*b"CRPSHARD");
-/// Version of the format, which covers the layout of sums and counters, and what densities and leaves of path guiding
-/// mean.
-const VERSION: u32 = 6;
+/// Version of the format, which covers the layout of sums and counters, and what densities, leaves and promises of path
+/// guiding mean.
+const VERSION: u32 = 7;
 /// Bytes of magic and hash, which the hash does not cover.
 const UNHASHED: usize = 16;
 
@@ -41,8 +41,8 @@ const HEADER: usize = size_of::<Header>();
 const GUIDED: usize = size_of::<GuideHeader>();
 
 // Any of these is part of the layout: other counters or sums need another version.
-const _: () = assert!(VERSION == 6 && HEADER == 400 && size_of::<PixelSums>() == 48 && Training::BIN_BYTES == 52);
-const _: () = assert!(VERSION == 6 && GUIDED == 56);
+const _: () = assert!(VERSION == 7 && HEADER == 400 && size_of::<PixelSums>() == 48 && Training::BIN_BYTES == 52);
+const _: () = assert!(VERSION == 7 && GUIDED == 56);
 
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]

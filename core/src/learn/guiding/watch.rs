@@ -69,6 +69,8 @@ const BLOCK_BITS: u32 = 3;
 pub(crate) const ENOUGH: f32 = 65_536.0;
 /// Samples before which nothing is decided.
 const FEWEST: f64 = 256.0;
+/// Most samples that a shard may tell of: more are not counted exactly.
+const MOST_SAMPLES: f64 = 9_007_199_254_740_992.0;
 /// Samples of a guided pixel that are learned from in each iteration, at least: a choice. 8 and 16 learn too little where
 /// light is hard to find; more than 32 cost more and gain nothing.
 pub(crate) const LEARNED: u32 = 32;
@@ -152,16 +154,21 @@ impl Promise {
         let gain = self.without / self.with;
         let [a, b, ab] = self.squares;
         let variance = (a - 2.0 * gain * ab + gain * gain * b).max(0.0);
-        // a guide that does much harm may leave less than nothing
-        Some(GuideGain { gain: gain.max(0.0), error: variance.sqrt_newton() / self.without.max(self.with * 1e-3) })
+        let error = variance.sqrt_newton() / self.without.max(self.with * 1e-3);
+        // a guide that does much harm may leave less than nothing; forged sums may have any ratio
+        (gain.is_finite() && error.is_finite()).then_some(GuideGain { gain: gain.max(0.0), error })
     }
 
-    /// Are these sums that samples may have?
+    /// Are these sums that samples may have? Sums of such ones are finite.
     pub(crate) fn is_sound(&self) -> bool {
-        let [a, b, c] = self.squares;
-        [self.samples, self.with, a, b].into_iter().all(|x| (0.0..f64::INFINITY).contains(&x))
-            && self.without.is_finite()
-            && c.is_finite()
+        // twice what finite samples may have, for rounding
+        let most = 2.0 * f64::from(f32::MAX);
+        let [a, b, ab] = self.squares;
+        let within = |x: f64, most: f64| x.abs() <= most * self.samples;
+        (0.0..=MOST_SAMPLES).contains(&self.samples)
+            && [self.with, a, b].into_iter().all(|x| x >= 0.0)
+            && [self.without, self.with].into_iter().all(|x| within(x, most))
+            && [a, b, ab].into_iter().all(|x| within(x, most * most))
     }
 }
 
@@ -348,6 +355,43 @@ mod tests {
         assert!(harm.is_sound() && harm.gain().is_some_and(|g| g.gain == 0.0 && g.error > 0.0));
         let watch = decided(enabled, &harm);
         assert!(!watch.enabled() && watch.promise.is_sound(), "{watch:?}");
+    }
+
+    /// Sums that a forged shard may have: those of many shards stay finite, and a ratio that is none decides nothing.
+    /// Killed by: finite sums of any size, squares that are not bounded, sums that are not numbers, infinite gains.
+    #[test]
+    fn forged_sums_are_refused_or_finite() {
+        let samples = 1000.0;
+        let largest = Promise { samples, without: 3e41, with: 3e41, squares: [1e80, 1e80, -1e80] };
+        assert!(largest.is_sound() && promise(1000, 2.0).is_sound() && Promise::default().is_sound());
+        let mut brightest = Promise::default();
+        (0..10).for_each(|_| brightest.add(-f32::MAX, f32::MAX));
+        assert!(brightest.is_sound(), "{brightest:?}");
+        for forged in [
+            Promise { samples: 1e300, ..largest },
+            Promise { samples: -1.0, ..Promise::default() },
+            Promise { samples: f64::NAN, ..Promise::default() },
+            Promise { without: -1e42, ..largest },
+            Promise { with: 1e42, ..largest },
+            Promise { with: -1.0, ..largest },
+            Promise { without: f64::NAN, ..largest },
+            Promise { squares: [1e81, 0.0, 0.0], ..largest },
+            Promise { squares: [0.0, 1e81, 0.0], ..largest },
+            Promise { squares: [0.0, 0.0, -1e81], ..largest },
+            Promise { squares: [0.0, f64::NAN, 0.0], ..largest },
+        ] {
+            assert!(!forged.is_sound(), "{forged:?}");
+        }
+        let mut watch = Watch::default();
+        let most = Promise { samples: MOST_SAMPLES, without: 3e54, with: 3e54, squares: [1e92; 3] };
+        assert!(most.is_sound());
+        (0..4096).for_each(|_| watch.add(&most));
+        watch.decide(1.0, true, Some(1.0));
+        assert!(watch.gain().is_some_and(|g| g.gain == 1.0 && g.error >= 0.0), "{watch:?}");
+        let tiny = Promise { with: 1e-320, ..largest };
+        assert!(tiny.is_sound() && tiny.gain().is_none());
+        let known = decided(Watch::default(), &tiny);
+        assert!(!known.enabled(), "{known:?}");
     }
 
     /// A gain of single samples enables the guide for an iteration, and is in doubt then. Killed by: as few standard errors when
