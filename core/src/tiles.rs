@@ -151,6 +151,11 @@ impl Tiles {
         self.columns as usize * self.rows as usize
     }
 
+    /// Number of pixels, of all shards.
+    pub(crate) fn pixels(&self) -> u64 {
+        u64::from(self.size[0]) * u64::from(self.size[1])
+    }
+
     /// Number of pixels that `shard` owns.
     pub(crate) fn pixels_of(&self, shard: u32) -> usize {
         let last = self.columns.saturating_sub(1);

@@ -35,14 +35,20 @@ use crate::media::{self, Segment8};
 use crate::rng::Key8;
 use crate::sampler::{Numbers8, Sampler};
 use crate::scene::Effects;
+use crate::tiles::Tiles;
 use crate::world::World;
 use core::f32::consts::{FRAC_1_PI, PI};
 use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 
-/// Pixels for each light path: with fewer paths what they have to find is missed, more cost more than they gain.
-const PIXELS: usize = 2;
+/// Pixels for each light path. With two, short renders of scenes that are not guided take up to 1.1 times the work
+/// (benches/EFFICIENCY.md).
+const PIXELS: u64 = 4;
+/// Light paths of a small picture, for which half as many pixels will do. With half as many paths `pool` misses what they
+/// have to find.
+const FEWEST: u64 = 8192;
 
-/// Arrivals of power after which no more light paths begin: each shard has an equal part of them.
+/// Arrivals of power after which no more light paths begin: each shard has an equal part of them. Caustics lose by fewer, more
+/// gain nothing.
 const ENOUGH: u32 = 4096;
 
 /// Most rays of a light path.
@@ -59,9 +65,13 @@ const FIRST_RAY: u32 = 0;
 const SAMPLE: u32 = 1;
 const NEXT_RAY: u32 = 2;
 
-/// Packets of light paths of a shard with so many pixels.
-pub(super) fn packets_of(pixels: usize) -> u32 {
-    u32::try_from(pixels.div_ceil(8 * PIXELS)).unwrap_or(u32::MAX)
+/// Packets of light paths of shard `index`.
+pub(super) fn packets_of(tiles: &Tiles, index: u32) -> u32 {
+    let pixels = tiles.pixels().max(1);
+    let paths = (pixels / PIXELS).max(FEWEST.min(2 * pixels / PIXELS)).max(1);
+    // a picture has less than 2^32 pixels
+    let packets = (tiles.pixels_of(index) as u64 * paths).div_ceil(8 * pixels);
+    u32::try_from(packets).unwrap_or(u32::MAX)
 }
 
 /// The next light paths of shard `index`, of which so many packets are left.
@@ -265,5 +275,30 @@ impl RayState8 {
         self.media = self.media.select(mask, o.media);
         self.key.lo = U32x8::select(mask, o.key.lo, self.key.lo);
         self.key.hi = U32x8::select(mask, o.key.hi, self.key.hi);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Killed by: as many paths for each pixel of every picture, small pictures with more paths than pixels, a product that
+    /// overflows, shards that do not share the paths.
+    #[test]
+    fn small_pictures_have_as_many_light_paths() {
+        for (size, paths) in [
+            ([16, 16], 128),
+            ([64, 64], 2048),
+            ([128, 128], 8192),
+            ([176, 160], 8192),
+            ([256, 256], 16_384),
+            ([32_768, 32_768], 1 << 28),
+        ] {
+            for shards in [1, 16] {
+                let tiles = Tiles::new(size, shards);
+                let all: u64 = (0..shards).map(|i| 8 * u64::from(packets_of(&tiles, i))).sum();
+                assert!((paths..paths + 8 * u64::from(shards)).contains(&all), "{size:?}, {shards} shards: {all}");
+            }
+        }
     }
 }

@@ -71,7 +71,7 @@ impl<'m> State<'m> {
         self.ring.resume(&r.ring)?;
         self.book.resume(&r.book)?;
         self.comb = CombNumbers::new(job.settings.seed, iteration.number, index).resume(r.drawn);
-        let most = if job.guide.is_some() { packets_of(job.tiles.pixels_of(index)) } else { 0 };
+        let most = if job.guide.is_some() { packets_of(&job.tiles, index) } else { 0 };
         self.light_packets = u32::try_from(r.light_packets).ok().filter(|left| *left <= most)?;
         Some(())
     }
@@ -92,7 +92,7 @@ impl<'m> State<'m> {
         self.cursor = CameraCursor::new(&job.tiles, index, iteration.samples);
         self.comb = CombNumbers::new(job.settings.seed, iteration.number, index);
         let trained = W::GUIDING && iteration.first_sample == 0 && world.learned().wants_light_paths();
-        self.light_packets = if trained { packets_of(job.tiles.pixels_of(index)) } else { 0 };
+        self.light_packets = if trained { packets_of(&job.tiles, index) } else { 0 };
     }
 }
 
