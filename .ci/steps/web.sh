@@ -26,7 +26,8 @@ step_web() {
 # shows all of its figures. Pictures of it, to be looked at, go to target/report-shots.
 step_report() {
     need_browser
-    local program=(cargo run --release -p croupier-host --bin croupier -- report)
+    # of the build of the tests: what the page shows of speed does not matter here
+    local program=(cargo run -p croupier-host --bin croupier -- report)
     rm -rf "$target/report" "$target/report-again"
     "${program[@]}" --tiny --out "$target/report"
     "${program[@]}" --ledger "$target/report/ledger.json" --out "$target/report-again"
