@@ -8,7 +8,12 @@ need_browser() {
     command -v node >/dev/null || missing+=(nodejs)
     command -v npm >/dev/null || missing+=(npm)
     [ ${#missing[@]} -eq 0 ] || packages "${missing[@]}"
-    npm ci --prefix embed-example/web --ignore-scripts --no-audit --no-fund
+    # one step at a time, and not while another uses what is there
+    (
+        flock 9
+        [ embed-example/web/node_modules/.package-lock.json -nt embed-example/web/package-lock.json ] ||
+            npm ci --prefix embed-example/web --ignore-scripts --no-audit --no-fund
+    ) 9>"$target/npm.lock"
 }
 
 # The page of embed-example/web: sizes, imports and the picture's hash of its modules and its worker in Node; the page itself
@@ -26,7 +31,7 @@ step_web() {
 # shows all of its figures. Pictures of it, to be looked at, go to target/report-shots.
 step_report() {
     need_browser
-    # of the build of the tests: what the page shows of speed does not matter here
+    # without LTO: what the page shows of speed does not matter here
     local program=(cargo run -p croupier-host --bin croupier -- report)
     rm -rf "$target/report" "$target/report-again"
     "${program[@]}" --tiny --out "$target/report"

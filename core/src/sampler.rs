@@ -19,8 +19,8 @@
 //! they are for any such decision. It must not decide what a number means, or how many points a pixel takes: its next
 //! points depend on those before. So all pixels have sequences of their own in each iteration with adaptive sampling
 //! ([`Origin::apart`]), and guided ones have them from the first bounce on that a guide may decide about
-//! ([`Key8::of_iteration`]). What a guided sample draws before that bounce goes on, the light sample at its vertex too: it
-//! must not be weighted by what the guide knows then.
+//! ([`Key8::of_iteration`]). What a guided sample draws before that bounce goes on, without adaptive sampling, and the light
+//! sample at its vertex too: it must not be weighted by what the guide knows then.
 
 mod sobol;
 
@@ -558,7 +558,7 @@ mod tests {
         }
     }
 
-    /// With sequences of one iteration alone, the samples of each half fill all cells, none goes on at any depth, so that
+    /// With sequences of one iteration alone, the samples of a half fill all cells, none goes on at any depth, so that
     /// bounces that a guide decides about have no others, and another iteration draws other numbers. Killed by: keys that are
     /// taken for ones that go on, hashed ones, an iteration that repeats points.
     #[test]

@@ -275,18 +275,21 @@ fn guides_that_pay_are_enabled() {
     assert_within(CAUSTICS, "ears, guided where it pays", &image, &reference);
 }
 
-/// Sobol' points, whose hashed lanes draw other blocks of numbers. Killed by: leaves that go with the light sample's
-/// numbers.
+/// Sobol' points, whose hashed lanes draw other blocks of numbers, and those of adaptive pictures, of which none go on.
+/// Killed by: leaves that go with the light sample's numbers, a light sample that is weighted against the BSDF where its
+/// bounce is weighted against the mixture.
 #[test]
 fn guided_renders_with_sobol_points_agree_with_others() {
     let scene = blob(&cornell([12, 12]));
     let reference = run(&scene, &plain(&guided(&scene, "none", 6)), &mut |_, _| ());
-    let s = Settings { sampler: Sampler::Sobol, ..guided(&scene, "ears", 6) };
-    let mut rng = SplitMix(7);
-    let image = run_to(PILOTED * DELTA, &scene, &s, &mut |_, l| {
-        l.load_guide(&adversarial(&scene, &s, 2, &mut rng)).expect("a guide of this scene");
-    });
-    assert_equivalent("Sobol' points", &image, &reference);
+    for adaptive in [false, true] {
+        let s = Settings { sampler: Sampler::Sobol, adaptive, ..guided(&scene, "ears", 6) };
+        let mut rng = SplitMix(7);
+        let image = run_to(PILOTED * DELTA, &scene, &s, &mut |_, l| {
+            l.load_guide(&adversarial(&scene, &s, 2, &mut rng)).expect("a guide of this scene");
+        });
+        assert_equivalent(&format!("Sobol' points, adaptive {adaptive}"), &image, &reference);
+    }
 }
 
 /// Killed by: directions of probability 0 where light comes from, densities of cells that are not sampled.

@@ -20,6 +20,9 @@ const VERSION: usize = 16;
 const DIFFERENCE: usize = HEADER + 40;
 const PIXELS: usize = 72;
 const HEADER: usize = 400;
+/// Bytes of what path guiding promises, behind the number of its directions; and of each direction.
+const PROMISE: usize = 48;
+const DIRECTION: usize = 12;
 
 /// Memory of one process: session and shards, full of what is no number.
 struct Process {
@@ -138,6 +141,35 @@ fn with_saved_shard(check: impl FnOnce(&Plan, Scene<'_>, &mut Session<'_, '_>, &
     shards.iter_mut().for_each(|s| finish(session, s, 1000));
     let bytes = saved(&shards[1]);
     check(&plan, scene, other, others, &bytes);
+}
+
+/// Killed by: what path guiding promises taken as it is.
+#[test]
+fn forged_promises_are_refused() {
+    let bytes = blob(&cornell([20, 12]));
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    let mut s = Settings { shards: 1, ..settings(&bytes, "ears") };
+    (s.learning.guiding, s.learning.guide_bytes) = (Guiding::Auto, 256 << 10);
+    let plan = Plan::new(&s).unwrap();
+    let mut memory = [0, 1].map(|_| Process::new(&plan));
+    let [(session, shards), (other, others)] = &mut memory.each_mut().map(|p| p.start::<Guided<Full>>(scene, &plan));
+    session.begin_iteration(4);
+    other.begin_iteration(4);
+    finish(session, &mut shards[0], 1000);
+    let bytes = saved(&shards[0]);
+    // behind the number of directions, of which the log holds all
+    let header = |directions: usize| bytes.len().checked_sub(DIRECTION * directions + PROMISE + 8);
+    let number = |at: usize| u64::from_ne_bytes(bytes[at..at + 8].try_into().unwrap());
+    let found = (1..).map_while(|n| Some((n, header(n)?))).find(|&(n, at)| number(at) == n as u64);
+    let at = found.expect("directions").1 + 8;
+    for forged in [-1.0f64, f64::NAN, 1e300] {
+        let mut bytes = bytes.clone();
+        bytes[at..at + 8].copy_from_slice(&forged.to_ne_bytes());
+        seal(&mut bytes);
+        let error = others[0].load(other, &bytes).unwrap_err();
+        assert!(matches!(error, SavedShardError::Numbers { what: "promise of path guiding", .. }), "{forged}: {error}");
+    }
+    others[0].load(other, &bytes).unwrap();
 }
 
 /// Killed by: any of the checks left out, an error that changes the shard, a shard that is saved while it works.

@@ -350,8 +350,11 @@ impl SessionState<'_> {
         match self.plan.settings().sampler {
             // no point of a sequence is lost by guiding
             Sampler::Hashed => Some(1.0),
-            // parts of a picture may begin with many samples that others have
-            Sampler::Sobol => self.film.independence().filter(|_| self.iteration.first_sample >= FEWEST_TOLD),
+            Sampler::Sobol => {
+                // not those of other parts of the picture, nor of this iteration
+                let own = (self.film.pixel(0).samples as u32).saturating_sub(self.iteration.samples);
+                self.film.independence().filter(|_| own >= FEWEST_TOLD)
+            }
         }
     }
 

@@ -43,7 +43,7 @@ use croupier_simd::{F32x8, Mask8, U32x8, Vec3x8};
 /// Pixels for each light path. With two, short renders of scenes that are not guided take up to 1.1 times the work
 /// (benches/EFFICIENCY.md).
 const PIXELS: u64 = 4;
-/// Light paths of a small picture, for which half as many pixels will do. With half as many paths `pool` misses what they
+/// Fewest light paths of a picture, unless that is more than one for two pixels: with half as many `pool` misses what they
 /// have to find.
 const FEWEST: u64 = 8192;
 

@@ -153,8 +153,11 @@ impl Promise {
         }
         let gain = self.without / self.with;
         let [a, b, ab] = self.squares;
-        let variance = (a - 2.0 * gain * ab + gain * gain * b).max(0.0);
-        let error = variance.sqrt_newton() / self.without.max(self.with * 1e-3);
+        let variance = a - 2.0 * gain * ab + gain * gain * b;
+        if !variance.is_finite() {
+            return None;
+        }
+        let error = variance.max(0.0).sqrt_newton() / self.without.max(self.with * 1e-3);
         // a guide that does much harm may leave less than nothing; forged sums may have any ratio
         (gain.is_finite() && error.is_finite()).then_some(GuideGain { gain: gain.max(0.0), error })
     }
@@ -388,10 +391,13 @@ mod tests {
         (0..4096).for_each(|_| watch.add(&most));
         watch.decide(1.0, true, Some(1.0));
         assert!(watch.gain().is_some_and(|g| g.gain == 1.0 && g.error >= 0.0), "{watch:?}");
-        let tiny = Promise { with: 1e-320, ..largest };
-        assert!(tiny.is_sound() && tiny.gain().is_none());
-        let known = decided(Watch::default(), &tiny);
-        assert!(!known.enabled(), "{known:?}");
+        // an infinite gain, and a finite one whose variance is not a number
+        for with in [1e-320, 1e-250] {
+            let tiny = Promise { with, squares: [1e80; 3], ..largest };
+            assert!(tiny.is_sound() && tiny.gain().is_none(), "{with}: {:?}", tiny.gain());
+            let known = decided(Watch::default(), &tiny);
+            assert!(!known.enabled(), "{known:?}");
+        }
     }
 
     /// A gain of single samples enables the guide for an iteration, and is in doubt then. Killed by: as few standard errors when
