@@ -190,7 +190,6 @@ fn soft(mut s: SceneDescription) -> SceneDescription {
 /// Every choice there is. Killed by: an adaptive pixel whose weight follows its own noise, shadow roulette that divides
 /// one of two sums, a control variate that is added without what was rounded away, a bound that lowers n and not s.
 #[test]
-#[ignore = "a minute of a core: .ci/nightly"]
 fn choices_do_not_bias() {
     let scene = blob(&cornell([16, 16]));
     let none = Known::of(&render(&scene, &Settings { seed: 5, ..learns(&scene, "none", 6) }, 30_000));
@@ -324,7 +323,6 @@ fn random_statistics_do_not_bias() {
 /// Random roulette of next event estimation alone, by visibilities and shares: the other factors stay 1. Killed by: a
 /// light sample or its shadow ray that is divided by another probability than it had, or by none, a probability of 0.
 #[test]
-#[ignore = "a minute of a core: .ci/nightly"]
 fn random_nee_roulette_does_not_bias() {
     let scene = blob(&cornell([16, 16]));
     let none = Known::of(&render(&scene, &Settings { seed: 8, ..learns(&scene, "none", 3) }, 60_000));

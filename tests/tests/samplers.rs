@@ -41,7 +41,6 @@ fn variance(images: &[Image]) -> f64 {
 /// that is no permutation, light chosen and placed by one coordinate, a flag that makes a bit of a random number
 /// constant.
 #[test]
-#[ignore = "a minute of a core: .ci/nightly"]
 fn the_mean_is_that_of_hashed_numbers() {
     for (name, scene, depth) in
         [("cornell", cornell([12, 12]), 5), ("everything", everything([16, 12]), 6), ("misty", misty([16, 12]), 5)]

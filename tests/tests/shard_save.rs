@@ -2,7 +2,7 @@
 //! do not belong are refused.
 
 use croupier::unstable::World;
-use croupier::unstable::learn::Guiding;
+use croupier::unstable::learn::{Guiding, Learning};
 use croupier::unstable::profile::{Full, Guided, Profile};
 use croupier::unstable::scene::blob::content_hash;
 use croupier::{Budget, Plan, SavedShardError, Scene, Session, Settings, Shard};
@@ -107,14 +107,20 @@ fn processes_that_exchange_shards_have_the_same_picture() {
     }
 }
 
+/// With a small guide.
+fn guided(bytes: &[u8], shards: u32) -> Settings {
+    let s = Settings { shards, ..settings(bytes, "ears") };
+    let learning = Learning { guiding: Guiding::Auto, guide_bytes: 256 << 10, ..s.learning };
+    Settings { learning, ..s }
+}
+
 /// With a guide that light paths teach at first, and shards that take turns at it later. Killed by: a loaded shard that has
 /// light paths left, turns that differ between processes.
 #[test]
 fn processes_with_path_guiding_have_the_same_picture() {
     let bytes = blob(&cornell([20, 28]));
     let scene = Scene::from_bytes(&bytes).unwrap();
-    let mut s = Settings { shards: 6, ..settings(&bytes, "ears") };
-    (s.learning.guiding, s.learning.guide_bytes) = (Guiding::Auto, 256 << 10);
+    let s = guided(&bytes, 6);
     // after twelve iterations a gain is in doubt, however little is known
     let iterations = [1, 2, 4, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2];
     let one = exchange::<Guided<Full>>(scene, &s, &iterations, 1, false);
@@ -148,8 +154,7 @@ fn with_saved_shard(check: impl FnOnce(&Plan, Scene<'_>, &mut Session<'_, '_>, &
 fn forged_promises_are_refused() {
     let bytes = blob(&cornell([20, 12]));
     let scene = Scene::from_bytes(&bytes).unwrap();
-    let mut s = Settings { shards: 1, ..settings(&bytes, "ears") };
-    (s.learning.guiding, s.learning.guide_bytes) = (Guiding::Auto, 256 << 10);
+    let s = guided(&bytes, 1);
     let plan = Plan::new(&s).unwrap();
     let mut memory = [0, 1].map(|_| Process::new(&plan));
     let [(session, shards), (other, others)] = &mut memory.each_mut().map(|p| p.start::<Guided<Full>>(scene, &plan));

@@ -238,7 +238,6 @@ fn hosts_may_choose_the_lights() {
 /// (whose reflections would take hours to average) and without the lens. Skipped where the shared scenes are not at
 /// hand. Killed by: a kernel whose samples depend on their number, a class of material that is not split.
 #[test]
-#[ignore = "a minute of a core: .ci/nightly"]
 fn fixed_factors_agree_on_the_materials() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/scenes/material_spheres");
     if !folder.exists() {
