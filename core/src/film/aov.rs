@@ -278,6 +278,7 @@ impl<'m> AovSums<'m> {
     }
 
     /// Empties a pixel.
+    #[inline]
     pub(crate) fn clear(&mut self, pixel: usize) {
         let layout = self.layout;
         let row = self.row_mut(pixel);

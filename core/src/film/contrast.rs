@@ -75,8 +75,10 @@ impl Line {
         // columns beside the block are 0
         let (mut sums, mut rows) = ([0.0; PADDED + 2 * BESIDE], 0.0);
         for line in window {
-            let own = sums.iter_mut().skip(BESIDE).zip(&line.denominator[c % 3]);
-            own.for_each(|(s, x)| *s += x);
+            let own = sums.get_mut(BESIDE..).unwrap_or_default().as_chunks_mut().0;
+            for (s, x) in own.iter_mut().zip(line.denominator[c % 3].as_chunks().0) {
+                *s = (F32x8::new(*s) + F32x8::new(*x)).to_array();
+            }
             rows += 1.0;
         }
         let mut root = [1.0; PADDED];

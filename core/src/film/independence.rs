@@ -27,6 +27,7 @@ const SPREADS: [f64; CLASSES - 1] = [1.0, 8.0];
 /// their noise comes from: rounding by a comb and points that are spread evenly make half the variance, or less, where
 /// all samples are of one size, and change nothing where few samples have found all there is. One ratio for all pixels is
 /// mostly that of the former, and states too little of the error of the latter.
+#[inline]
 pub(super) fn class(p: &PixelStats) -> usize {
     let (mean, variance) = (p.mean(), p.variance_of_mean());
     let square: f64 = mean.iter().map(|m| m * m).sum();
@@ -73,6 +74,7 @@ pub(super) struct Differences {
 
 impl Differences {
     /// Adds a pixel, whose halves are compared in this channel.
+    #[inline]
     pub(super) fn add(&mut self, p: &PixelStats, channel: usize) {
         let (ahead, c) = (p.ahead, channel.min(2));
         let left = p.weight * p.weight - ahead * ahead;

@@ -102,6 +102,7 @@ impl PixelSums {
     }
 
     /// Adds the samples of an iteration, all with weight 1.
+    #[inline]
     pub(super) fn merge(&mut self, o: &Self) {
         if self.samples == 0 || o.samples == 0 {
             if self.samples == 0 {
@@ -120,6 +121,7 @@ impl PixelSums {
     }
 
     /// Adds the number of samples and what the halves differ by.
+    #[inline]
     fn merge_halves(&mut self, o: &Self, w: f64) {
         self.samples = self.samples.saturating_add(o.samples);
         self.difference = finite(f64::from(self.difference) + w * f64::from(o.difference));
@@ -149,6 +151,7 @@ impl PixelSums {
     }
 
     /// Statistics of the pixel; `weights` if its samples have weights.
+    #[inline]
     pub(super) fn stats(&self, weights: Option<&PixelWeights>, rays: u32) -> PixelStats {
         let n = f64::from(self.samples);
         let alike = (n, n, f64::from(self.ahead));
@@ -193,6 +196,7 @@ pub struct PixelStats {
 
 impl PixelStats {
     /// Mean radiance; 0 before the first sample.
+    #[inline]
     pub fn mean(&self) -> [f64; 3] {
         let w = if self.samples == 0 { 1.0 } else { self.weight };
         self.sum.map(|s| s / w)
@@ -202,6 +206,7 @@ impl PixelStats {
     /// that is an upper bound: one comb rounds a packet, and the roundings of its samples cancel (standard errors of up
     /// to twice the true ones were measured). [`Film::standard_error`](super::Film::standard_error) corrects it. One sample
     /// has no measurable variance: its square is used.
+    #[inline]
     pub fn variance_of_mean(&self) -> [f64; 3] {
         let (w, w2, m) = (self.weight, self.weight_sqr, self.mean());
         // w^2 - w2 is w^2 (1 - 1 / n) for n samples of equal weight

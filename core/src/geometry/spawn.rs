@@ -45,6 +45,7 @@ pub(super) fn point_with_normal([a, b, c]: [Vec3x8; 3], n: Vec3x8, u: F32x8, v: 
 /// Geometric normal of `[a, b, c]`, as long as twice the area, from the two shorter edges: of a needle the two long ones
 /// are nearly parallel, and the roundings of their cross product would tilt it. If all three are nearly parallel (an
 /// obtuse needle) it may be tilted by some 2^-24 of length over width.
+#[inline]
 pub fn triangle_normal(a: Vec3x8, b: Vec3x8, c: Vec3x8) -> Vec3x8 {
     edge_normal(b - a, c - b, a - c)
 }
@@ -60,6 +61,7 @@ pub(super) fn edge_normal(ab: Vec3x8, bc: Vec3x8, ca: Vec3x8) -> Vec3x8 {
 }
 
 /// `p` moved along `ng` by `error` to the side that `d` points to. Rounding the sum moves it by at most `error / 32`.
+#[inline]
 pub fn offset(p: Vec3x8, ng: Vec3x8, error: F32x8, d: Vec3x8) -> Vec3x8 {
     p + ng * error.copysign(d.dot(ng))
 }

@@ -449,6 +449,7 @@ impl<'m> LearnedState<'m> {
     /// too dark, and with weights by the variance or the work of earlier iterations up to 2 % too bright. As the
     /// lengths of iterations double, the first ones, which have learned least, cost little. A quarter of the weight for
     /// the very first made the next pictures worse and no later one better.
+    #[inline]
     pub(crate) fn weight_of(&self, film: usize) -> f64 {
         1.0 / self.allocation.share(film as u32)
     }

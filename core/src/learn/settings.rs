@@ -64,6 +64,7 @@ const MEAN_TRUST: f32 = 64.0;
 
 impl ControlVariate {
     /// The value per lane; `None` if it is 0 everywhere.
+    #[inline]
     pub(crate) fn of(self, learned: &Learned8) -> Option<Vec3x8> {
         match self {
             Self::Off => None,

@@ -177,6 +177,7 @@ impl<'m> Bookkeeping<'m> {
     }
 
     /// Begins pixel `slot` of the shard, the next one, with empty sums.
+    #[inline]
     pub(super) fn begin_pixel(&mut self, slot: u32) {
         let slot = slot as usize;
         if let Some(p) = self.pixels.get_mut(slot) {
@@ -190,6 +191,7 @@ impl<'m> Bookkeeping<'m> {
     }
 
     /// Sums, rays and auxiliary sums of pixel `slot` in this iteration; none before it begins.
+    #[inline]
     pub(super) fn pixel(&self, slot: usize) -> (PixelSums, u32, &[f32]) {
         match self.pixels.get(slot) {
             Some(p) if slot < self.begun => (*p, self.rays.get(slot).copied().unwrap_or(0), self.aovs.row(slot)),
@@ -227,6 +229,7 @@ impl<'m> Bookkeeping<'m> {
 
     /// Opens a camera sample: its root and, if it is `learned` from, its ledger record. `None` cannot happen while
     /// roots outnumber vertices by two packets.
+    #[inline]
     pub(super) fn open_camera_sample(&mut self, target: PixelTarget, learned: bool) -> Option<(u32, u32)> {
         let root = self.roots.open(target)?;
         if !learned || !self.ledger.is_on() {
@@ -355,6 +358,7 @@ impl<'m> Bookkeeping<'m> {
     }
 
     /// Counts the lanes of `broken`, whose weight is not finite; what they are part of is not learned from.
+    #[inline]
     pub(super) fn break_lanes(&mut self, broken: Mask8, path: &Path8) {
         for i in broken.lanes() {
             self.count_non_finite(path.root.lane(i));
@@ -394,6 +398,7 @@ impl<'m> Bookkeeping<'m> {
 
     /// Tells the records of the lanes in `active` at which bin the samples of the vertex that they led to are logged,
     /// times which scale, and what they count (`inner`, the bounce's weight over the vertex's factor).
+    #[inline]
     pub(super) fn arrive(&mut self, active: Mask8, path: &Path8, bin: U32x8, scale: Vec3x8, inner: Vec3x8) {
         let active = active.and_not(path.record.eq(U32x8::splat(NO_RECORD)));
         let (record, bin) = (path.record.to_array(), bin.to_array());

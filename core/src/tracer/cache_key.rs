@@ -23,6 +23,7 @@ pub(super) struct CacheKey8 {
 }
 
 /// 1 / x where x is at least `floor`, 0 elsewhere.
+#[inline]
 fn inverse(x: Vec3x8, floor: f32) -> Vec3x8 {
     let one = |x: F32x8| x.ge(F32x8::splat(floor)).zero_unless(F32x8::ONE / x.max(F32x8::splat(floor)));
     Vec3x8::new(one(x.x), one(x.y), one(x.z))

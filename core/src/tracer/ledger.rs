@@ -140,6 +140,7 @@ impl<'m> Ledger<'m> {
     }
 
     /// A record for a sample with one open lane, `with_nee` if it draws a light sample; [`NO_RECORD`] if the slab is full.
+    #[inline]
     pub fn open(&mut self, parent: u32, with_nee: bool) -> u32 {
         let Some(slot) = self.free.take() else { return NO_RECORD };
         let open = if with_nee { 1 | WITH_NEE } else { 1 };

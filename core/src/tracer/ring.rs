@@ -148,6 +148,7 @@ impl<'m> Ring<'m> {
     }
 
     /// Stores a vertex with its samples; the caller has made sure that a slot is free.
+    #[inline]
     pub(crate) fn push(&mut self, class: PacketClass, v: PathVertex) {
         if self.free_len == 0 {
             debug_assert!(false, "a vertex without a slot");

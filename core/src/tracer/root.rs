@@ -144,6 +144,7 @@ impl<'m> Roots<'m> {
     }
 
     /// A new root with one open lane. `None` cannot happen while roots outnumber vertices by two packets.
+    #[inline]
     pub(crate) fn open(&mut self, target: PixelTarget) -> Option<u32> {
         let slot = self.free.take()?;
         *self.slots.get_mut(slot as usize)? = CameraSample { target, open: 1, ..Zeroable::zeroed() };

@@ -30,6 +30,7 @@ pub(crate) struct CombNumbers {
 }
 
 impl CombNumbers {
+    #[inline]
     pub(super) fn new(seed: u64, iteration: u64, shard: u32) -> Self {
         let stream = (iteration << 20 | u64::from(shard)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         Self { generator: Pcg32::seed_from_u64(seed ^ stream), drawn: 0 }
@@ -176,6 +177,7 @@ fn samples_with_nee(comb: &mut CombNumbers, n: [u32; 8], nee_probability: F32x8,
 
 /// Factors above 1 fall to 1 where waiting room or the camera sample's split budget is short: before any weight is
 /// computed, so that the estimate stays unbiased.
+#[inline]
 fn limit(settings: &Settings, book: &mut Bookkeeping<'_>, free: usize, s: F32x8, root: U32x8, active: Mask8) -> F32x8 {
     let splitting = active & s.gt(F32x8::ONE);
     if splitting.none() {

@@ -30,14 +30,16 @@ struct Kernel<'a, 's> {
     /// World directions of light samples; `None` where light sampling does not apply.
     nee: Option<Vec3x8>,
     u: [F32x8; 3],
+    /// Towards the light sample, the scattered direction (local in `wi`), shading frames. Not a result: an option of one
+    /// would be copied twice.
+    found: &'a mut (Eval8, Sample8, Frame8),
 }
 
 impl<'s> Visitor<'s> for Kernel<'_, 's> {
-    /// Towards the light sample, the scattered direction (local in `wi`), shading frames.
-    type Out = (Eval8, Sample8, Frame8);
+    type Out = ();
 
     #[inline(never)]
-    fn visit<B: Bsdf<'s>>(self) -> Self::Out {
+    fn visit<B: Bsdf<'s>>(self) {
         let v = &self.samples.vertex;
         let frame = Frame8::from_normal(v.ns);
         let wo = frame.to_local(v.wo);
@@ -46,13 +48,14 @@ impl<'s> Visitor<'s> for Kernel<'_, 's> {
         if B::FOLDED {
             let n = frame.to_local(v.ng);
             let nee = self.nee.map_or(Eval8::ZERO, |wi| folded::eval(&b, wo, frame.to_local(wi), n));
-            return (nee, folded::sample(&b, wo, self.u, n), frame);
+            *self.found = (nee, folded::sample(&b, wo, self.u, n), frame);
+            return;
         }
         let nee = match self.nee {
             Some(wi) if !B::DELTA => b.eval(wo, frame.to_local(wi)),
             _ => Eval8::ZERO,
         };
-        (nee, b.sample(wo, self.u), frame)
+        *self.found = (nee, b.sample(wo, self.u), frame);
     }
 }
 
@@ -80,8 +83,10 @@ pub(crate) fn scatter<W: World>(
             return onwards(world, samples, key, m.nee, &m.sample, m.wi);
         }
     }
-    let kernel = Kernel { scene: world.scene(), samples, nee, u: key.scattering(world.sampler()) };
-    let (nee, s, frame) = visit::<W, _>(samples, kernel).unwrap_or_else(nothing);
+    let mut found = nothing();
+    let u = key.scattering(world.sampler());
+    visit::<W, _>(samples, Kernel { scene: world.scene(), samples, nee, u, found: &mut found });
+    let (nee, s, frame) = found;
     onwards(world, samples, key, nee, &s, frame.to_world(s.wi))
 }
 

@@ -70,13 +70,8 @@ impl PathVertex {
     /// Eight records of words by row and column.
     #[inline(always)]
     pub(super) fn of_columns(columns: [[F32x8; 8]; 4]) -> [Self; 8] {
-        let mut out: [Self; 8] = Zeroable::zeroed();
-        for (r, columns) in columns.into_iter().enumerate() {
-            for (v, row) in out.iter_mut().zip(F32x8::transpose(columns)) {
-                v.rows[r] = row.to_array();
-            }
-        }
-        out
+        let [a, b, c, d] = columns.map(|c| F32x8::transpose(c).map(F32x8::to_array));
+        core::array::from_fn(|i| Self { rows: [a[i], b[i], c[i], d[i]] })
     }
 
     /// The words of eight records, by row and column.
@@ -127,6 +122,7 @@ impl PathVertex {
 }
 
 impl PathVertex8 {
+    #[inline]
     fn columns(&self) -> [[F32x8; 8]; 4] {
         let f = F32x8::from_bits;
         [
@@ -164,6 +160,7 @@ impl PathVertex8 {
         ]
     }
 
+    #[inline]
     fn from_columns(c: [[F32x8; 8]; 4]) -> Self {
         let [a, b, d, e] = c;
         let (media, depth) = MediaSet8::unpack(b[7].to_bits());
@@ -188,11 +185,13 @@ impl PathVertex8 {
     }
 
     /// The eight lanes as records.
+    #[inline]
     pub(crate) fn records(&self) -> [PathVertex; 8] {
         PathVertex::of_columns(self.columns())
     }
 
     /// Loads one record per lane.
+    #[inline]
     pub(crate) fn from_records(v: [&PathVertex; 8]) -> Self {
         Self::from_columns(PathVertex::columns(v))
     }

@@ -39,6 +39,7 @@ pub(super) struct BinRecord {
 
 impl BinRecord {
     /// Adds a finite sample; `false` if the bin is full.
+    #[inline]
     pub(super) fn add(&mut self, x: [f32; 3], cost: f32) -> bool {
         if self.count == BIN_LIMIT {
             return false;
@@ -61,6 +62,7 @@ impl BinRecord {
     }
 
     /// Adds the square of a finite contribution of next event estimation, times its probability.
+    #[inline]
     pub(super) fn add_nee(&mut self, x: [f32; 3], nee_probability: f32) {
         if self.count != BIN_LIMIT {
             let square: f32 = x.map(|x| x.clamp(0.0, MAX_VALUE)).map(|x| x * x).iter().sum();
@@ -70,6 +72,7 @@ impl BinRecord {
     }
 
     /// Adds a finite half squared difference; `false` if the bin is full.
+    #[inline]
     pub(super) fn add_pair(&mut self, half_squared_difference: [f32; 3]) -> bool {
         if self.pairs == BIN_LIMIT {
             return false;
@@ -97,6 +100,7 @@ impl ShadowRecord {
     }
 
     /// Adds a ray; `false` if the record is full.
+    #[inline]
     pub(super) fn add(&mut self, visible: bool) -> bool {
         if self.rays == BIN_LIMIT {
             return false;

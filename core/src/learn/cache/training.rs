@@ -159,10 +159,12 @@ impl<'m> Training<'m> {
         self.shadows.get(..self.used).unwrap_or(&[])
     }
 
+    #[inline]
     fn shadows_mut(&mut self) -> &mut [ShadowRecord] {
         self.shadows.get_mut(..self.used).unwrap_or(&mut [])
     }
 
+    #[inline]
     fn used_mut(&mut self) -> &mut [BinRecord] {
         self.records.get_mut(..self.used).unwrap_or(&mut [])
     }
