@@ -52,14 +52,14 @@ fn commit() -> String {
 
 /// The command that makes the same table; absolute paths are cut to their last part.
 fn command(bin: &str) -> String {
-    let release = if cfg!(debug_assertions) { "" } else { " --release" };
+    let option = env!("BUILD_OPTION");
     let features =
         [("fast", !croupier::unstable::simd::REPRODUCIBLE), ("effects-rows", cfg!(feature = "effects-rows"))];
     let features =
         features.map(|(name, there)| if there { format!(" --features {name}") } else { String::new() }).concat();
     let args: Vec<String> = std::env::args().skip(1).map(|a| shortened(&a)).collect();
     let args = if args.is_empty() { String::new() } else { format!(" -- {}", args.join(" ")) };
-    format!("cargo run{release} -p croupier-benches{features} --bin {bin}{args}")
+    format!("cargo run{option} -p croupier-benches{features} --bin {bin}{args}")
 }
 
 fn shortened(arg: &str) -> String {

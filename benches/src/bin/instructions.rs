@@ -182,7 +182,7 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         let risen = check(&rows, args.tolerance, &results)?;
         println!("{} rows of benches/results/{NAME}.md checked, {risen} figures above it", rows.len());
         if risen > 0 {
-            println!("if that is meant: cargo run --release -p croupier-benches --bin {NAME} -- --write");
+            println!("if that is meant: cargo run --profile embed -p croupier-benches --bin {NAME} -- --write");
         }
         return Ok(risen == 0);
     }

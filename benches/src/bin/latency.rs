@@ -112,7 +112,7 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         risen.iter().for_each(|figure| println!("RISEN {figure}"));
         println!("{} rows of benches/results/{NAME}.md checked, {} figures above it", table.rows.len(), risen.len());
         if !risen.is_empty() {
-            println!("if that is meant: cargo run --release -p croupier-benches --bin {NAME} -- --write");
+            println!("if that is meant: cargo run --profile embed -p croupier-benches --bin {NAME} -- --write");
         }
         return Ok(risen.is_empty());
     }

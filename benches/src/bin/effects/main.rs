@@ -301,7 +301,8 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
     if args.check {
         let risen = check(&bases, &Results::read(NAME)?)?;
         if risen > 0 {
-            let command = "cargo run --release -p croupier-benches --features effects-rows --bin effects -- --write";
+            let command =
+                "cargo run --profile embed -p croupier-benches --features effects-rows --bin effects -- --write";
             println!("if that is meant: {command}");
         }
         return Ok(risen == 0);
