@@ -9,7 +9,8 @@ fn main() {
     let output = Command::new(rustc).arg("--version").output();
     let version = output.ok().and_then(|o| String::from_utf8(o.stdout).ok()).unwrap_or_else(|| "unknown".into());
     println!("cargo::rustc-env=RUSTC_VERSION={}", version.trim());
-    // cargo names the profile that another one inherits from, but the folder is that of the profile itself
+    // cargo's PROFILE is the one that a profile inherits from, but the folder <target>/<profile>/build/<package>/out has its
+    // own name
     let out = PathBuf::from(std::env::var_os("OUT_DIR").unwrap_or_default());
     let profile = out.ancestors().nth(3).and_then(Path::file_name).unwrap_or_default().to_string_lossy();
     let option = match &*profile {

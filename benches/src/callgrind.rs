@@ -12,6 +12,21 @@ use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+/// Kept counts are of builds with the profile `embed`, without LTO.
+///
+/// # Errors
+/// Another build whose counts are to be kept; of one whose counts are compared it prints a note.
+pub fn note_profile(write: bool) -> Result<(), String> {
+    if env!("BUILD_OPTION").trim() == "--profile embed" {
+        return Ok(());
+    }
+    if write {
+        return Err("counts are kept of builds with `--profile embed`, and this is none".into());
+    }
+    println!("kept counts are of builds with `--profile embed`, and this is none");
+    Ok(())
+}
+
 /// A temporary folder that is removed in the end.
 #[derive(Debug)]
 pub struct Folder(PathBuf);

@@ -80,6 +80,7 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         render(blob, strategy)?;
         return Ok(true);
     }
+    callgrind::note_profile(args.write)?;
     let mut results = Results::of_this_run(NAME);
     let committed = if args.check { Some(Results::read(NAME)?) } else { None };
     let difference = committed.as_ref().and_then(|c| results.differs_in(c, &["instruction set", "arithmetic"]));

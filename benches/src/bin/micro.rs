@@ -99,6 +99,7 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         call(&args.only)?;
         return Ok(true);
     }
+    callgrind::note_profile(args.write)?;
     let mut results = Results::of_this_run(NAME);
     results.header.push(("valgrind".into(), provenance::version_of("valgrind")));
     results.header.push(("caches".into(), CACHES.join(" ")));

@@ -289,6 +289,7 @@ fn run(args: &Args) -> Result<bool, Box<dyn Error>> {
         render(blob, args)?;
         return Ok(true);
     }
+    callgrind::note_profile(args.write)?;
     let mut results = Results::of_this_run(NAME);
     if args.check
         && let Some(difference) = results.differs_in(&Results::read(NAME)?, &["instruction set", "arithmetic"])
