@@ -91,7 +91,6 @@ impl CameraCursor {
         Self { tile, start: tile.map_or([0; 2], |tile| tiles.start(tile)), ..Self::finished() }
     }
 
-    #[inline]
     pub(super) fn new(tiles: &Tiles, shard: u32, samples: u32) -> Self {
         Self::at_tile(tiles, if samples == 0 { None } else { tiles.next_of(shard, 0) })
     }

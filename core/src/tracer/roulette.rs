@@ -30,7 +30,6 @@ pub(crate) struct CombNumbers {
 }
 
 impl CombNumbers {
-    #[inline]
     pub(super) fn new(seed: u64, iteration: u64, shard: u32) -> Self {
         let stream = (iteration << 20 | u64::from(shard)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         Self { generator: Pcg32::seed_from_u64(seed ^ stream), drawn: 0 }

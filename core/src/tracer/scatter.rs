@@ -30,8 +30,8 @@ struct Kernel<'a, 's> {
     /// World directions of light samples; `None` where light sampling does not apply.
     nee: Option<Vec3x8>,
     u: [F32x8; 3],
-    /// Towards the light sample, the scattered direction (local in `wi`), shading frames. Written in
-    /// place: `visit` would return it as an option, which without LTO is copied twice on its way.
+    /// Towards the light sample, the scattered direction (local in `wi`), shading frames. Written in place: [`visit`] would
+    /// return it as an option, which without LTO is copied twice on its way.
     found: &'a mut (Eval8, Sample8, Frame8),
 }
 
