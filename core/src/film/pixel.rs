@@ -208,13 +208,13 @@ impl PixelStats {
     /// has no measurable variance: its square is used.
     #[inline]
     pub fn variance_of_mean(&self) -> [f64; 3] {
-        let (w, w2, m) = (self.weight, self.weight_sqr, self.mean());
-        // w^2 - w2 is w^2 (1 - 1 / n) for n samples of equal weight
-        core::array::from_fn(|c| match self.samples {
-            0 => 0.0,
-            1 => m[c] * m[c],
-            _ => self.spread[c] / (w * w - w2),
-        })
+        let (w, w2) = (self.weight, self.weight_sqr);
+        match self.samples {
+            0 => [0.0; 3],
+            1 => self.mean().map(|m| m * m),
+            // w^2 - w2 is w^2 (1 - 1 / n) for n samples of equal weight
+            _ => self.spread.map(|s| s / (w * w - w2)),
+        }
     }
 }
 
