@@ -32,7 +32,7 @@ const LEARNS = (rrs) => rrs === 'ears' || rrs === 'adrrs';
 const state = {
   scene: null, blob: null, about: '', gain: 1, orbit: null,
   rrs: 'ears', plane: 'picture', depth: 1, workers: 0, target: 0.01,
-  size: [0, 0], moved: 0, moving: false, shownAt: 0, paints: 0, previews: 0,
+  size: [0, 0], moved: 0, moving: false, shownAt: 0, paints: 0, previews: 0, pictures: 0,
   /** Whether the preview does not show the plane that is asked for. */
   stale: false,
 };
@@ -106,6 +106,7 @@ function rest() {
   curves[state.rrs] = [];
   state.shownAt = 0;
   report(null);
+  document.documentElement.dataset.pictures = ++state.pictures;
 }
 
 function frame(now) {
