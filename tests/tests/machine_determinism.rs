@@ -3,7 +3,7 @@
 
 use croupier::Settings;
 use croupier::unstable::Sampler;
-use croupier::unstable::learn::ControlVariate;
+use croupier::unstable::learn::{ControlVariate, Guiding};
 use croupier::unstable::scene::blob::content_hash;
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::builtin;
@@ -242,6 +242,9 @@ fn pictures_have_the_same_bits_on_every_target() {
         learns.learning.subdivide_count = 1000.0;
         add("ears", learns, &[1, 2, 4]);
         add("ears+sobol", Settings { sampler: Sampler::Sobol, ..learns }, &[1, 2, 4]);
+        let mut guided = Settings { sampler: Sampler::Sobol, ..learns };
+        (guided.learning.guiding, guided.learning.guide_bytes) = (Guiding::On, 1 << 20);
+        add("ears+sobol+guided", guided, &[1, 2, 4]);
         let all = Settings { adaptive: true, shadow_roulette: true, control_variate: ControlVariate::Cached, ..learns };
         add("ears+adaptive+shadow+constant", all, &[1, 2, 4]);
     }

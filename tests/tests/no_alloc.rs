@@ -6,7 +6,8 @@
 mod example;
 
 use croupier::unstable::accel::WideBvh;
-use croupier::unstable::profile::{Full, Profile};
+use croupier::unstable::learn::Guiding;
+use croupier::unstable::profile::{Full, Guided, Profile};
 use croupier::unstable::scene::blob::{Light, Material};
 use croupier::{Budget, Plan, Scene, Session, Settings, Shard, StepResult, Strategy};
 use croupier_host::blob::AlignedBytes;
@@ -68,14 +69,18 @@ fn the_watch_works() {
     without_allocating(|| std::hint::black_box(vec![1u8; 100]).len());
 }
 
-/// From bytes to picture, with every strategy and every effect. Killed by: a `Vec` or a `format!` anywhere on the way.
+/// From bytes to picture, with every strategy and every effect, without and with path guiding. Killed by: a `Vec` or a
+/// `format!` anywhere on the way.
 #[test]
 fn nothing_is_allocated_between_bytes_and_picture() {
     for scene in [blob(&cornell([20, 12])), blob(&everything([20, 12]))] {
         for (name, _) in Strategy::TABLE {
             let text = if *name == "fixed" { "fixed:3.3" } else { name };
             let strategy = Strategy::parse(text).unwrap();
-            render::<Full>(&scene, strategy);
+            render::<Full>(&scene, strategy, Guiding::Off);
+            if ["none", "ears"].contains(name) {
+                render::<Guided<Full>>(&scene, strategy, Guiding::On);
+            }
         }
     }
 }
@@ -96,9 +101,10 @@ fn composing_allocates_nothing() {
     assert_eq!(effects, Scene::from_bytes(&baked).unwrap().effects);
 }
 
-fn render<P: Profile>(bytes: &[u8], strategy: Strategy) {
+fn render<P: Profile>(bytes: &[u8], strategy: Strategy, guiding: Guiding) {
     let scene = without_allocating(|| Scene::from_bytes(bytes)).unwrap();
-    let settings = Settings { strategy, shards: 2, aovs: true.into(), max_depth: 6, ..Settings::for_scene(&scene) };
+    let mut settings = Settings { strategy, shards: 2, aovs: true.into(), max_depth: 6, ..Settings::for_scene(&scene) };
+    settings.learning.guiding = guiding;
     let plan = without_allocating(|| Plan::new(&settings)).unwrap();
     let mut shared = AlignedBytes::zeroed(plan.session().size);
     let mut blocks = [(); 2].map(|_| AlignedBytes::zeroed(plan.shard().size));
@@ -126,6 +132,7 @@ fn render<P: Profile>(bytes: &[u8], strategy: Strategy) {
         session.end_iteration(&shards).unwrap();
         let estimate = session.film().error_estimate();
         assert!(estimate.rel_mse.is_finite() && session.counters().rays() > 0);
+        assert!(session.guide().is_some() == (guiding == Guiding::On) && session.guide().is_none_or(|g| g.leaves() > 0));
     });
 }
 

@@ -1,5 +1,7 @@
 //! Sessions that are suspended in their block, resumed, and restarted.
 
+use croupier::unstable::learn::{Guiding, Learning};
+use croupier::unstable::profile::{Full, Guided, Profile, Surfaces};
 use croupier::unstable::scene::blob::content_hash;
 use croupier::unstable::{ResumeError, World};
 use croupier::{Budget, Plan, Scene, Session, SessionError, Settings, Shard, StepResult};
@@ -11,8 +13,29 @@ use croupier_tests::stats::SplitMix;
 
 const ITERATIONS: [u32; 4] = [4, 8, 3, 8];
 
+/// Strategies that guide paths, always and where it pays, with and without statistics of their own.
+fn kinds_of_guides(bytes: &[u8]) -> Vec<Settings> {
+    let guided = |mut s: Settings, guiding| {
+        s.learning = Learning { guiding, guide_bytes: 1 << 20, ..s.learning };
+        s
+    };
+    let kinds = kinds_of_statistics(bytes, 2);
+    let [classic, ears, .., sobol] = kinds[..] else { unreachable!() };
+    vec![guided(classic, Guiding::On), guided(ears, Guiding::On), guided(sobol, Guiding::Auto)]
+}
+
+/// All that a session shows and has learned, as bytes.
+fn everything<P: Profile>(session: &Session<'_, '_, P>) -> Vec<u8> {
+    let mut all = shown(session);
+    let mut statistics = vec![0; session.saved_statistics_len()];
+    let _ = session.save_statistics(&mut statistics);
+    all.extend(statistics);
+    all.extend(format!("{:?}", session.guide_use()).into_bytes());
+    all
+}
+
 /// Renders all iterations.
-fn render(session: &mut Session<'_, '_>, shards: &mut [Shard<'_>]) {
+fn render<P: Profile>(session: &mut Session<'_, '_, P>, shards: &mut [Shard<'_>]) {
     for samples in ITERATIONS {
         session.begin_iteration(samples);
         shards.iter_mut().for_each(|s| finish(session, s, 1 << 20));
@@ -32,78 +55,89 @@ fn blocks(plan: &Plan) -> Vec<AlignedBytes> {
 #[test]
 fn a_session_goes_on_where_it_was_suspended() {
     let bytes = blob(&cornell([20, 12]));
-    let scene = Scene::from_bytes(&bytes).unwrap();
-    for s in kinds_of_statistics(&bytes, 2) {
-        let plan = Plan::new(&s).unwrap();
-        let (mut block, mut own) = (memory(plan.session().size, 0xff), blocks(&plan));
-        let mut session = Session::new(scene, &plan, block.as_mut()).unwrap();
-        render(&mut session, &mut shards(&plan, &mut own));
-        let clean = shown(&session);
+    kinds_of_statistics(&bytes, 2).iter().for_each(|s| goes_on::<Full>(&bytes, s));
+    kinds_of_guides(&bytes).iter().for_each(|s| goes_on::<Guided<Surfaces>>(&bytes, s));
+}
 
-        // the block changes places every time
-        let (mut block, mut own) = (memory(plan.session().size, 0xff), blocks(&plan));
-        let mut shards = shards(&plan, &mut own);
-        Session::new(scene, &plan, block.as_mut()).unwrap().suspend();
-        let mut moved = |work: &mut dyn FnMut(&mut Session<'_, '_>)| {
-            let mut other = memory(plan.session().size, 0xff);
-            other.as_mut().copy_from_slice(block.as_ref());
-            block = other;
-            let mut session = Session::resume(scene, &plan, block.as_mut()).unwrap();
-            work(&mut session);
-            session.suspend();
-        };
-        for samples in ITERATIONS {
-            moved(&mut |session| session.begin_iteration(samples));
-            moved(&mut |session| {
-                shards.iter_mut().for_each(|s| {
-                    s.step(session, Budget { rays: 500 });
-                });
-            });
-            moved(&mut |session| shards.iter_mut().for_each(|s| finish(session, s, 1 << 20)));
-            moved(&mut |session| session.end_iteration(&shards).unwrap());
-        }
-        let mut found = Vec::new();
-        moved(&mut |session| found = shown(session));
-        assert!(found == clean, "{}", s.strategy);
+fn goes_on<P: Profile>(bytes: &[u8], s: &Settings) {
+    let scene = Scene::from_bytes(bytes).unwrap();
+    let plan = Plan::new(s).unwrap();
+    let builder = || Session::builder(scene).profile::<P>();
+    let (mut block, mut own) = (memory(plan.session().size, 0xff), blocks(&plan));
+    let mut session = builder().build(&plan, block.as_mut()).unwrap();
+    render(&mut session, &mut shards(&plan, &mut own));
+    let clean = everything(&session);
+    if s.learning.guiding == Guiding::On {
+        assert!(session.guide().unwrap().mean_fraction() > 0.1);
     }
+
+    // the block changes places every time
+    let (mut block, mut own) = (memory(plan.session().size, 0xff), blocks(&plan));
+    let mut shards = shards(&plan, &mut own);
+    builder().build(&plan, block.as_mut()).unwrap().suspend();
+    let mut moved = |work: &mut dyn FnMut(&mut Session<'_, '_, P>)| {
+        let mut other = memory(plan.session().size, 0xff);
+        other.as_mut().copy_from_slice(block.as_ref());
+        block = other;
+        let mut session = builder().resume(&plan, block.as_mut()).unwrap();
+        work(&mut session);
+        session.suspend();
+    };
+    for samples in ITERATIONS {
+        moved(&mut |session| session.begin_iteration(samples));
+        moved(&mut |session| {
+            shards.iter_mut().for_each(|s| {
+                s.step(session, Budget { rays: 500 });
+            });
+        });
+        moved(&mut |session| shards.iter_mut().for_each(|s| finish(session, s, 1 << 20)));
+        moved(&mut |session| session.end_iteration(&shards).unwrap());
+    }
+    let mut found = Vec::new();
+    moved(&mut |session| found = everything(session));
+    assert!(found == clean, "{}, guiding {:?}", s.strategy, s.learning.guiding);
 }
 
 /// Killed by: statistics, samples or numbers of before that stay, shards whose sums of before are taken.
 #[test]
 fn a_restarted_session_renders_what_a_new_one_does() {
     let bytes = blob(&cornell([20, 12]));
-    let scene = Scene::from_bytes(&bytes).unwrap();
-    for s in kinds_of_statistics(&bytes, 2) {
-        let plan = Plan::new(&s).unwrap();
-        let (mut block, mut own) = (memory(plan.session().size, 0xff), blocks(&plan));
-        let mut shards = shards(&plan, &mut own);
-        let mut session = Session::new(scene, &plan, block.as_mut()).unwrap();
-        render(&mut session, &mut shards);
-        let clean = shown(&session);
-        let before = session.identity();
-        // between iterations, and while one runs
-        for part in [0, 1, 2] {
-            if part > 0 {
-                session.begin_iteration(8);
-                shards.iter_mut().take(part).for_each(|s| finish(&session, s, 1 << 20));
-            }
-            session.restart(false);
-            assert_ne!(session.identity().epoch, before.epoch);
-            assert_eq!(session.end_iteration(&shards), Err(SessionError::NoIteration));
-            // the same numbers again: the sums of before are those of another epoch
-            session.begin_iteration(ITERATIONS[3]);
-            assert_eq!(session.end_iteration(&shards), Err(SessionError::Unfinished { shard: 0 }));
-            session.restart(false);
-            render(&mut session, &mut shards);
-            assert!(shown(&session) == clean, "{}, part {part}", s.strategy);
+    kinds_of_statistics(&bytes, 2).iter().for_each(|s| starts_again::<Full>(&bytes, s));
+    kinds_of_guides(&bytes).iter().for_each(|s| starts_again::<Guided<Surfaces>>(&bytes, s));
+}
+
+fn starts_again<P: Profile>(bytes: &[u8], s: &Settings) {
+    let scene = Scene::from_bytes(bytes).unwrap();
+    let plan = Plan::new(s).unwrap();
+    let (mut block, mut own) = (memory(plan.session().size, 0xff), blocks(&plan));
+    let mut shards = shards(&plan, &mut own);
+    let mut session = Session::builder(scene).profile::<P>().build(&plan, block.as_mut()).unwrap();
+    render(&mut session, &mut shards);
+    let clean = everything(&session);
+    let before = session.identity();
+    // between iterations, and while one runs
+    for part in [0, 1, 2] {
+        if part > 0 {
+            session.begin_iteration(8);
+            shards.iter_mut().take(part).for_each(|s| finish(&session, s, 1 << 20));
         }
-        // with its statistics it renders something else, if it has any, with as many samples
-        session.restart(true);
-        let kept = session.cache().map(|c| c.leaves());
-        assert!(kept.is_none_or(|leaves| leaves > 6));
+        session.restart(false);
+        assert_ne!(session.identity().epoch, before.epoch);
+        assert_eq!(session.end_iteration(&shards), Err(SessionError::NoIteration));
+        // the same numbers again: the sums of before are those of another epoch
+        session.begin_iteration(ITERATIONS[3]);
+        assert_eq!(session.end_iteration(&shards), Err(SessionError::Unfinished { shard: 0 }));
+        session.restart(false);
         render(&mut session, &mut shards);
-        assert_eq!(shown(&session) == clean, s.strategy.name() == "classic", "{}", s.strategy);
+        assert!(everything(&session) == clean, "{}, guiding {:?}, part {part}", s.strategy, s.learning.guiding);
     }
+    // with its statistics it renders something else, if it has any, with as many samples
+    session.restart(true);
+    let kept = session.cache().map(|c| c.leaves());
+    assert!(kept.is_none_or(|leaves| leaves > 6));
+    render(&mut session, &mut shards);
+    let learns = s.strategy.name() != "classic" || s.learning.guiding != Guiding::Off;
+    assert_eq!(everything(&session) != clean, learns, "{}, guiding {:?}", s.strategy, s.learning.guiding);
 }
 
 /// A session that is resumed with another scene begins its picture anew, as a restart with the statistics does. Killed by:
