@@ -330,6 +330,23 @@ fn stale_guides_and_tiny_logs_do_not_bias() {
     assert_equivalent("24 KiB", &image, &reference);
 }
 
+/// What other renders have learned, of the same scene and of one that is emptier, is added again and again. Killed by: a
+/// merged leaf whose density is not that of what is drawn from it, sums that are added without what they are out of.
+#[test]
+fn merged_statistics_do_not_bias() {
+    let scene = blob(&cornell([12, 12]));
+    let reference = run(&scene, &plain(&guided(&scene, "none", 5)), &mut |_, _| ());
+    let s = guided(&scene, "ears", 5);
+    let [same, emptier] = [s, Settings { max_depth: 2, ..s }].map(|s| taught(&scene, &Settings { seed: 9, ..s }));
+    let mut least = 1.0f64;
+    let image = run(&scene, &s, &mut |i, l| {
+        l.merge_statistics(if i % 2 == 0 { &same } else { &emptier }).expect("statistics of this scene");
+        least = least.min(l.guide().expect("a guide").1);
+    });
+    assert!(least > 0.1, "only {least} of the samples were guided");
+    assert_equivalent("merged", &image, &reference);
+}
+
 /// Killed by: logs replayed in the order in which shards finish, combs or keys that depend on steps, a guide that is
 /// read while it changes.
 #[test]

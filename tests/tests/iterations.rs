@@ -1,7 +1,8 @@
 //! How the driver divides a render into iterations.
 
 use croupier::unstable::schedule::{LARGEST_ITERATION, Work, next_iteration};
-use croupier::{ErrorEstimate, Film, Scene, Settings, Strategy};
+use croupier::{Budget, ErrorEstimate, Film, Plan, Scene, Session, Settings, Shard, StepResult, Strategy};
+use croupier_host::blob::AlignedBytes;
 use croupier_host::drive::{Observer, Options, Progress, Rendered, Target, Unobserved, drive};
 use croupier_tests::scenes::{blob, everything};
 use std::time::Duration;
@@ -136,4 +137,60 @@ fn iterations_of_a_render_follow_the_plan() {
     let sum = parts(|i| i.tracing + i.merging + i.estimating + i.learning);
     assert!(sum <= parts(|i| i.work.seconds) && parts(|i| i.work.seconds) <= r.seconds);
     assert!(parts(|i| i.tracing) > 0.5 * r.seconds && parts(|i| i.estimating) > 0.0 && parts(|i| i.learning) > 0.0);
+}
+
+/// A host's own loop around a session, with a clock that counts so many seconds per ray: the work of each iteration.
+fn own_loop(strategy: &str, target: Target, seconds_per_ray: f64) -> Vec<Work> {
+    let bytes = blob(&everything([24, 16]));
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    let strategy = Strategy::parse(strategy).unwrap();
+    let plan = Plan::new(&Settings { strategy, shards: 3, max_depth: 8, ..Settings::for_scene(&scene) }).unwrap();
+    let mut block = AlignedBytes::zeroed(plan.session().size);
+    let mut own = [(); 3].map(|()| AlignedBytes::zeroed(plan.shard().size));
+    let mut session = Session::new(scene, &plan, block.as_mut()).unwrap();
+    let mut shards: Vec<_> = (0..).zip(&mut own).map(|(i, b)| Shard::new(&plan, i, b.as_mut()).unwrap()).collect();
+    let (mut all, mut done) = (Work::default(), Vec::new());
+    loop {
+        let last = done.last().copied().unwrap_or_default();
+        let samples = session.samples_of_next(target, &all, &last);
+        let error = (all.samples > 0).then(|| session.film().error_estimate());
+        assert_eq!(samples, next_iteration(target, plan.settings().learns(), &all, &last, error));
+        if samples == 0 {
+            return done;
+        }
+        session.begin_iteration(samples);
+        for shard in &mut shards {
+            while shard.step(&session, Budget { rays: 10_000 }) == StepResult::More {}
+        }
+        session.end_iteration(&shards).unwrap();
+        let rays = session.counters().rays() - all.rays;
+        done.push(work(samples, rays, rays as f64 * seconds_per_ray));
+        all = work(all.samples + samples, all.rays + rays, all.seconds + rays as f64 * seconds_per_ray);
+    }
+}
+
+/// Hosts without a clock inside plan as the driver does: samples and rays are the same, and what they measured is spent
+/// to the last few per cent. Killed by: a plan of the session that forgets the error or that statistics are learned, work
+/// of all iterations taken for that of the last.
+#[test]
+fn hosts_with_a_clock_of_their_own_meet_their_targets() {
+    for strategy in ["ears", "classic"] {
+        for target in [Target::Spp(90), Target::Rays(300_000), Target::Error(0.01)] {
+            let plan: Vec<_> = own_loop(strategy, target, 0.0).iter().map(|w| (w.samples, w.rays)).collect();
+            let driven = render(strategy, target, 1, &Unobserved).iterations;
+            assert_eq!(plan, driven.iter().map(|i| (i.work.samples, i.work.rays)).collect::<Vec<_>>(), "{target:?}");
+            assert!(plan.len() > 4, "{plan:?}");
+        }
+        for seconds in [0.02, 0.4, 3.0] {
+            let done = own_loop(strategy, Target::Seconds(seconds), 1e-6);
+            let spent: f64 = done.iter().map(|w| w.seconds).sum();
+            let a_sample = done.last().map(|w| w.seconds / f64::from(w.samples)).unwrap();
+            assert!(spent <= 1.02 * seconds, "{strategy}: {spent} of {seconds} seconds");
+            assert!(spent > 0.98 * seconds - 1.5 * a_sample, "{strategy}: {spent} of {seconds} seconds");
+            assert_eq!(done[0].samples, 1, "the first picture is there as soon as it can be");
+        }
+        // no second is too few for the first sample, and none is long enough for another
+        let done = own_loop(strategy, Target::Seconds(1e-9), 1e-6);
+        assert_eq!(done.iter().map(|w| w.samples).collect::<Vec<_>>(), [1]);
+    }
 }

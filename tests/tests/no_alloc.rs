@@ -132,7 +132,9 @@ fn render<P: Profile>(bytes: &[u8], strategy: Strategy, guiding: Guiding) {
         session.end_iteration(&shards).unwrap();
         let estimate = session.film().error_estimate();
         assert!(estimate.rel_mse.is_finite() && session.counters().rays() > 0);
-        assert!(session.guide().is_some() == (guiding == Guiding::On) && session.guide().is_none_or(|g| g.leaves() > 0));
+        assert!(
+            session.guide().is_some() == (guiding == Guiding::On) && session.guide().is_none_or(|g| g.leaves() > 0)
+        );
     });
 }
 

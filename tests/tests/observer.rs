@@ -65,6 +65,24 @@ fn observers_may_have_their_own_clock() {
     assert_eq!((rendered.iterations.len(), rendered.spp), (3, 3), "a fourth sample at 10 seconds each would pass it");
 }
 
+/// However short a render is, its first sample is shown. Killed by: no iteration where there is no time for one, a first
+/// iteration of more than a sample.
+#[test]
+fn the_first_sample_is_shown() {
+    let (scene, settings) = small();
+    for (strategy, target) in
+        [("ears", Target::Seconds(1e-9)), ("classic", Target::Seconds(1e-9)), ("ears", Target::Rays(1))]
+    {
+        let mut settings = settings;
+        settings.set("rrs", strategy).unwrap();
+        let observer = Slow::default();
+        let rendered = drive(&scene, &Options { threads: 1, ..Options::new(settings, target) }, &observer).unwrap();
+        let seen = observer.seen.into_inner().unwrap();
+        assert_eq!(seen.iter().map(|s| s.0).collect::<Vec<_>>(), [1], "{strategy}, {target:?}");
+        assert!(rendered.spp == 1 && seen[0].1 > 0.0);
+    }
+}
+
 /// Killed by: showing the film before its shards are merged, counting the observer's time, leaving out the last
 /// iteration.
 #[test]

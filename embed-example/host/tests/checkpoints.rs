@@ -49,25 +49,29 @@ fn resumed_renders_have_the_same_bits() {
     let baked = bake(&builtin::cornell_box(), &BakeOptions::default(), |_, _| {}).unwrap();
     let scene = Scene::from_bytes(&baked.bytes).unwrap();
     let dir = tempfile::tempdir().unwrap();
-    for (strategy, adaptive, sampler) in [
-        ("classic", false, "hashed"),
-        ("ears", false, "hashed"),
-        ("ears", true, "hashed"),
-        ("bolin-meyer", false, "hashed"),
-        ("classic", false, "sobol"),
-        ("ears", true, "sobol"),
+    for (strategy, adaptive, sampler, guiding) in [
+        ("classic", false, "hashed", "off"),
+        ("ears", false, "hashed", "off"),
+        ("ears", true, "hashed", "off"),
+        ("bolin-meyer", false, "hashed", "off"),
+        ("classic", false, "sobol", "off"),
+        ("ears", true, "sobol", "off"),
+        ("classic", false, "hashed", "on"),
+        ("ears", false, "sobol", "auto"),
     ] {
         let mut settings =
             Settings { size: [40, 30], shards: 3, aovs: true.into(), adaptive, ..Settings::for_scene(&scene) };
         settings.set("rrs", strategy).unwrap();
         settings.set("sampler", sampler).unwrap();
         settings.set("cache-bytes", "1MiB").unwrap();
-        let learns = strategy == "ears";
+        settings.set("guiding", guiding).unwrap();
+        settings.set("guide-bytes", "300000").unwrap();
+        let learns = strategy == "ears" || guiding != "off";
         let plain = Options { threads: 1, save_cache: learns, ..Options::new(settings, Target::Spp(37)) };
         let whole = drive_scene(scene, &plain, &After::new(u32::MAX)).unwrap();
         let mut breaks = 0;
         for asks in [1, 2, 5, 11] {
-            let path = dir.path().join(format!("{strategy}{adaptive}{sampler}{asks}"));
+            let path = dir.path().join(format!("{strategy}{adaptive}{sampler}{guiding}{asks}"));
             let schedule = Schedule { path: path.clone(), every: 1e9 };
             let mut resume = None;
             // The more asks are left, the further it comes before the next break.
@@ -79,7 +83,7 @@ fn resumed_renders_have_the_same_bits() {
                 breaks += u32::from(r.stopped_early);
                 (!r.stopped_early).then_some(r)
             });
-            assert!(everything(&found.unwrap()) == everything(&whole), "{strategy} {adaptive}: {asks}");
+            assert!(everything(&found.unwrap()) == everything(&whole), "{strategy} {adaptive} {guiding}: {asks}");
         }
         assert!(breaks > 0, "{strategy}");
     }
