@@ -106,6 +106,8 @@ struct Sample {
     /// The same at `max_depth` 1.
     direct: f64,
     counters: Counters,
+    /// Largest share of samples that a guide took.
+    guided: f64,
 }
 
 /// What partners share: depth, iterations, whether noisy pixels are left out, and the first seed.
@@ -129,8 +131,8 @@ impl Place {
         Ok(Self { blob, threads, partners: HashMap::new(), calm: HashMap::new() })
     }
 
-    /// One render as the row's trial wants it.
-    fn render(&self, row: &Row, depth: u32, seed: u64) -> Image {
+    /// One render as the row's trial wants it, and the largest share of samples that a guide took.
+    fn render(&self, row: &Row, depth: u32, seed: u64) -> (Image, f64) {
         let s = settings(&self.blob, row.strategy);
         // statistics of a size that suits small pictures
         let small = Learning { cache_bytes: 1 << 20, subdivide_count: 2000.0, ..s.learning };
@@ -141,12 +143,14 @@ impl Place {
             let mut save = |_, l: &mut dyn Learned| saved = l.saved().expect("a strategy with a cache");
             learning(&self.blob, &Settings { seed: seed + STREAMS[3], ..s }, &[2, 2, 4, 1], IN_ORDER, &mut save);
         }
-        let mut rng = SplitMix(seed);
-        learning(&self.blob, &s, row.iterations, IN_ORDER, &mut |i, l: &mut dyn Learned| match row.trial {
+        let (mut rng, mut guided) = (SplitMix(seed), 0.0f64);
+        let image = learning(&self.blob, &s, row.iterations, IN_ORDER, &mut |i, l: &mut dyn Learned| match row.trial {
             Trial::Reloaded if i % 2 == 0 => l.load(&saved).expect("statistics of this scene"),
             Trial::Poisoned if i > 0 => poison(l, &mut rng),
+            Trial::Guided | Trial::Thinned => guided = guided.max(l.guide().map_or(0.0, |g| g.1)),
             _ => {}
-        })
+        });
+        (image, guided)
     }
 
     fn sample(&self, row: &Row, seed: u64) -> Sample {
@@ -157,8 +161,8 @@ impl Place {
                 pixels.flat_map(|p| p.0.mean()).sum::<f64>() / (3 * calm.iter().filter(|c| **c).count()) as f64
             }
         };
-        let image = self.render(row, row.depth, seed);
-        Sample { mean: mean(&image), direct: mean(&self.render(row, 1, seed)), counters: image.counters }
+        let (image, guided) = self.render(row, row.depth, seed);
+        Sample { mean: mean(&image), direct: mean(&self.render(row, 1, seed).0), counters: image.counters, guided }
     }
 
     /// Finds the pixels that a row leaves out, from renders without roulette.
@@ -167,7 +171,7 @@ impl Place {
             return;
         }
         let none = Row { strategy: "none", trial: Trial::None, iterations: &[64], ..*row };
-        let images = each(self.threads, STREAMS[4]..STREAMS[4] + 128, |seed| self.render(&none, row.depth, seed));
+        let images = each(self.threads, STREAMS[4]..STREAMS[4] + 128, |seed| self.render(&none, row.depth, seed).0);
         let pixels = 0..images.first().map_or(0, |i| i.pixels.len());
         let noise = |p: usize| images.iter().flat_map(|i| i.pixels[p].variance_of_mean()).sum::<f64>();
         let noise: Vec<f64> = pixels.map(noise).collect();
@@ -216,6 +220,8 @@ struct Round {
     /// Of the partners, with all light.
     mean: Mean,
     counters: Counters,
+    /// Largest share of samples that a guide took.
+    guided: f64,
 }
 
 impl Round {
@@ -224,6 +230,7 @@ impl Round {
         self.difference.add((x.mean - x.direct) - (y.mean - y.direct));
         self.mean.add(y.mean);
         self.counters.merge(&x.counters);
+        self.guided = self.guided.max(x.guided);
     }
 
     fn value(&self) -> f64 {
@@ -257,7 +264,7 @@ impl Round {
         let biased = is_biased(row.strategy);
         let tests = [
             (self.counters.non_finite == 0, "FAILS: not finite"),
-            (row.trial.happened(&self.counters), "FAILS: not what it says"),
+            (row.trial.happened(&self.counters, self.guided), "FAILS: not what it says"),
             (self.error() <= MAX_ERROR, "FAILS: too noisy"),
             (biased || self.equal(), "FAILS: not equal"),
             (!biased || self.different(), "BIASED, BUT NOT FOUND"),

@@ -1,7 +1,7 @@
 //! The rows of the table: scenes, strategies, and what is made hard for them.
 
-use croupier::unstable::MIN_RING;
-use croupier::unstable::learn::{ControlVariate, Learning, PixelEstimator};
+use croupier::unstable::learn::{ControlVariate, Guiding, Learning, PixelEstimator};
+use croupier::unstable::{MIN_RING, Sampler};
 use croupier::{Counters, Settings};
 
 /// What is made hard for a strategy.
@@ -26,6 +26,12 @@ pub(crate) enum Trial {
     Poisoned,
     /// Splitting may add 4 samples to a camera sample.
     Budget,
+    /// Sobol' points in place of hashed numbers.
+    Sobol,
+    /// Sobol' points, light roulette and path guiding from the first statistics on.
+    Guided,
+    /// The same with a guide of 24 KiB, whose logs are too small.
+    Thinned,
 }
 
 impl Trial {
@@ -41,6 +47,9 @@ impl Trial {
             Self::Reloaded => ", reloaded cache",
             Self::Poisoned => ", poisoned cache",
             Self::Budget => ", split budget of 4",
+            Self::Sobol => ", Sobol' points",
+            Self::Guided => ", guided",
+            Self::Thinned => ", guided from 24 KiB",
         }
     }
 
@@ -54,6 +63,12 @@ impl Trial {
             Self::Adaptive => s.adaptive = true,
             Self::Poisoned => s.learning.cache_bytes = 32 << 10,
             Self::Budget => s.split_budget = 4,
+            Self::Sobol => s.sampler = Sampler::Sobol,
+            Self::Guided | Self::Thinned => {
+                (s.sampler, s.shadow_roulette) = (Sampler::Sobol, s.strategy.name() == "ears");
+                s.learning.guiding = Guiding::On;
+                s.learning.guide_bytes = if self == Self::Guided { 1 << 20 } else { 24 << 10 };
+            }
             Self::Small => {
                 (s.ring, s.shadow_roulette, s.control_variate) = (MIN_RING, true, ControlVariate::Cached);
                 s.learning = Learning {
@@ -67,9 +82,11 @@ impl Trial {
     }
 
     /// Did it happen? Else the row means nothing. Settings alone need no check.
-    pub(crate) fn happened(self, c: &Counters) -> bool {
+    /// `guided` is the largest share of samples that a guide took.
+    pub(crate) fn happened(self, c: &Counters, guided: f64) -> bool {
         match self {
-            Self::None | Self::Cache | Self::Adaptive | Self::Reloaded => true,
+            Self::None | Self::Cache | Self::Adaptive | Self::Reloaded | Self::Sobol => true,
+            Self::Guided | Self::Thinned => guided > 0.1,
             Self::Ring => c.splits_limited_by_ring > 0,
             Self::Shadow => {
                 c.shadow_rays_terminated > c.shadow_rays / 50 && c.light_samples_skipped > c.vertex_samples / 100
@@ -167,6 +184,10 @@ const CBOX: &[Row] = &[
     tried("ears", Trial::Adaptive),
     tried("ears", Trial::Reloaded),
     quick(short("ears", Trial::Poisoned, 3, USUAL)),
+    tried("ears", Trial::Sobol),
+    tried("classic", Trial::Guided),
+    quick(tried("ears", Trial::Guided)),
+    tried("ears", Trial::Thinned),
     quick(plain("threshold")),
 ];
 
@@ -196,6 +217,8 @@ const VEACH_MIS: &[Row] = &[
     calm(tried("ears", Trial::Small)),
     tried("ears", Trial::Reloaded),
     calm(short("ears", Trial::Poisoned, 3, USUAL)),
+    tried("ears", Trial::Sobol),
+    tried("ears", Trial::Guided),
 ];
 
 const MATERIAL_SPHERES: &[Row] = &[
@@ -226,6 +249,8 @@ const MATERIAL_SPHERES: &[Row] = &[
     calm(tried("ears", Trial::Small)),
     calm(tried("ears", Trial::Reloaded)),
     calm(short("ears", Trial::Poisoned, 3, USUAL)),
+    calm(tried("ears", Trial::Sobol)),
+    calm(tried("ears", Trial::Guided)),
 ];
 
 const MISTY_ROWS: &[Row] = &[
@@ -251,4 +276,6 @@ const MISTY_ROWS: &[Row] = &[
     tried("ears", Trial::Adaptive),
     tried("ears", Trial::Reloaded),
     quick(short("ears", Trial::Poisoned, 3, USUAL)),
+    tried("ears", Trial::Sobol),
+    quick(tried("ears", Trial::Guided)),
 ];
