@@ -119,6 +119,7 @@ other_processors() {
     export CARGO_TARGET_I686_UNKNOWN_LINUX_GNU_RUSTFLAGS="-C target-feature=+crt-static"
     local processor options example message
     for processor in aarch64 i686; do
+        # the crate of test programs only where there are tests
         options="--locked -Zbuild-std=std,panic_unwind${1+,test} --target $processor-unknown-linux-gnu"
         # what is skipped takes the emulator minutes, with integers only
         [[ " $* " != *" $processor "* ]] || debian_cargo test $options -p croupier-simd -p croupier --lib -- \

@@ -43,6 +43,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+/// The program; results of some options have names of their own.
+const NAME: &str = "efficiency";
 const SCENES: [&str; 9] =
     ["kitchen", "bathroom", "living_room", "pool", "water_caustic", "cbox", "veach_mis", "smoke", "volumetric_caustic"];
 /// The last is what the program does by default.
@@ -146,7 +148,7 @@ impl Args {
             (true, ..) => "efficiency-all",
             (_, true, _) => "efficiency-overhead",
             (.., true) => "efficiency-time",
-            _ => "efficiency",
+            _ => NAME,
         }
     }
 
@@ -471,7 +473,7 @@ fn speed_up(m: Option<Median>) -> String {
 }
 
 fn run(args: &Args) -> Result<(), Box<dyn Error>> {
-    let mut results = Results::of_this_run(args.name());
+    let mut results = Results::of_this_run(NAME);
     if let Some(name) = args.only.iter().find(|name| !args.scenes.join(name).is_dir()) {
         return Err(format!("there is no scene {name} in {}", args.scenes.display()).into());
     }
@@ -503,5 +505,5 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
 }
 
 fn main() -> ExitCode {
-    exit_code("efficiency", run(&Args::parse()).map(|()| true))
+    exit_code(NAME, run(&Args::parse()).map(|()| true))
 }
