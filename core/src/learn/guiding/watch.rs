@@ -31,20 +31,21 @@ use bytemuck::{Pod, Zeroable};
 
 /// Gain times the variance of the picture over that of independent samples, less some of its standard error ([`DOUBT`]),
 /// from which on the guide is enabled. The factor is more than what Sobol' points lose by it, as some of them go on: in
-/// `veach_mis`, whose factor is a half, 1.03 times, in `cbox`, where it is 0.6, 1.16 times. And pictures gain less than is
-/// predicted, because roulette and splitting would be others without the guide, and guided samples take more time
-/// (benches/EFFICIENCY.md; the benchmark `guiding` shows errors and seconds).
-const ENABLED_ABOVE: f64 = 1.08;
+/// `veach_mis`, whose factor is a half, 1.03 times, in `cbox`, where it is 0.6, 1.16 times. Guided samples take 1.03 to 1.6
+/// times as long as others, most where rays are cheap. And pictures gain less than is predicted, because roulette and
+/// splitting would be others without the guide: in `cbox` 1.65 is predicted once all pixels are guided, of which pictures
+/// gain 1.22 (benches/EFFICIENCY.md; the benchmark `guiding` shows errors and seconds).
+const ENABLED_ABOVE: f64 = 1.4;
 /// Standard errors that the gain must lie above a bound, at first, and once it was in doubt or all pixels are guided. A ratio
 /// of which few samples, those that found rare light, make the most has a standard error of the same size, and is most likely
 /// too small; one that turns out to be too large soon disables the guide again. Later iterations are longer, and few samples
 /// tell of the gain in each, so that one that is too large costs more. When all pixels are guided many samples tell of it: a
 /// gain that has still such an error is that of a few long paths whose ratios of densities are huge.
 const DOUBT: [f64; 2] = [0.25, 1.0];
-/// The same product below which it is disabled again.
-const DISABLED_BELOW: f64 = 1.04;
-/// Product that is out of the question if it lies two standard errors above what is known.
-const UNPROMISING_BELOW: f64 = 1.0;
+/// The same product below which it is disabled again. Hardly less: what is predicted rises when all pixels are guided.
+const DISABLED_BELOW: f64 = 1.35;
+/// A gain is out of the question while the product lies below this by two standard errors.
+const UNPROMISING_BELOW: f64 = 1.2;
 /// Variance of the picture over that of independent samples that is assumed before it is known: most scenes have 0.87 to 1
 /// after two or three samples per pixel, `smoke` has 0.65.
 const ASSUMED: f64 = 0.85;
@@ -192,8 +193,9 @@ pub(crate) struct Watch {
 const IN_DOUBT: u32 = u32::MAX - 1;
 /// The same: one is out of the question.
 const UNPROMISING: u32 = u32::MAX;
-/// Iterations without a gain after which one is in doubt: of a guide that has learned enough, the same while a standard
-/// error more would be a gain, and of any.
+/// Iterations without a gain after which one is in doubt: of a guide that has learned enough, or while a gain is out of the
+/// question; the same while a standard error more would be a gain; and of any. Iterations double, so each one more doubles
+/// what a trial costs.
 const PATIENCE: [u32; 3] = [3, 6, 12];
 
 /// A shard goes on in one of so many iterations, or of as many as there are shards, once a gain is in doubt. It may take a
@@ -290,14 +292,15 @@ impl Watch {
         }
         let [informed, unclear, longest] = PATIENCE;
         let hopeful = gain.is_some_and(|g| g.gain * (1.0 + g.error) > ENABLED_ABOVE);
-        let patience = match (enough, hopeful) {
+        let unpromising = gain.is_some_and(|g| g.gain * (1.0 + 2.0 * g.error) < UNPROMISING_BELOW);
+        let patience = match (enough || unpromising, hopeful) {
             (false, _) => longest,
             (true, true) => unclear,
             (true, false) => informed,
         };
         self.doubts = match gain {
             _ if self.enabled() => 0,
-            Some(g) if enough && g.gain * (1.0 + 2.0 * g.error) < UNPROMISING_BELOW => UNPROMISING,
+            _ if enough && unpromising => UNPROMISING,
             None if doubted => self.doubts,
             _ if doubted || was_enabled && enough || self.doubts + 1 >= patience => IN_DOUBT,
             _ => self.doubts + 1,
