@@ -109,7 +109,7 @@ instructions() {
 check_overhead() {
     local box=$1 library=$target/c-x86-64-v3/release rust=$target/c-x86-64-v3/release/overhead steps tracer own
     (cd core/capi/library && RUSTFLAGS="-C target-cpu=x86-64-v3" CARGO_TARGET_DIR=$target/c-x86-64-v3 \
-        cargo build --release --locked --features overhead --bin overhead)
+        cargo build --release --locked --features overhead,guiding --bin overhead)
     renders A "$rust" "$box"
     # with the names of functions, which the installed one has not
     mkdir -p "$target/c/named"
@@ -138,7 +138,7 @@ check_header() {
 # functions that make sessions name. `croupier_plan_init`, which formats texts, does not: the check can fail.
 check_panics() {
     (cd core/capi/library && RUSTFLAGS="-C target-cpu=x86-64-v3" CARGO_TARGET_DIR=$target/c-link-check \
-        cargo rustc --release --locked --features link-check --crate-type staticlib)
+        cargo rustc --release --locked --features link-check,guiding --crate-type staticlib)
     local build=(gcc -std=c99 -Wall -Wextra -Icore/capi/include core/capi/tests/c/hot.c -Wl,--gc-sections
         -Wl,-u,croupier_session_init,-u,croupier_session_init_with
         "$target/c-link-check/release/libcroupier.a" -o "$target/hot")
@@ -146,7 +146,8 @@ check_panics() {
     local turns
     turns=$(nm -C "$target/hot" | grep -c 'tracer::pipeline::turn')
     echo "$turns tracers without a panic"
-    [ "$turns" -ge 4 ]
+    # four sets of callbacks, each with path guiding and without
+    [ "$turns" -ge 8 ]
     ! "${build[@]}" -Wl,-u,croupier_plan_init 2>/dev/null
 }
 

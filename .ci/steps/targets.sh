@@ -100,16 +100,17 @@ step_firmware() {
         awk '$4 > 1.02 * $2 { print $1 ": " $4 " is more than " $2; bad = 1 } END { exit bad }'
 }
 
-# Other processors: 64-bit ARM in an emulator and 32-bit x86 get the picture of every host and the numbers of the probe. A
-# big-endian one is refused when it is compiled.
-step_targets() { other_processors; }
+# Another processor: 64-bit ARM in an emulator gets the picture of every host and the numbers of the probe. A big-endian one
+# is refused when it is compiled. Firmware and browser are 32-bit ones.
+step_targets() { other_processors "" aarch64; }
 
-# They pass the tests of the core, which take minutes to build for each.
-step_night_targets() { other_processors aarch64 i686; }
+# The same with the tests of the core, which take minutes to build, and for 32-bit x86.
+step_night_targets() { other_processors ,test aarch64 i686; }
 
-# `step_targets`, with the tests of the core on these processors.
+# `step_targets` for some processors, with a crate of test programs or without: `other_processors [,test] PROCESSOR...`
 other_processors() {
-    need_debian_rust gcc-aarch64-linux-gnu libc6-dev-arm64-cross gcc-i686-linux-gnu libc6-dev-i386-cross
+    need_debian_rust gcc-aarch64-linux-gnu libc6-dev-arm64-cross
+    [[ $* != *i686* ]] || packages gcc-i686-linux-gnu libc6-dev-i386-cross
     numbers >"$target/probe.v3"
     export CARGO_TARGET_DIR=$target/targets CARGO_PROFILE_DEV_DEBUG=0 CARGO_PROFILE_TEST_DEBUG=0
     export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
@@ -117,12 +118,11 @@ other_processors() {
     export CARGO_TARGET_I686_UNKNOWN_LINUX_GNU_LINKER=i686-linux-gnu-gcc
     # static: the loader and the libraries of that processor need not be installed
     export CARGO_TARGET_I686_UNKNOWN_LINUX_GNU_RUSTFLAGS="-C target-feature=+crt-static"
-    local processor options example message
-    for processor in aarch64 i686; do
-        # the crate of test programs only where there are tests
-        options="--locked -Zbuild-std=std,panic_unwind${1+,test} --target $processor-unknown-linux-gnu"
+    local tests=$1 processor options example message
+    for processor in "${@:2}"; do
+        options="--locked -Zbuild-std=std,panic_unwind$tests --target $processor-unknown-linux-gnu"
         # what is skipped takes the emulator minutes, with integers only
-        [[ " $* " != *" $processor "* ]] || debian_cargo test $options -p croupier-simd -p croupier --lib -- \
+        [ -z "$tests" ] || debian_cargo test $options -p croupier-simd -p croupier --lib -- \
             --skip shards_own_their_share_of_odd_pictures
         debian_cargo check $options -p croupier-capi
         example="run --quiet $options --manifest-path embed-example/firmware/Cargo.toml --example firmware_probe"

@@ -261,6 +261,30 @@ typedef uint32_t croupier_surround;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+// What ends a render; the amount is a parameter of croupier_session_next_samples.
+enum croupier_target
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  // Samples per pixel. The picture does not depend on the machine.
+  CROUPIER_TARGET_SAMPLES = 0,
+  // Seconds by the program's clock. No iteration begins that would pass them at the speed so far; one that has begun
+  // is meant to be finished, and the first one, a sample per pixel, is rendered in any case.
+  CROUPIER_TARGET_SECONDS = 1,
+  // Rays of all kinds: no iteration begins that would pass them at the cost so far.
+  CROUPIER_TARGET_RAYS = 2,
+  // Estimated relMSE of the picture, from 4 samples per pixel on.
+  CROUPIER_TARGET_ERROR = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum croupier_target croupier_target;
+#else
+typedef uint32_t croupier_target;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
 // A scene: a baked blob in the program's memory. Calls that read it may run on several threads at a time, steps of
 // shards included; an edit needs it for itself.
 typedef struct croupier_scene croupier_scene;
@@ -827,6 +851,18 @@ typedef struct croupier_parts {
   croupier_points points;
 } croupier_parts;
 
+// Work of a render, which croupier_session_next_samples remembers here between its calls. It begins anew with a picture.
+typedef struct croupier_work {
+  // sizeof(croupier_work), set by the program.
+  uint32_t struct_size;
+  // Camera samples per pixel.
+  uint32_t samples;
+  // Rays of all kinds.
+  uint64_t rays;
+  // Seconds by the program's clock.
+  double seconds;
+} croupier_work;
+
 // Lanes used of lanes offered: eight per packet.
 typedef struct croupier_utilisation {
   // Packets run.
@@ -1366,6 +1402,21 @@ croupier_status croupier_session_restart(struct croupier_session *session,
 croupier_status croupier_session_change_scene(struct croupier_session *session,
                                               const struct croupier_scene *scene,
                                               uint32_t keep,
+                                              struct croupier_message *message);
+
+// Camera samples per pixel of the next iteration, for croupier_session_begin_iteration; 0 when the target is reached.
+// Iterations are short at first, so that a picture is soon there and statistics are renewed often, and longer later.
+// target is a croupier_target, amount how much of it. seconds is the time that the iterations of this picture have
+// taken by the program's clock, without pauses; not used unless the target is in seconds. work is what
+// the call before has left there. To be called between iterations.
+// CROUPIER_RANGE for an amount that is not above 0 or not finite, seconds that are below 0 or no number, or another
+// target.
+croupier_status croupier_session_next_samples(const struct croupier_session *session,
+                                              uint32_t target,
+                                              double amount,
+                                              double seconds,
+                                              struct croupier_work *work,
+                                              uint32_t *samples,
                                               struct croupier_message *message);
 
 // Makes shard index of a plan in memory: as many bytes as croupier_plan_shard_size says, at a multiple of

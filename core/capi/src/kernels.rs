@@ -54,12 +54,19 @@ trait Parts {
     fn of<'s>(scene: Scene<'s>, host: &croupier_parts) -> (Self::Intersector<'s>, Self::Extension);
 }
 
+/// Effects that scenes may have: all.
+#[cfg(not(feature = "guiding"))]
+type Profile = Full;
+/// The same with path guiding, for sessions whose settings ask for it.
+#[cfg(feature = "guiding")]
+type Profile = croupier::unstable::profile::Guided<Full>;
+
 type Builder<'s, K> =
-    SessionBuilder<'s, Full, <K as Parts>::Intersector<'s>, TreeSelector<'s>, <K as Parts>::Extension>;
+    SessionBuilder<'s, Profile, <K as Parts>::Intersector<'s>, TreeSelector<'s>, <K as Parts>::Extension>;
 
 fn builder<'s, K: Parts>(scene: Scene<'s>, host: &croupier_parts) -> Builder<'s, K> {
     let (intersector, extension) = K::of(scene, host);
-    Session::builder(scene).intersector(intersector).extension(extension)
+    Session::builder(scene).profile::<Profile>().intersector(intersector).extension(extension)
 }
 
 const fn of<K: Parts>() -> Kernel {

@@ -25,7 +25,7 @@
 //! | `records` | the structs of the header |
 //! | `parts` | callbacks: intersectors, ray sources |
 //! | `kernels` | the kernels that callbacks choose |
-//! | `version`, `settings`, `plan`, `compose`, `scene`, `edit`, `session`, `picture`, `learned`, `shard`, `exchange` | the functions |
+//! | `version`, `settings`, `plan`, `compose`, `scene`, `edit`, `session`, `picture`, `learned`, `schedule`, `shard`, `exchange` | the functions |
 #![no_std]
 #![deny(clippy::expect_used, clippy::panic, clippy::unreachable, clippy::unwrap_used)]
 #![deny(clippy::indexing_slicing, clippy::arithmetic_side_effects)]
@@ -57,6 +57,8 @@ mod plan;
 
 mod session;
 
+mod schedule;
+
 mod shard;
 
 mod picture;
@@ -79,6 +81,7 @@ pub use picture::*;
 pub use plan::*;
 pub use records::*;
 pub use scene::*;
+pub use schedule::*;
 pub use session::*;
 pub use settings::*;
 pub use shard::*;

@@ -54,7 +54,7 @@ impl CoreError for SessionError {
             Self::Instructions { .. } => CROUPIER_INSTRUCTIONS,
             Self::Memory(MemoryError::Misaligned) => CROUPIER_MISALIGNED,
             Self::Memory(_) | Self::Estimate { .. } => CROUPIER_SIZE,
-            Self::Profile { .. } => CROUPIER_EFFECTS,
+            Self::Profile { .. } | Self::Sampler { .. } | Self::Guiding => CROUPIER_EFFECTS,
             Self::Shards { .. } => CROUPIER_SHARDS,
             Self::Unfinished { .. } => CROUPIER_UNFINISHED,
             Self::Plan { .. } | Self::Resume(ResumeError::Plan) => CROUPIER_PLAN,

@@ -70,7 +70,7 @@ pub(super) fn packets_of(tiles: &Tiles, index: u32) -> u32 {
     let pixels = tiles.pixels().max(1);
     let paths = (pixels / PIXELS).max(FEWEST.min(2 * pixels / PIXELS)).max(1);
     // a picture has less than 2^32 pixels
-    let packets = (tiles.pixels_of(index) as u64 * paths).div_ceil(8 * pixels);
+    let packets = (tiles.pixels_of(index) as u64 * paths).div_ceil((8 * pixels).max(1));
     u32::try_from(packets).unwrap_or(u32::MAX)
 }
 

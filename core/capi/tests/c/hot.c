@@ -12,7 +12,9 @@ int main(void)
 {
     croupier_session *session = (croupier_session *)(void *)memory;
     croupier_shard *shard = (croupier_shard *)(void *)memory;
+    croupier_work work = {.struct_size = sizeof work};
     uint32_t more = 0;
+    croupier_session_next_samples(session, CROUPIER_TARGET_SECONDS, 1.0, 0.0, &work, &more, 0);
     croupier_session_begin_iteration(session, 1, 0);
     croupier_shard_step(shard, session, 1, &more, 0);
     croupier_shard_stop(shard, 0);

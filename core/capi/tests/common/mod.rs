@@ -115,18 +115,21 @@ pub(crate) fn set(settings: &mut croupier_settings, name: &str, value: &str) {
     ok!(croupier_settings_set(settings, name.as_ptr(), value.as_ptr()));
 }
 
+/// Settings of the examples, by name.
+pub(crate) const SETTINGS: [(&str, &str); 6] = [
+    ("rrs", "ears"),
+    ("ring", "64"),
+    ("ledger", "256"),
+    ("cache-bytes", "65536"),
+    ("split-budget", "64"),
+    ("pixel-estimator", "blocks"),
+];
+
 /// Settings of the examples.
 pub(crate) fn settings(scene: *const croupier_scene, shards: u32) -> croupier_settings {
     let mut settings = croupier_settings { opaque: [7; 64] };
     ok!(croupier_settings_init(&raw mut settings, scene));
-    for (name, value) in [
-        ("rrs", "ears"),
-        ("ring", "64"),
-        ("ledger", "256"),
-        ("cache-bytes", "65536"),
-        ("split-budget", "64"),
-        ("pixel-estimator", "blocks"),
-    ] {
+    for (name, value) in SETTINGS {
         set(&mut settings, name, value);
     }
     ok!(croupier_settings_set_shards(&raw mut settings, shards));

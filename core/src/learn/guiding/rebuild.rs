@@ -182,14 +182,15 @@ impl Guide<'_> {
             return;
         }
         let [square, pdf] = hit.square_and_pdf();
+        let Some((frozen, sums)) = self.frozen.get(leaf).zip(self.leaves.get_mut(leaf)) else { return };
         if let Some(guided) = first {
-            let share = f32::from(self.frozen[leaf].share()) / 65_536.0;
-            self.leaves[leaf].add(square, hit.share(), share * guided, weight);
+            let share = f32::from(frozen.share()) / 65_536.0;
+            sums.add(square, hit.share(), share * guided, weight);
         }
         if pdf <= 0.0 {
             return;
         }
-        let root = if first.is_some() { self.root_of(leaf) } else { self.frozen[leaf].root };
+        let root = if first.is_some() { self.root_of(leaf) } else { frozen.root };
         if root != UNIFORM {
             self.add_to_cell(root, hit.point, hit.contribution() * weight, first.is_some());
         }
@@ -197,12 +198,15 @@ impl Guide<'_> {
 
     /// The node of all directions of a leaf, a new one if it has none; [`UNIFORM`] if there is no room.
     pub(super) fn root_of(&mut self, leaf: usize) -> u16 {
-        if self.frozen[leaf].root == UNIFORM
-            && let Some(root) = self.take_node()
+        let root = self.frozen.get(leaf).map_or(UNIFORM, |f| f.root);
+        if root == UNIFORM
+            && let Some(new) = self.take_node()
+            && let Some(f) = self.frozen.get_mut(leaf)
         {
-            self.frozen[leaf].root = root;
+            f.root = new;
+            return new;
         }
-        self.frozen[leaf].root
+        root
     }
 
     /// Adds to the cell around a point of the square, from a node on; if not `always`, to nodes that are new only.
@@ -281,13 +285,13 @@ impl Guide<'_> {
 
     /// Computes what is sampled in a leaf; cells become nodes if `grow`. Work done.
     pub(super) fn freeze_leaf(&mut self, leaf: usize, grow: bool) -> u64 {
-        let root = self.frozen[leaf].root;
+        let root = self.frozen.get(leaf).map_or(UNIFORM, |f| f.root);
         let last_of_light = !grow && self.scalars.rebuild.source == LIGHT;
         if last_of_light {
             self.become_prior(leaf);
         }
-        if !grow {
-            self.frozen[leaf].fraction = self.leaves[leaf].fraction();
+        if !grow && let Some((frozen, sums)) = self.frozen.get_mut(leaf).zip(self.leaves.get(leaf)) {
+            frozen.fraction = sums.fraction();
         }
         if root == UNIFORM {
             return 1;
@@ -307,7 +311,7 @@ impl Guide<'_> {
     fn settle(&mut self, index: u16, level: usize) {
         let Some(node) = self.nodes.get(index as usize).copied().filter(|_| level + 1 < LEVELS) else { return };
         for (cell, child) in node.child.into_iter().enumerate().filter(|(_, c)| *c != UNIFORM) {
-            let was = self.sums.get(index as usize).map_or(0.0, |s| s.mass[cell]);
+            let was = self.sums.get(index as usize).and_then(|s| s.mass.get(cell)).copied().unwrap_or(0.0);
             match self.sums.get_mut(child as usize) {
                 Some(s) if s.fresh != 0 => {
                     let sum: f32 = s.mass.iter().sum();
@@ -428,17 +432,19 @@ impl Guide<'_> {
     /// Subdivides the leaf at a node of the octrees: its children begin with an eighth each. `false` if there is no room.
     pub(super) fn divide(&mut self, index: u32) -> bool {
         let OctreeNode::Leaf { number, .. } = self.tree.node(index) else { return false };
-        let Some(leaf) = self.leaves.get(number as usize).copied() else { return false };
+        let known = self.frozen.get(number as usize).copied().zip(self.leaves.get(number as usize).copied());
+        let Some((FrozenLeaf { root, fraction }, leaf)) = known else { return false };
         let room = self.size.nodes - self.scalars.used + self.scalars.free_nodes >= 7;
         let first = if room { self.tree.subdivide(index) } else { None };
         let Some(first) = first else {
             self.scalars.refused = self.scalars.refused.saturating_add(1);
             return false;
         };
-        let FrozenLeaf { root, fraction } = self.frozen[number as usize];
         self.each_node(root, 0, &|s| s.scale(0.125));
         let part: LeafSums = leaf.eighth();
-        self.leaves[number as usize] = part;
+        if let Some(first) = self.leaves.get_mut(number as usize) {
+            *first = part;
+        }
         for child in first as usize..first as usize + 7 {
             let root = self.copy_node(root, 0);
             if let (Some(f), Some(l)) = (self.frozen.get_mut(child), self.leaves.get_mut(child)) {
