@@ -163,31 +163,23 @@ fn narrow_phase_functions_are_not_guided() {
     }
 }
 
-/// Guiding of some blocks of pixels, and of no others unless it pays there, by adversarial guides. Killed by: a choice of
+/// Guiding of some blocks of pixels, and of no others, by adversarial guides. Killed by: a choice of
 /// pixels that goes with what they find, weights of samples that are not guided by a mixture's density.
 #[test]
 fn watched_guides_do_not_bias() {
     let scene = blob(&cornell([32, 32]));
     let reference = run(&scene, &plain(&guided(&scene, "none", 5)), &mut |_, _| ());
-    // misled again in each iteration, or once: then shards take turns, until it pays after all
-    for (strategy, again) in [("classic", true), ("ears", true), ("ears", false)] {
+    for strategy in ["classic", "ears"] {
         let mut s = guided(&scene, strategy, 5);
         s.learning.guiding = Guiding::Auto;
-        let (mut rng, mut least, mut enabled) = (SplitMix(11), f64::INFINITY, false);
+        let (mut rng, mut least) = (SplitMix(11), f64::INFINITY);
         let image = run(&scene, &s, &mut |i, l| {
             let u = l.guide_use().expect("a guide that is watched");
-            enabled |= u.enabled;
-            assert!(!u.enabled || !again && i > 3, "{strategy}, iteration {i}: {u:?}");
+            assert!(!u.enabled, "{strategy}, iteration {i}: {u:?}");
             least = least.min(u.gain.map_or(f64::INFINITY, |g| g.gain));
-            if again || i == 0 {
-                l.load_guide(&adversarial(&scene, &s, 3, &mut rng)).expect("a guide of this scene");
-            }
+            l.load_guide(&adversarial(&scene, &s, 3, &mut rng)).expect("a guide of this scene");
         });
         assert!(least < 0.95, "{strategy}: adversarial guides promise {least}");
-        assert_eq!(
-            enabled, !again,
-            "{strategy}: a guide that is misled no more is enabled in the middle of the render"
-        );
         assert_equivalent(&format!("{strategy}, watched"), &image, &reference);
     }
 }
@@ -255,8 +247,9 @@ fn shards_without_a_turn_open_no_records_without_a_cache() {
     assert!(of(0) > 1000 && (12..17).map(of).sum::<u64>() < 5 * of(0) / 4, "{full:?}");
 }
 
-/// Where light comes through glass the guide is enabled, and the mean stays. Killed by: a gain that no guide reaches, a
-/// decision that goes with the samples of the iteration that it is for.
+/// Where light comes through glass the guide is enabled, and the mean stays, even after a guide that misled at first: then
+/// shards take turns until it pays. Killed by: a gain that no guide reaches, a decision that goes with the samples of the
+/// iteration that it is for, a gain in doubt that stays in doubt.
 #[test]
 fn guides_that_pay_are_enabled() {
     let scene = blob(&mirror_and_glass());
@@ -264,15 +257,20 @@ fn guides_that_pay_are_enabled() {
     let reference = run_to(CAUSTICS, &scene, &Settings { size, ..plain(&guided(&scene, "none", 6)) }, &mut |_, _| ());
     let mut s = Settings { size, ..guided(&scene, "ears", 6) };
     (s.shadow_roulette, s.learning.guiding) = (true, Guiding::Auto);
-    let (mut enabled, mut last) = (0, None);
-    // what the mean needs is too few to find out: with some seeds it takes more than 4,000 samples per pixel
-    let image = learning(&scene, &s, &doubling(16_000), IN_ORDER, &mut |_, l| {
-        last = l.guide_use();
-        enabled += u32::from(last.is_some_and(|u| u.enabled));
-    });
-    println!("enabled after {enabled} iterations, {last:?}");
-    assert!(enabled >= 5, "{last:?}");
-    assert_within(CAUSTICS, "ears, guided where it pays", &image, &reference);
+    for (misled, what) in [(false, "ears, guided where it pays"), (true, "ears, misled at first")] {
+        let (mut enabled, mut last) = (0, None);
+        // what the mean needs is too few to find out: with some seeds it takes more than 4,000 samples per pixel
+        let image = learning(&scene, &s, &doubling(16_000), IN_ORDER, &mut |i, l| {
+            last = l.guide_use();
+            enabled += u32::from(last.is_some_and(|u| u.enabled));
+            if misled && i == 0 {
+                l.load_guide(&adversarial(&scene, &s, 3, &mut SplitMix(11))).expect("a guide of this scene");
+            }
+        });
+        println!("{what}: all pixels guided in {enabled} iterations, {last:?}");
+        assert!(enabled >= 5, "{what}: {last:?}");
+        assert_within(CAUSTICS, what, &image, &reference);
+    }
 }
 
 /// Sobol' points, whose hashed lanes draw other blocks of numbers, and those of adaptive pictures, of which none go on.
