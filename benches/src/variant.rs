@@ -14,6 +14,11 @@ pub const MODIFIERS: &[(&str, &str)] = &[
     ("small", "one shard, and less than 256 KiB for all that is learned"),
     ("hashed", "hashed numbers in place of Sobol' points"),
     ("truth", "strategies that learn are told the true pixels instead of denoised ones"),
+    ("1MiB", "as much for all that is learned of the scene, a quarter of it for path guiding"),
+    ("4MiB", "the same"),
+    ("16MiB", "the same"),
+    ("64MiB", "the same"),
+    ("256MiB", "the same"),
     ("idle", "learned factors are all 1: what learning costs where paths are as with `classic:200`"),
 ];
 
@@ -73,8 +78,14 @@ impl Variant {
         }
         if self.has("small") {
             (s.shards, s.ring) = (1, 128);
-            s.learning =
-                Learning { cache_bytes: 152 << 10, ledger: 256, pixel_estimator: PixelEstimator::Blocks, ..s.learning };
+            s.learning = Learning { ledger: 256, pixel_estimator: PixelEstimator::Blocks, ..s.learning };
+            // records are larger with path guiding
+            let [cache, guide] = if s.guides() { [103, 40] } else { [152, 0] };
+            (s.learning.cache_bytes, s.learning.guide_bytes) = (cache << 10, guide << 10);
+        }
+        let sizes = self.modifiers.iter().filter_map(|m| m.strip_suffix("MiB")?.parse::<usize>().ok());
+        for bytes in sizes.map(|mib| mib << 20) {
+            (s.learning.cache_bytes, s.learning.guide_bytes) = (bytes / 4 * 3, bytes / 4);
         }
         s
     }

@@ -16,7 +16,7 @@ fn small_is_256_kib() {
         plan.session().size + plan.shard().size
     };
     let film = of(Settings { strategy: Strategy::parse("none").unwrap(), ring: 16, ..Settings::for_scene(&scene) });
-    for name in ["ears+small", "ears+small+shadow", "adrrs+small"] {
+    for name in ["ears+small", "ears+small+shadow", "ears+small+auto", "adrrs+small"] {
         let all = of(Variant::parse(name).unwrap().apply(Settings::for_scene(&scene)));
         assert!(all - film <= 256 << 10, "{name}: {} bytes", all - film);
     }

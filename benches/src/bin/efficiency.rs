@@ -17,8 +17,8 @@
 //! does hits all strategies. A time to an error is read from the errors with a star after the iterations ([`time_to`]).
 //!
 //! `--write` puts a run of all scenes into `benches/results`: with the usual strategies into `efficiency.md`, with
-//! `--all` into `efficiency-all.md`, with `--overhead` into `efficiency-overhead.md`, with `--over-time` into
-//! `efficiency-time.md`.
+//! `--all` into `efficiency-all.md`, with `--overhead` into `efficiency-overhead.md`, with `--memory` into
+//! `efficiency-memory.md`, with `--over-time` into `efficiency-time.md`.
 //!
 //! `--over-time` compares pictures of the same age: at each time the strategies that are efficiency-aware with the best
 //! of the others, the one with the smallest median error at that time. A picture of 1 second is that of a longer render
@@ -78,6 +78,16 @@ const ALL: [&str; 24] = [
 ];
 /// With `--overhead`: the same paths without learning, and with it.
 const OVERHEAD: [&str; 2] = ["classic:200", "ears+idle"];
+/// With `--memory`: from 256 KiB to 256 MiB for all that is learned.
+const MEMORY: [&str; 7] = [
+    "classic",
+    "ears+shadow+auto+small",
+    "ears+shadow+auto+1MiB",
+    "ears+shadow+auto+4MiB",
+    "ears+shadow+auto+16MiB",
+    "ears+shadow+auto+64MiB",
+    "ears+shadow+auto+256MiB",
+];
 /// With `--over-time`: simple rules, and what is compared with the best of them.
 const OVER_TIME: [&str; 6] = ["none", "classic", "throughput", "adrrs", "ears+shadow", "ears+shadow+auto"];
 /// Core-seconds at which pictures are compared.
@@ -109,16 +119,19 @@ struct Args {
     /// What learning costs: rays per second of `ears+idle` over those of `classic:200`, which traces the same paths.
     #[arg(long, conflicts_with_all = ["strategies", "all"])]
     overhead: bool,
+    /// What memory for statistics brings: 256 KiB to 256 MiB.
+    #[arg(long, conflicts_with_all = ["strategies", "all", "overhead"])]
+    memory: bool,
     /// Error after 0.1 to 100 core-seconds, against the best simple rule of that time.
-    #[arg(long, conflicts_with_all = ["strategies", "all", "overhead", "equal_samples"])]
+    #[arg(long, conflicts_with_all = ["strategies", "all", "overhead", "memory", "equal_samples"])]
     over_time: bool,
-    /// Independent seeds [default: 8, quick: 3, all and overhead: 2].
+    /// Independent seeds [default: 8, quick: 3, all, overhead and memory: 2].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     seeds: Option<u32>,
     /// The first of them.
     #[arg(long, default_value_t = 0)]
     first_seed: u64,
-    /// Core-seconds of each render [default: 30, quick: 5, all: 4, over time: 100].
+    /// Core-seconds of each render [default: 30, quick: 5, all: 4, memory: 10, over time: 100].
     #[arg(long)]
     seconds: Option<f64>,
     /// Per cent of the pixels that the figures with a star leave out, the worst ones.
@@ -144,16 +157,17 @@ struct Args {
 impl Args {
     /// Name of the results.
     fn name(&self) -> &'static str {
-        match (self.all, self.overhead, self.over_time) {
+        match (self.all, self.overhead, self.over_time, self.memory) {
             (true, ..) => "efficiency-all",
-            (_, true, _) => "efficiency-overhead",
-            (.., true) => "efficiency-time",
+            (_, true, ..) => "efficiency-overhead",
+            (.., true, _) => "efficiency-time",
+            (.., true) => "efficiency-memory",
             _ => NAME,
         }
     }
 
     fn seeds(&self) -> u32 {
-        let usual = match (self.quick, self.all || self.overhead) {
+        let usual = match (self.quick, self.all || self.overhead || self.memory) {
             (true, _) => 3,
             (_, true) => 2,
             _ => 8,
@@ -163,6 +177,7 @@ impl Args {
 
     fn seconds(&self) -> f64 {
         let usual = match (self.quick, self.all, self.over_time) {
+            _ if self.memory => 10.0,
             (true, ..) => 5.0,
             (_, true, _) => 4.0,
             (.., true) => 100.0,
@@ -180,6 +195,7 @@ impl Args {
             (true, ..) => ALL.to_vec(),
             (_, true, _) => OVERHEAD.to_vec(),
             _ if self.over_time => OVER_TIME.to_vec(),
+            _ if self.memory => MEMORY.to_vec(),
             (.., false) => self.strategies.iter().map(|s| &**s).collect(),
             _ => STRATEGIES.to_vec(),
         };
