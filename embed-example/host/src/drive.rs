@@ -4,6 +4,7 @@
 mod calibrate;
 mod error;
 mod forecast;
+mod guide_view;
 mod observe;
 mod part;
 mod result;
@@ -12,6 +13,7 @@ pub use calibrate::Calibration;
 pub use croupier::unstable::schedule::{self, Target};
 pub use error::DriveError;
 pub use forecast::{Forecast, UNKNOWN, forecast};
+pub use guide_view::GuideView;
 pub use observe::{Observer, Progress, Unobserved};
 pub use part::{Part, PartError, Share};
 pub use result::{CacheRecord, GuideRecord, IterationRecord, Rendered};
@@ -61,6 +63,8 @@ pub struct Options<'a> {
     pub save_cache: bool,
     /// Measurement, in the end, of look-ups and of recording samples.
     pub calibrate: bool,
+    /// [`Rendered::guide_view`], in the end.
+    pub guide_view: bool,
     /// Checkpoints to write while the render runs.
     pub checkpoint: Option<&'a Schedule>,
     /// Checkpoint of a render of the same scene and settings to go on from. It holds pixel estimate and cache, so that
@@ -80,6 +84,7 @@ impl Options<'_> {
             cache: None,
             save_cache: false,
             calibrate: false,
+            guide_view: false,
             checkpoint: None,
             resume: None,
         }
@@ -246,6 +251,7 @@ pub fn drive_extended<P: Profile + Send + Sync, X: Extension + Copy + Sync>(
             share: g.mean_fraction(),
             watched: session.guide_use(),
         }),
+        guide_view: session.guide().filter(|_| options.guide_view).map(|g| GuideView::new(&scene, g, film.size())),
         cache: options.save_cache.then(|| save(session.cache(), session.guide())).transpose()?,
         calibration: used.filter(|_| options.calibrate).and_then(|c| calibrate::calibrate(c, &scene)),
     })

@@ -545,6 +545,7 @@ fn add(parts: &[Checked], common: Common) -> Result<Merged, MergeError> {
         threads: 0,
         iterations: Vec::new(),
         guide: None,
+        guide_view: None,
         cache: saved,
         calibration: None,
     };

@@ -42,6 +42,8 @@ pub struct RenderOptions {
     pub denoise: bool,
     /// Measurement of look-ups and of recording samples, for [`Statistics::time`].
     pub calibrate: bool,
+    /// Layers of what path guiding has learned, where it is on.
+    pub guide_view: bool,
     /// Checkpoints to write while the render runs.
     pub checkpoint: Option<Schedule>,
     /// Checkpoint of a render of the same scene and settings to go on from.
@@ -71,6 +73,7 @@ impl RenderOptions {
             save_cache: false,
             denoise: false,
             calibrate: false,
+            guide_view: false,
             checkpoint: None,
             resume: None,
         }
@@ -281,6 +284,7 @@ pub fn render_part(
         cache: options.cache.as_deref(),
         save_cache: options.save_cache,
         calibrate: options.calibrate,
+        guide_view: options.guide_view,
         checkpoint: options.checkpoint.as_ref(),
         resume: options.resume.as_deref(),
         ..Options::new(settings, options.target)
@@ -326,6 +330,10 @@ fn picture(r: &Rendered, names: &Names, denoise: bool) -> Picture {
     picture.add1("samples", "N", &r.pixels.iter().map(|p| p.samples as f32).collect::<Vec<_>>());
     for (aov, channels) in &r.planes {
         add_aov(&mut picture, names, r, *aov, channels);
+    }
+    if let Some(view) = &r.guide_view {
+        picture.add1("guide", "share", &view.share);
+        picture.add3("guide_direction", ["X", "Y", "Z"], &view.direction);
     }
     if denoise {
         picture.add3("denoised", RGB, &denoised(r));

@@ -237,9 +237,9 @@ fn everything_at_once() {
     let caches = ["--cache-out", "a.cache", "-o", "a.exr"];
     let found = json(&render(dir, &[&flags[..], &more, &caches].concat()));
     assert_eq!(found["cache_out"], "a.cache");
-    let images = ["factor1", "factor2", "factor3", "factor4", "cost", "paths"].map(|n| format!("a.{n}.png"));
+    let images = ["factor1", "factor2", "factor3", "factor4", "cost", "paths", "guide"].map(|n| format!("a.{n}.png"));
     assert_eq!(found["false_color"], serde_json::json!(images));
-    assert_eq!(found["written"].as_array().unwrap().len(), 9);
+    assert_eq!(found["written"].as_array().unwrap().len(), 10);
     for name in images.iter().map(String::as_str).chain(["a.png", "a.exr", "a.cache"]) {
         assert!(std::fs::metadata(dir.join(name)).unwrap().len() > 100, "{name}");
     }
@@ -248,7 +248,7 @@ fn everything_at_once() {
     assert!(found["paths"]["path_length"].as_f64().unwrap() > 1.0);
     assert_eq!(found["time"].as_array().unwrap().len(), 6);
     let picture = Picture::read_exr(&dir.join("a.exr")).unwrap();
-    for layer in ["", "denoised", "paths", "cost", "factor1", "factor4", "albedo"] {
+    for layer in ["", "denoised", "paths", "cost", "factor1", "factor4", "albedo", "guide", "guide_direction"] {
         assert!(picture.layer(layer).is_some(), "{layer}");
     }
 
@@ -265,6 +265,7 @@ fn everything_at_once() {
     assert!(["iterations", "time", "false_color", "cache_out"].iter().all(|k| plain.get(*k).is_none()), "{plain}");
     assert!(Picture::read_exr(&dir.join("b.exr")).unwrap().layer("denoised").is_none());
     assert!(!dir.join("b.factor1.png").exists());
+    assert!(Picture::read_exr(&dir.join("b.exr")).unwrap().layer("guide").is_none());
 
     let noisy = ["--spp", "4", "--json"];
     json(&render(dir, &[&noisy[..], &["-o", "noisy.exr"]].concat()));
@@ -290,7 +291,7 @@ fn everything_at_once() {
 fn every_flag_changes_the_picture() {
     let dir = tempfile::tempdir().unwrap();
     // enough samples that the small cache is too small
-    let flags: [&[&str]; 17] = [
+    let flags: [&[&str]; 18] = [
         &[],
         &["--adaptive"],
         &["--shadow-roulette=false"],
@@ -300,7 +301,9 @@ fn every_flag_changes_the_picture() {
         &["--norm", "luminance"],
         &["--norm", "max"],
         &["--cache-bytes", "25KiB"],
-        &["--ring", "16"],
+        // which splits more
+        &["--guiding", "on"],
+        &["--ring", "16", "--guiding", "on"],
         &["--split-budget", "0"],
         &["--ledger", "16"],
         // what is guided is learned from more often
@@ -324,12 +327,12 @@ fn every_flag_changes_the_picture() {
     let leaves =
         |json: &serde_json::Value| json["iterations"].as_array().unwrap().last().unwrap()["leaves"].as_u64().unwrap();
     let base = &found[0];
-    let ring = of("--ring");
-    assert!(counter(base, "ring_peak") > 16 && counter(base, "splits") > 1000, "{base}");
+    let (guided, ring) = (of("--guiding"), of("--ring"));
+    assert!(counter(guided, "ring_peak") > 16 && counter(base, "splits") > 1000, "{guided} {base}");
     assert_eq!((counter(base, "ledger_full"), counter(base, "splits_limited_by_budget")), (0, 0), "{base}");
     assert!(
         counter(ring, "ring_peak") <= 16
-            && counter(ring, "splits_limited_by_ring") > counter(base, "splits_limited_by_ring"),
+            && counter(ring, "splits_limited_by_ring") > counter(guided, "splits_limited_by_ring"),
         "{ring}"
     );
     let budget = of("--split-budget");

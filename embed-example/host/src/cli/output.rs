@@ -12,13 +12,14 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Layers drawn in false colours, and the titles of their legends.
-const FALSE_COLOR: [(&str, &str); 6] = [
+const FALSE_COLOR: [(&str, &str); 7] = [
     ("factor1", "factor 1"),
     ("factor2", "factor 2"),
     ("factor3", "factor 3"),
     ("factor4", "factor 4+"),
     ("cost", "rays"),
     ("paths", "paths"),
+    ("guide", "share of guided samples"),
 ];
 
 /// Paths of all files of a render.
@@ -208,10 +209,10 @@ mod tests {
         FALSE_COLOR.iter().for_each(|(layer, _)| picture.add1(layer, "s", &[1.0; 2]));
         let [exr, cache, lost] = ["a.exr", "a.cache", "no/where"].map(at);
         let whole = Outputs::new(&exr, Some(&cache), None, true);
-        assert_eq!(whole.write(&picture, Some(&[7]), "", Exposure::Stops(0.0)).files.len(), 9);
-        for i in 0..9 {
+        assert_eq!(whole.write(&picture, Some(&[7]), "", Exposure::Stops(0.0)).files.len(), 10);
+        for i in 0..10 {
             let dir = tempfile::tempdir().unwrap();
-            let mut names: Vec<PathBuf> = (0..9).map(|n| dir.path().join(n.to_string())).collect();
+            let mut names: Vec<PathBuf> = (0..10).map(|n| dir.path().join(n.to_string())).collect();
             names[i] = lost.join(i.to_string());
             let (png, false_color) = (Some(names[2].clone()), names[3..].to_vec());
             let outputs = Outputs { exr: &names[0], png, cache: Some(&names[1]), checkpoint: None, false_color };

@@ -88,6 +88,7 @@ impl Flags {
             threads: self.threads.into(),
             denoise: self.denoise,
             calibrate: self.stats,
+            guide_view: self.false_color,
             ..self.settings.options()?
         };
         self.cache.apply(&mut options)?;

@@ -1,6 +1,7 @@
 //! Results of a render: sums of the pixels, and a record of every iteration.
 
 use super::calibrate::Calibration;
+use super::guide_view::GuideView;
 use croupier::unstable::film::{Aov, PixelAov, PixelStats, VarianceFactors};
 use croupier::unstable::learn::PictureStatistics;
 use croupier::unstable::learn::guiding::GuideUse;
@@ -90,6 +91,8 @@ pub struct Rendered {
     pub iterations: Vec<IterationRecord>,
     /// What path guiding has learned, if it is on.
     pub guide: Option<GuideRecord>,
+    /// The same as the camera sees it, if asked for.
+    pub guide_view: Option<GuideView>,
     /// Saved cache, if asked for.
     pub cache: Option<Vec<u8>>,
     /// Seconds of a look-up and of recording a sample, if asked for and anything is looked up.

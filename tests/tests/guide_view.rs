@@ -1,0 +1,54 @@
+//! What a guide has learned, as the camera sees it.
+
+use croupier::unstable::film::{Aov, AovSet};
+use croupier::unstable::learn::Guiding;
+use croupier::{Scene, Settings, Strategy};
+use croupier_host::bake::{BakeOptions, bake};
+use croupier_host::builtin;
+use croupier_host::drive::{GuideView, Options, Rendered, Target, Unobserved, drive};
+
+/// The box with blocks in it, a picture of another shape than its own, so that some rays meet nothing.
+fn render(guiding: Guiding, guide_view: bool) -> Rendered {
+    let bytes = bake(&builtin::cornell_blocks(), &BakeOptions::default(), |_, _| {}).unwrap().bytes;
+    let scene = Scene::from_bytes(&bytes).unwrap();
+    let mut s = Settings { size: [61, 20], strategy: Strategy::parse("ears").unwrap(), ..Settings::for_scene(&scene) };
+    s.aovs = AovSet::of(&[Aov::Normal, Aov::Alpha]);
+    s.learning.guiding = guiding;
+    drive(&bytes, &Options { guide_view, ..Options::new(s, Target::Spp(64)) }, &Unobserved).unwrap()
+}
+
+fn view(r: &Rendered) -> &GuideView {
+    r.guide_view.as_ref().unwrap()
+}
+
+/// Killed by: normals away from the camera, pixels in another order, directions that are not the guide's, a view of what no
+/// ray meets.
+#[test]
+fn guides_are_seen_where_they_have_learned() {
+    let r = render(Guiding::On, true);
+    let (normals, alpha) = (r.channels(Aov::Normal).unwrap(), &r.channels(Aov::Alpha).unwrap()[0]);
+    let (mut known, mut away, mut longest) = (0, 0, 0.0f32);
+    for (i, (share, d)) in view(&r).share.iter().zip(&view(&r).direction).enumerate() {
+        let length = d.iter().map(|x| x * x).sum::<f32>().sqrt();
+        assert!((0.0..=0.75).contains(share) && length < 1.0 && (*share > 0.0 || length == 0.0), "{i}: {share} {d:?}");
+        assert!(*share == 0.0 || alpha[i] > 0.0, "{i}: what no ray meets");
+        // not at edges, where the pixel has several normals
+        let n = [0, 1, 2].map(|axis| normals[axis][i]);
+        if *share > 0.0 && n.iter().map(|x| x * x).sum::<f32>() > 0.98 {
+            known += 1;
+            away += usize::from(n.iter().zip(d).map(|(n, d)| n * d).sum::<f32>() <= 0.0);
+            longest = longest.max(length);
+        }
+    }
+    assert!(known > 200 && away == 0, "{away} of {known}");
+    assert!((0.3..0.95).contains(&longest), "{longest}");
+}
+
+/// Killed by: a view of a render without a guide, one that nobody has asked for.
+#[test]
+fn there_is_a_view_of_what_there_is() {
+    assert!(render(Guiding::Off, true).guide_view.is_none());
+    assert!(render(Guiding::On, false).guide_view.is_none());
+    let r = render(Guiding::Auto, true);
+    assert_eq!((view(&r).share.len(), view(&r).direction.len()), (61 * 20, 61 * 20));
+}
