@@ -84,7 +84,7 @@ pub unsafe extern "C" fn croupier_session_next_samples(
         let mut to = promised!(output(samples, "samples"))?;
         let before = promised!(read_struct(work))?;
         let target = self::target(target, amount)?;
-        if !(seconds >= 0.0 && seconds < f64::INFINITY) {
+        if !(0.0..f64::INFINITY).contains(&seconds) {
             return Err(Fault::new(CROUPIER_RANGE, "seconds"));
         }
         // of whole iterations, with adaptive sampling the mean of the pixels

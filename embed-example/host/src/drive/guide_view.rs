@@ -57,7 +57,7 @@ fn mean_direction(guide: &Guide<'_>, at: &Guide8, lanes: Mask8) -> Vec3x8 {
     for i in 0..DIRECTIONS {
         // a lattice (Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018), and for the cells below
         let word = |step: u32| U32x8::splat(i.wrapping_mul(step).wrapping_add(step >> 1));
-        sum = sum + guide.sample(at, [0xcd17_f8ff, 0xa7ea_f0a5, 0x895b_7175, 0x708c_d5cf].map(word), lanes).0;
+        sum += guide.sample(at, [0xcd17_f8ff, 0xa7ea_f0a5, 0x895b_7175, 0x708c_d5cf].map(word), lanes).0;
     }
     sum * F32x8::splat(1.0 / DIRECTIONS as f32)
 }
