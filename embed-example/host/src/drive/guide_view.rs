@@ -3,15 +3,21 @@
 use croupier::Scene;
 use croupier::unstable::accel::{Intersector, WideBvh};
 use croupier::unstable::camera::generate;
-use croupier::unstable::geometry::{Ray8, SurfaceHit8};
+use croupier::unstable::geometry::{Ray8, SurfaceHit8, SurfacePoint8, offset};
 use croupier::unstable::learn::guiding::{Guide, Guide8};
+use croupier::unstable::scene::blob::MaterialKind;
 use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Directions of which a mean is taken: powers of 4 are spread evenly over the first choice that a guide makes.
 const DIRECTIONS: u32 = 64;
+/// Surfaces that rays pass: what the view is for is behind them.
+const CLEAR: [MaterialKind; 3] = [MaterialKind::Dielectric, MaterialKind::ThinDielectric, MaterialKind::Null];
+/// Most of them that a ray passes.
+const MOST_PASSED: usize = 8;
 
 /// What a guide has learned where rays through the centres of the pixels meet surfaces first, row by row; 0 where they meet
-/// none, or nothing was learned. Mirrors and glass count as other surfaces do, though paths are not guided there.
+/// none, or nothing was learned. They go straight through clear glass and water, where paths are not guided; mirrors count
+/// as other surfaces do.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GuideView {
     /// Share of the samples that the guide would choose the direction of, 0 to 3/4.
@@ -35,13 +41,10 @@ impl GuideView {
                 })
             });
             let (o, d) = generate(scene.camera, size, at[0], at[1], [F32x8::ZERO; 2]);
-            let rays = Ray8::unbounded(o, d);
-            let hit = bvh.closest(&rays, Mask8::first(share.len()));
-            let mut surface = SurfaceHit8::gather(scene, &hit);
-            let point = surface.place(scene, rays.time);
+            let (hit, point) = behind_glass(scene, &bvh, Ray8::unbounded(o, d), Mask8::first(share.len()));
             let facing = Vec3x8::select(point.ng.dot(d).gt(F32x8::ZERO), -point.ng, point.ng);
-            let learned = guide.at(point.p, Some(facing), [F32x8::splat(0.5); 3], hit.hit);
-            let known = hit.hit & learned.known & learned.fraction.gt(F32x8::ZERO);
+            let learned = guide.at(point.p, Some(facing), [F32x8::splat(0.5); 3], hit);
+            let known = hit & learned.known & learned.fraction.gt(F32x8::ZERO);
             let mean = mean_direction(guide, &learned, known);
             for i in known.lanes() {
                 (share[i], direction[i]) = (learned.fraction.lane(i), mean.lane(i));
@@ -49,6 +52,32 @@ impl GuideView {
         }
         view
     }
+}
+
+/// The first surfaces that rays meet behind clear ones, through which they go straight on; lanes that meet any.
+fn behind_glass(scene: &Scene<'_>, bvh: &WideBvh<'_>, mut rays: Ray8, lanes: Mask8) -> (Mask8, SurfacePoint8) {
+    let is_clear = |material: u32| {
+        let kind = scene.materials.get(material as usize).map(|m| m.kind);
+        CLEAR.iter().any(|clear| kind == Some(*clear as u32))
+    };
+    let (mut left, mut met) = (lanes, Mask8::NONE);
+    let mut found = SurfacePoint8 { p: Vec3x8::ZERO, ng: Vec3x8::ZERO, error: F32x8::ZERO };
+    for _ in 0..=MOST_PASSED {
+        let hit = bvh.closest(&rays, left);
+        let mut surface = SurfaceHit8::gather(scene, &hit);
+        let point = surface.place(scene, rays.time);
+        let clear = hit.hit.lanes().filter(|i| is_clear(surface.material[*i])).fold(0, |bits, i| bits | 1 << i);
+        let clear = Mask8::from_bits(clear);
+        let ends = hit.hit.and_not(clear);
+        found.p = Vec3x8::select(ends, point.p, found.p);
+        found.ng = Vec3x8::select(ends, point.ng, found.ng);
+        (met, left) = (met | ends, clear);
+        if left.none() {
+            break;
+        }
+        rays.o = Vec3x8::select(clear, offset(point.p, point.ng, point.error, rays.d), rays.o);
+    }
+    (met, found)
 }
 
 /// Mean of directions that a guide chooses.
