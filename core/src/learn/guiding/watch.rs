@@ -35,17 +35,18 @@ use bytemuck::{Pod, Zeroable};
 /// times as long as others, most where rays are cheap. And pictures gain less than is predicted, because roulette and
 /// splitting would be others without the guide: in `cbox` 1.65 is predicted once all pixels are guided, of which pictures
 /// gain 1.22 (benches/EFFICIENCY.md; the benchmark `guiding` shows errors and seconds).
-const ENABLED_ABOVE: f64 = 1.4;
+const ENABLED_ABOVE: f64 = 1.2;
 /// Standard errors that the gain must lie above a bound, at first, and once it was in doubt or all pixels are guided. A ratio
 /// of which few samples, those that found rare light, make the most has a standard error of the same size, and is most likely
 /// too small; one that turns out to be too large soon disables the guide again. Later iterations are longer, and few samples
 /// tell of the gain in each, so that one that is too large costs more. When all pixels are guided many samples tell of it: a
 /// gain that has still such an error is that of a few long paths whose ratios of densities are huge.
 const DOUBT: [f64; 2] = [0.25, 1.0];
-/// The same product below which it is disabled again. Hardly less: what is predicted rises when all pixels are guided.
-const DISABLED_BELOW: f64 = 1.35;
+/// Product below which it is disabled again, of the gain and the square of that variance, which is of guided samples then:
+/// without the guide Sobol' points would leave less (in `cbox` 0.58 in place of 0.78).
+const DISABLED_BELOW: f64 = 1.2;
 /// A gain is out of the question while the product lies below this by two standard errors.
-const UNPROMISING_BELOW: f64 = 1.2;
+const UNPROMISING_BELOW: f64 = 1.1;
 /// Variance of the picture over that of independent samples that is assumed before it is known: most scenes have 0.87 to 1
 /// after two or three samples per pixel, `smoke` has 0.65.
 const ASSUMED: f64 = 0.85;
@@ -283,6 +284,7 @@ impl Watch {
     pub(crate) fn decide(&mut self, decay: f64, enough: bool, independence: Option<f64>) {
         let (doubted, was_enabled) = (self.doubts >= IN_DOUBT, self.enabled());
         let left = independence.unwrap_or(ASSUMED).min(1.0);
+        let left = if was_enabled { left * left } else { left };
         let gain = self.gain().map(|g| GuideGain { gain: g.gain * left, ..g });
         if let Some(GuideGain { gain, error }) = gain {
             let least = if was_enabled { DISABLED_BELOW } else { ENABLED_ABOVE };
