@@ -40,13 +40,17 @@ fn what_sobol_points_gain_counts_against_the_guide() {
     }
 }
 
-/// Killed by: a factor of guided samples that counts like one of others.
+/// Killed by: a factor of guided samples that counts like one of others, one of samples before that counts like theirs, one
+/// that nobody knows.
 #[test]
 fn what_sobol_points_gain_with_a_guide_counts_twice() {
+    let again = |start: Watch, independence| {
+        decided_of(independence, Watch { promise: Promise::default(), ..start }, &promise(4000, 1.0 / 1.6))
+    };
     let enabled = decided(Watch::default(), &promise(4000, 0.5));
-    for (independence, stays) in [(0.95, true), (0.85, false)] {
-        let watch = Watch { promise: Promise::default(), ..enabled };
-        assert_eq!(decided_of(Some(independence), watch, &promise(4000, 1.0 / 1.5)).enabled(), stays);
+    for (independence, stays) in [(Some(0.95), true), (Some(0.8), false), (None, true)] {
+        let first = again(enabled, independence);
+        assert_eq!((first.enabled(), again(first, independence).enabled()), (true, stays), "{independence:?}");
     }
 }
 
