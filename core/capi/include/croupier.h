@@ -75,7 +75,7 @@ enum croupier_status
   CROUPIER_EDIT_FIXED = 15,
   // The scene is not in the state that the session was started or changed for: croupier_session_change_scene.
   CROUPIER_SCENE_CHANGED = 16,
-  // The scene needs a part that the library does not have, such as a scattering model of the host's own.
+  // Scene or settings need a part that the library does not have, such as a scattering model of the host's own.
   CROUPIER_EFFECTS = 17,
   // Session and shard, or session and saved bytes, are of different plans.
   CROUPIER_PLAN = 18,
@@ -861,6 +861,14 @@ typedef struct croupier_work {
   uint64_t rays;
   // Seconds by the program's clock.
   double seconds;
+  // Those of the last iteration.
+  uint32_t last_samples;
+  // 0.
+  uint32_t reserved;
+  // Those of the last iteration.
+  uint64_t last_rays;
+  // Those of the last iteration.
+  double last_seconds;
 } croupier_work;
 
 // Lanes used of lanes offered: eight per packet.
@@ -1406,11 +1414,10 @@ croupier_status croupier_session_change_scene(struct croupier_session *session,
 
 // Camera samples per pixel of the next iteration, for croupier_session_begin_iteration; 0 when the target is reached.
 // Iterations are short at first, so that a picture is soon there and statistics are renewed often, and longer later.
-// target is a croupier_target, amount how much of it. seconds is the time that the iterations of this picture have
-// taken by the program's clock, without pauses; not used unless the target is in seconds. work is what
-// the call before has left there. To be called between iterations.
-// CROUPIER_RANGE for an amount that is not above 0 or not finite, seconds that are below 0 or no number, or another
-// target.
+// target is a croupier_target, amount how much of it. seconds is the time that the iterations of this picture have taken by
+// the program's clock, without pauses; not read unless the target is in seconds. work is what the call before has left
+// there. To be called between iterations. CROUPIER_RANGE for an amount that is not above 0 or not finite, seconds that are
+// below 0 or not finite, or another target.
 croupier_status croupier_session_next_samples(const struct croupier_session *session,
                                               uint32_t target,
                                               double amount,
@@ -1538,14 +1545,15 @@ croupier_status croupier_scene_occluded(const struct croupier_scene *scene,
                                         uint32_t *occluded,
                                         struct croupier_message *message);
 
-// Bytes that croupier_session_save_statistics writes. CROUPIER_ABSENT if the strategy learns nothing of the scene.
+// Bytes that croupier_session_save_statistics writes. CROUPIER_ABSENT if neither
+// the strategy nor path guiding learns anything of the scene.
 croupier_status croupier_session_statistics_size(const struct croupier_session *session,
                                                  size_t *bytes,
                                                  struct croupier_message *message);
 
 // Writes what was learned of the scene, for another run, another machine, another scene of the same bounds. The bytes
-// are the same on every machine. CROUPIER_SIZE if there is too little room, CROUPIER_ABSENT if the strategy learns
-// nothing of the scene.
+// are the same on every machine. CROUPIER_SIZE if there is too little room, CROUPIER_ABSENT if neither the
+// strategy nor path guiding learns anything of the scene.
 croupier_status croupier_session_save_statistics(const struct croupier_session *session,
                                                  void *bytes,
                                                  size_t size,

@@ -34,11 +34,19 @@ pub struct croupier_work {
     pub rays: u64,
     /// Seconds by the program's clock.
     pub seconds: f64,
+    /// Those of the last iteration.
+    pub last_samples: u32,
+    /// 0.
+    pub reserved: u32,
+    /// Those of the last iteration.
+    pub last_rays: u64,
+    /// Those of the last iteration.
+    pub last_seconds: f64,
 }
 
 // SAFETY: `repr(C)` and Pod, begins with its size.
 unsafe impl Versioned for croupier_work {
-    const FIRST: u32 = 24;
+    const FIRST: u32 = 48;
     const NAME: &'static str = "work";
 
     fn empty() -> Self {
@@ -63,11 +71,10 @@ fn target(kind: u32, amount: f64) -> Result<Target, Fault> {
 
 /// Camera samples per pixel of the next iteration, for croupier_session_begin_iteration; 0 when the target is reached.
 /// Iterations are short at first, so that a picture is soon there and statistics are renewed often, and longer later.
-/// target is a croupier_target, amount how much of it. seconds is the time that the iterations of this picture have
-/// taken by the program's clock, without pauses; not used unless the target is in seconds. work is what
-/// the call before has left there. To be called between iterations.
-/// CROUPIER_RANGE for an amount that is not above 0 or not finite, seconds that are below 0 or no number, or another
-/// target.
+/// target is a croupier_target, amount how much of it. seconds is the time that the iterations of this picture have taken by
+/// the program's clock, without pauses; not read unless the target is in seconds. work is what the call before has left
+/// there. To be called between iterations. CROUPIER_RANGE for an amount that is not above 0 or not finite, seconds that are
+/// below 0 or not finite, or another target.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_next_samples(
     session: *const croupier_session,
@@ -84,6 +91,7 @@ pub unsafe extern "C" fn croupier_session_next_samples(
         let mut to = promised!(output(samples, "samples"))?;
         let before = promised!(read_struct(work))?;
         let target = self::target(target, amount)?;
+        let seconds = if matches!(target, Target::Seconds(_)) { seconds } else { 0.0 };
         if !(0.0..f64::INFINITY).contains(&seconds) {
             return Err(Fault::new(CROUPIER_RANGE, "seconds"));
         }
@@ -91,15 +99,27 @@ pub unsafe extern "C" fn croupier_session_next_samples(
         let counters = state.counters();
         let pixels = (state.film().pixels().len() as u64).max(1);
         let mean = counters.camera_samples.saturating_add(pixels >> 1).checked_div(pixels).unwrap_or(0);
-        let samples = mean.min(u32::MAX.into()) as u32;
-        let before = if samples == 0 { croupier_work::empty() } else { before };
-        let all = Work { samples, rays: counters.rays(), seconds };
-        let last = Work {
-            samples: samples.saturating_sub(before.samples),
-            rays: all.rays.saturating_sub(before.rays),
-            seconds: (seconds - before.seconds).max(0.0),
+        let all = Work { samples: mean.min(u32::MAX.into()) as u32, rays: counters.rays(), seconds };
+        let before = if all.samples == 0 { croupier_work::empty() } else { before };
+        let last = if all.samples == before.samples {
+            Work { samples: before.last_samples, rays: before.last_rays, seconds: before.last_seconds }
+        } else {
+            Work {
+                samples: all.samples.saturating_sub(before.samples),
+                rays: all.rays.saturating_sub(before.rays),
+                seconds: (seconds - before.seconds).max(0.0),
+            }
         };
         to.set(state.samples_of_next(target, &all, &last));
-        promised!(write_struct(work, &croupier_work { samples, rays: all.rays, seconds, ..croupier_work::empty() }))
+        let work_now = croupier_work {
+            samples: all.samples,
+            rays: all.rays,
+            seconds,
+            last_samples: last.samples,
+            last_rays: last.rays,
+            last_seconds: last.seconds,
+            ..croupier_work::empty()
+        };
+        promised!(write_struct(work, &work_now))
     })
 }

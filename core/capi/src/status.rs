@@ -41,7 +41,7 @@ pub enum croupier_status {
     CROUPIER_EDIT_FIXED = 15,
     /// The scene is not in the state that the session was started or changed for: croupier_session_change_scene.
     CROUPIER_SCENE_CHANGED = 16,
-    /// The scene needs a part that the library does not have, such as a scattering model of the host's own.
+    /// Scene or settings need a part that the library does not have, such as a scattering model of the host's own.
     CROUPIER_EFFECTS = 17,
     /// Session and shard, or session and saved bytes, are of different plans.
     CROUPIER_PLAN = 18,
@@ -82,7 +82,7 @@ const TEXTS: [&str; 26] = [
     "the edit breaks a rule of scenes\0",
     "only baking can change that\0",
     "the scene has changed since the session was told\0",
-    "the library lacks an effect that the scene needs\0",
+    "the library lacks a part that scene or settings need\0",
     "made for another plan\0",
     "no iteration has begun, or one is under way\0",
     "a shard has not finished the iteration\0",

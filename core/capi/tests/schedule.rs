@@ -14,7 +14,7 @@ use std::ptr;
 const SECONDS_PER_RAY: f64 = 1e-6;
 
 fn work() -> croupier_work {
-    croupier_work { struct_size: 24, ..bytemuck::Zeroable::zeroed() }
+    croupier_work { struct_size: 48, ..bytemuck::Zeroable::zeroed() }
 }
 
 /// Rays so far.
@@ -105,6 +105,31 @@ fn programs_plan_as_hosts_in_rust_do() {
     }
 }
 
+/// A program that asks twice, and one that wants more when it is done. Killed by: a second call that knows nothing of the
+/// last iteration.
+#[test]
+fn asking_twice_changes_nothing() {
+    let scene = OwnScene::new(&common::baked());
+    for target in [(CROUPIER_TARGET_SECONDS, 0.2), (CROUPIER_TARGET_RAYS, 2e5)] {
+        let render = Render::new(scene.handle, &plan(&settings(scene.handle, 1)), None);
+        let mut work = work();
+        loop {
+            let samples = next(&render, target, &mut work);
+            let kept = work;
+            assert_eq!(next(&render, target, &mut work), samples);
+            assert_eq!(work, kept);
+            if samples == 0 {
+                break;
+            }
+            iterate(&render, samples);
+        }
+        assert!(rays(&render) < 202_000, "{}", rays(&render));
+        let more = next(&render, (target.0, 1.1 * target.1), &mut work);
+        iterate(&render, more);
+        assert!(more > 0 && rays(&render) < 223_000, "{more} more samples: {} rays", rays(&render));
+    }
+}
+
 /// Work begins anew with the picture, whatever the struct holds. Killed by: work of the picture before that counts.
 #[test]
 fn restarted_pictures_are_planned_anew() {
@@ -166,11 +191,11 @@ fn what_cannot_be_planned_is_refused() {
     assert!(text.contains("target") && text.contains('4'), "{text}");
     fails!(CROUPIER_NULL, croupier_session_next_samples(session, 0, 1.0, 0.0, ptr::null_mut(), &raw mut samples));
     fails!(CROUPIER_NULL, croupier_session_next_samples(session, 0, 1.0, 0.0, &raw mut kept, ptr::null_mut()));
-    kept.struct_size = 23;
+    kept.struct_size = 47;
     fails!(CROUPIER_STRUCT_SIZE, croupier_session_next_samples(session, 0, 1.0, 0.0, &raw mut kept, &raw mut samples));
     assert_eq!(samples, 7, "nothing is written");
     // the largest and the smallest amounts are as good as any
-    kept.struct_size = 24;
+    kept.struct_size = 48;
     for (target, amount) in [(0, 1e300), (0, 1e-300), (1, 1e300), (2, 1e300), (3, 1e-300)] {
         ok!(croupier_session_next_samples(session, target, amount, 0.0, &raw mut kept, &raw mut samples));
         assert_eq!(samples, 1);

@@ -29,7 +29,7 @@ SIZE(croupier_transform, 96);
 SIZE(croupier_pixel, 32);
 SIZE(croupier_error_estimate, 48);
 SIZE(croupier_iteration, 32);
-SIZE(croupier_work, 24);
+SIZE(croupier_work, 48);
 SIZE(croupier_counters, 320);
 SIZE(croupier_rays8, 288);
 SIZE(croupier_hits8, 192);
