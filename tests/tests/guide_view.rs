@@ -5,11 +5,17 @@ use croupier::unstable::learn::Guiding;
 use croupier::{Scene, Settings, Strategy};
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::builtin;
+use croupier_host::description::{Model, SceneDescription};
 use croupier_host::drive::{GuideView, Options, Rendered, Target, Unobserved, drive};
+use croupier_tests::scenes::{add_quad, facing_z};
+
+fn render(guiding: Guiding, guide_view: bool) -> Rendered {
+    render_scene(&builtin::cornell_blocks(), guiding, guide_view)
+}
 
 /// The box with blocks in it, a picture of another shape than its own, so that some rays meet nothing.
-fn render(guiding: Guiding, guide_view: bool) -> Rendered {
-    let bytes = bake(&builtin::cornell_blocks(), &BakeOptions::default(), |_, _| {}).unwrap().bytes;
+fn render_scene(scene: &SceneDescription, guiding: Guiding, guide_view: bool) -> Rendered {
+    let bytes = bake(scene, &BakeOptions::default(), |_, _| {}).unwrap().bytes;
     let scene = Scene::from_bytes(&bytes).unwrap();
     let mut s = Settings { size: [61, 20], strategy: Strategy::parse("ears").unwrap(), ..Settings::for_scene(&scene) };
     s.aovs = AovSet::of(&[Aov::Normal, Aov::Alpha]);
@@ -51,4 +57,17 @@ fn there_is_a_view_of_what_there_is() {
     assert!(render(Guiding::On, false).guide_view.is_none());
     let r = render(Guiding::Auto, true);
     assert_eq!((view(&r).share.len(), view(&r).direction.len()), (61 * 20, 61 * 20));
+}
+
+/// Killed by: a view that ends at glass, or stays in front of it.
+#[test]
+fn guides_are_seen_through_glass() {
+    let mut scene = builtin::cornell_blocks();
+    let glass = scene.add_material("glass", Model::ThinDielectric { int_ior: 1.5, ext_ior: 1.0 });
+    for z in [2.0, 2.5] {
+        add_quad(&mut scene, "pane", glass, facing_z(3.0, z, 1.0));
+    }
+    let r = render_scene(&scene, Guiding::On, true);
+    let known = view(&r).share.iter().filter(|share| **share > 0.0).count();
+    assert!(known > 200, "{known}");
 }

@@ -265,6 +265,9 @@ fn everything_at_once() {
     assert!(["iterations", "time", "false_color", "cache_out"].iter().all(|k| plain.get(*k).is_none()), "{plain}");
     assert!(Picture::read_exr(&dir.join("b.exr")).unwrap().layer("denoised").is_none());
     assert!(!dir.join("b.factor1.png").exists());
+    let unguided = ["--rrs", "ears", "--spp", "2", "--guiding", "off", "--false-color", "--json", "-o", "g.exr"];
+    assert_eq!(json(&render(dir, &unguided))["false_color"].as_array().unwrap().len(), 6);
+    assert!(!dir.join("g.guide.png").exists());
     assert!(Picture::read_exr(&dir.join("b.exr")).unwrap().layer("guide").is_none());
 
     let noisy = ["--spp", "4", "--json"];

@@ -94,6 +94,12 @@ impl<'a> Outputs<'a> {
         spares(&others, &resumed.map(Path::to_path_buf).into_iter().collect::<Vec<_>>())
     }
 
+    /// Pictures in false colours of layers that there are.
+    pub(crate) fn drawn(&self, picture: &Picture) -> Vec<PathBuf> {
+        let drawings = self.false_color.iter().zip(FALSE_COLOR);
+        drawings.filter(|(_, (layer, _))| picture.layer(layer).is_some()).map(|(path, _)| path.clone()).collect()
+    }
+
     /// Writes everything: the PNG and the false colours are made from `picture`. `image` names the layer of the PNG.
     pub(crate) fn write(&self, picture: &Picture, cache: Option<&[u8]>, image: &str, exposure: Exposure) -> Written {
         let mut written = Written::default();

@@ -62,8 +62,8 @@ pub(crate) struct Flags {
     /// Add the denoised picture as layer `denoised`, and tone-map it for the PNG; always for the built-in still life
     #[arg(long)]
     denoise: bool,
-    /// Also write roulette factors, rays per sample and paths per sample as false-colour pictures with legends:
-    /// NAME.factor1.png to NAME.factor4.png, NAME.cost.png, NAME.paths.png
+    /// Also write roulette factors, rays per sample, paths per sample and what path guiding has learned as false-colour
+    /// pictures with legends: NAME.factor1.png to NAME.factor4.png, NAME.cost.png, NAME.paths.png, NAME.guide.png
     #[arg(long)]
     false_color: bool,
     /// Print counters, and statistics of paths, iterations and time
@@ -212,6 +212,7 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Result<ExitCode, Box<dy
     if checkpoint_error.is_none() {
         written.files.extend(checkpoint.filter(|c| c.is_file()).map(Path::to_path_buf));
     }
+    let drawn = outputs.drawn(picture);
     let report = Report {
         stats,
         notes: &notes,
@@ -224,7 +225,7 @@ pub(crate) fn run(path: Option<&Path>, flags: &Flags) -> Result<ExitCode, Box<dy
         stopped_early: *stopped_early,
         output: outputs.exr,
         png: outputs.png.as_deref(),
-        false_color: &outputs.false_color,
+        false_color: &drawn,
         cache_out: outputs.cache,
         checkpoint,
         denoised: options.denoise,

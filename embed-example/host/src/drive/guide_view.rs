@@ -2,7 +2,7 @@
 
 use croupier::Scene;
 use croupier::unstable::accel::{Intersector, WideBvh};
-use croupier::unstable::camera::generate;
+use croupier::unstable::camera::project;
 use croupier::unstable::geometry::{Ray8, SurfaceHit8, SurfacePoint8, offset};
 use croupier::unstable::learn::guiding::{Guide, Guide8};
 use croupier::unstable::scene::blob::MaterialKind;
@@ -10,9 +10,7 @@ use croupier::unstable::simd::{F32x8, Mask8, U32x8, Vec3x8};
 
 /// Directions of which a mean is taken: powers of 4 are spread evenly over the first choice that a guide makes.
 const DIRECTIONS: u32 = 64;
-/// Surfaces that rays pass: what the view is for is behind them.
-const CLEAR: [MaterialKind; 3] = [MaterialKind::Dielectric, MaterialKind::ThinDielectric, MaterialKind::Null];
-/// Most of them that a ray passes.
+/// Most clear surfaces that a ray passes.
 const MOST_PASSED: usize = 8;
 
 /// What a guide has learned where rays through the centres of the pixels meet surfaces first, row by row; 0 where they meet
@@ -40,7 +38,7 @@ impl GuideView {
                     [pixel % width, pixel / width][axis] as f32 + 0.5
                 })
             });
-            let (o, d) = generate(scene.camera, size, at[0], at[1], [F32x8::ZERO; 2]);
+            let (o, d) = project(scene.camera, size, at[0], at[1], [F32x8::splat(0.5); 2]);
             let (hit, point) = behind_glass(scene, &bvh, Ray8::unbounded(o, d), Mask8::first(share.len()));
             let facing = Vec3x8::select(point.ng.dot(d).gt(F32x8::ZERO), -point.ng, point.ng);
             let learned = guide.at(point.p, Some(facing), [F32x8::splat(0.5); 3], hit);
@@ -57,8 +55,8 @@ impl GuideView {
 /// The first surfaces that rays meet behind clear ones, through which they go straight on; lanes that meet any.
 fn behind_glass(scene: &Scene<'_>, bvh: &WideBvh<'_>, mut rays: Ray8, lanes: Mask8) -> (Mask8, SurfacePoint8) {
     let is_clear = |material: u32| {
-        let kind = scene.materials.get(material as usize).map(|m| m.kind);
-        CLEAR.iter().any(|clear| kind == Some(*clear as u32))
+        let kind = scene.materials.get(material as usize).and_then(|m| MaterialKind::from_u32(m.kind));
+        kind.is_some_and(|k| k.facts().transmissive && k.facts().delta)
     };
     let (mut left, mut met) = (lanes, Mask8::NONE);
     let mut found = SurfacePoint8 { p: Vec3x8::ZERO, ng: Vec3x8::ZERO, error: F32x8::ZERO };
