@@ -149,7 +149,7 @@ struct Args {
     /// Also write everything, with the errors over time, into this file after every scene.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write the tables into benches/results; needs all scenes and one of the three sets of strategies.
+    /// Write the tables into benches/results; needs all scenes and one of the sets of strategies.
     #[arg(long, conflicts_with_all = ["only", "strategies", "first_seed", "equal_samples", "quick"])]
     write: bool,
 }
