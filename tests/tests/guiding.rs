@@ -163,8 +163,8 @@ fn narrow_phase_functions_are_not_guided() {
     }
 }
 
-/// Guiding of some blocks of pixels, and of no others, by adversarial guides. Killed by: a choice of
-/// pixels that goes with what they find, weights of samples that are not guided by a mixture's density.
+/// Guiding of some blocks of pixels, and of no others, by adversarial guides. Killed by: a choice of pixels that goes with
+/// what they find, weights of samples that are not guided by a mixture's density.
 #[test]
 fn watched_guides_do_not_bias() {
     let scene = blob(&cornell([32, 32]));

@@ -116,7 +116,7 @@ fn caustics_are_found_at_once() {
         let s = Settings { seed, ..guided(&scene, Guiding::Auto) };
         run(&scene, &s, &[1, 1, 1, 1], &mut |_, l| {
             found = l.guide_use();
-            // a gain that is more than Sobol' points would make of samples without the guide
+            // the bound that the guide was enabled above when light paths were tuned, in a picture of unknown independence
             let gain = found.and_then(|f| f.gain).map(|g| 0.85 * g.gain * (1.0 - 0.25 * g.error));
             once |= gain.is_some_and(|gain| gain > 1.08);
         });

@@ -109,8 +109,8 @@ struct Args {
     /// scenes whose reference is wrong.
     #[arg(long = "reference", value_name = "SCENE=FILE", value_delimiter = ',')]
     references: Vec<String>,
-    /// Only these strategies (any that `croupier render --rrs` knows, with options, and behind a `+` other choices:
-    /// adaptive, shadow, constant, small, truth, idle); several with commas.
+    /// Only these strategies (any that `croupier render --rrs` knows, with options, and behind a `+` other choices
+    /// such as adaptive, shadow, auto, small, 4MiB, hashed); several with commas.
     #[arg(long = "strategy", value_name = "NAME", value_delimiter = ',', conflicts_with = "all")]
     strategies: Vec<String>,
     /// Every strategy that needs no options: an overview from short renders.

@@ -861,13 +861,13 @@ typedef struct croupier_work {
   uint64_t rays;
   // Seconds by the program's clock.
   double seconds;
-  // Those of the last iteration.
+  // Camera samples per pixel of the last iteration.
   uint32_t last_samples;
   // 0.
   uint32_t reserved;
-  // Those of the last iteration.
+  // Rays of all kinds of the last iteration.
   uint64_t last_rays;
-  // Those of the last iteration.
+  // Seconds of the last iteration.
   double last_seconds;
 } croupier_work;
 
@@ -1545,15 +1545,15 @@ croupier_status croupier_scene_occluded(const struct croupier_scene *scene,
                                         uint32_t *occluded,
                                         struct croupier_message *message);
 
-// Bytes that croupier_session_save_statistics writes. CROUPIER_ABSENT if neither
-// the strategy nor path guiding learns anything of the scene.
+// Bytes that croupier_session_save_statistics writes. CROUPIER_ABSENT if neither the strategy nor path
+// guiding learns anything of the scene.
 croupier_status croupier_session_statistics_size(const struct croupier_session *session,
                                                  size_t *bytes,
                                                  struct croupier_message *message);
 
 // Writes what was learned of the scene, for another run, another machine, another scene of the same bounds. The bytes
-// are the same on every machine. CROUPIER_SIZE if there is too little room, CROUPIER_ABSENT if neither the
-// strategy nor path guiding learns anything of the scene.
+// are the same on every machine. CROUPIER_SIZE if there is too little room, CROUPIER_ABSENT if neither the strategy
+// nor path guiding learns anything of the scene.
 croupier_status croupier_session_save_statistics(const struct croupier_session *session,
                                                  void *bytes,
                                                  size_t size,

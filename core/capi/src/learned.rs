@@ -21,8 +21,8 @@ impl CoreError for CacheError {
 /// Name in messages.
 const STATISTICS: &str = "statistics";
 
-/// Bytes that croupier_session_save_statistics writes. CROUPIER_ABSENT if neither
-/// the strategy nor path guiding learns anything of the scene.
+/// Bytes that croupier_session_save_statistics writes. CROUPIER_ABSENT if neither the strategy nor path
+/// guiding learns anything of the scene.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_statistics_size(
     session: *const croupier_session,
@@ -39,8 +39,8 @@ pub unsafe extern "C" fn croupier_session_statistics_size(
 }
 
 /// Writes what was learned of the scene, for another run, another machine, another scene of the same bounds. The bytes
-/// are the same on every machine. CROUPIER_SIZE if there is too little room, CROUPIER_ABSENT if neither the
-/// strategy nor path guiding learns anything of the scene.
+/// are the same on every machine. CROUPIER_SIZE if there is too little room, CROUPIER_ABSENT if neither the strategy
+/// nor path guiding learns anything of the scene.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn croupier_session_save_statistics(
     session: *const croupier_session,

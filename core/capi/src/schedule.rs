@@ -6,6 +6,7 @@ use crate::session::{croupier_session, session_at};
 use crate::status::croupier_status::{self, *};
 use bytemuck::{Pod, Zeroable};
 use croupier::unstable::schedule::{Target, Work};
+use croupier_target::*;
 
 /// What ends a render; the amount is a parameter of croupier_session_next_samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,13 +35,13 @@ pub struct croupier_work {
     pub rays: u64,
     /// Seconds by the program's clock.
     pub seconds: f64,
-    /// Those of the last iteration.
+    /// Camera samples per pixel of the last iteration.
     pub last_samples: u32,
     /// 0.
     pub reserved: u32,
-    /// Those of the last iteration.
+    /// Rays of all kinds of the last iteration.
     pub last_rays: u64,
-    /// Those of the last iteration.
+    /// Seconds of the last iteration.
     pub last_seconds: f64,
 }
 
@@ -61,10 +62,10 @@ fn target(kind: u32, amount: f64) -> Result<Target, Fault> {
     }
     // casts end at the largest numbers; less than a whole sample, or ray, is one
     match kind {
-        0 => Ok(Target::Spp((amount as u32).max(1))),
-        1 => Ok(Target::Seconds(amount)),
-        2 => Ok(Target::Rays((amount as u64).max(1))),
-        3 => Ok(Target::Error(amount)),
+        _ if kind == CROUPIER_TARGET_SAMPLES as u32 => Ok(Target::Spp((amount as u32).max(1))),
+        _ if kind == CROUPIER_TARGET_SECONDS as u32 => Ok(Target::Seconds(amount)),
+        _ if kind == CROUPIER_TARGET_RAYS as u32 => Ok(Target::Rays((amount as u64).max(1))),
+        _ if kind == CROUPIER_TARGET_ERROR as u32 => Ok(Target::Error(amount)),
         _ => Err(Fault::new(CROUPIER_RANGE, "target").at(kind.into())),
     }
 }

@@ -70,6 +70,7 @@ pub(super) fn packets_of(tiles: &Tiles, index: u32) -> u32 {
     let pixels = tiles.pixels().max(1);
     let paths = (pixels / PIXELS).max(FEWEST.min(2 * pixels / PIXELS)).max(1);
     // a picture has less than 2^32 pixels
+    // and compilers do not see that they are not 0 times 8
     let packets = (tiles.pixels_of(index) as u64 * paths).div_ceil((8 * pixels).max(1));
     u32::try_from(packets).unwrap_or(u32::MAX)
 }

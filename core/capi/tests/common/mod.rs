@@ -5,6 +5,7 @@ use croupier_capi::*;
 use croupier_host::bake::{BakeOptions, bake};
 use croupier_host::blob::AlignedBytes;
 use croupier_host::builtin;
+pub(crate) use croupier_tests::embedding::SETTINGS;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::ptr;
 
@@ -114,16 +115,6 @@ pub(crate) fn set(settings: &mut croupier_settings, name: &str, value: &str) {
     let (name, value) = (CString::new(name).expect("a name"), CString::new(value).expect("a value"));
     ok!(croupier_settings_set(settings, name.as_ptr(), value.as_ptr()));
 }
-
-/// Settings of the examples, by name.
-pub(crate) const SETTINGS: [(&str, &str); 6] = [
-    ("rrs", "ears"),
-    ("ring", "64"),
-    ("ledger", "256"),
-    ("cache-bytes", "65536"),
-    ("split-budget", "64"),
-    ("pixel-estimator", "blocks"),
-];
 
 /// Settings of the examples.
 pub(crate) fn settings(scene: *const croupier_scene, shards: u32) -> croupier_settings {

@@ -30,7 +30,9 @@ use crate::rng::mix;
 use bytemuck::{Pod, Zeroable};
 
 /// Gain times the variance of the picture over that of independent samples, less some of its standard error ([`DOUBT`]),
-/// from which on the guide is enabled. The factor is more than what Sobol' points lose by it, as some of them go on: in
+/// above which the guide is enabled, and stays so. From the second decision after that on the film has samples of guided
+/// pixels, and the square of that variance counts: without the guide Sobol' points would leave less (in `cbox` 0.58 in place
+/// of 0.78). The factor is more than what Sobol' points lose by it, as some of them go on: in
 /// `veach_mis`, whose factor is a half, 1.03 times, in `cbox`, where it is 0.6, 1.16 times. Guided samples take 1.03 to 1.6
 /// times as long as others, most where rays are cheap. And pictures gain less than is predicted, because roulette and
 /// splitting would be others without the guide: in `cbox` 1.56 is predicted once all pixels are guided, of which pictures
@@ -42,9 +44,6 @@ const ENABLED_ABOVE: f64 = 1.2;
 /// tell of the gain in each, so that one that is too large costs more. When all pixels are guided many samples tell of it: a
 /// gain that has still such an error is that of a few long paths whose ratios of densities are huge.
 const DOUBT: [f64; 2] = [0.25, 1.0];
-/// The same product below which it is disabled again. From the second decision on the film has samples of guided pixels, and
-/// the square of that variance counts: without the guide Sobol' points would leave less (in `cbox` 0.58 in place of 0.78).
-const DISABLED_BELOW: f64 = 1.2;
 /// A gain is out of the question while the product lies below this by two standard errors.
 const UNPROMISING_BELOW: f64 = 1.1;
 /// Variance of the picture over that of independent samples that is assumed before it is known: most scenes have 0.87 to 1
@@ -284,14 +283,13 @@ impl Watch {
     pub(crate) fn decide(&mut self, decay: f64, enough: bool, independence: Option<f64>) {
         let (doubted, was_enabled) = (self.doubts >= IN_DOUBT, self.enabled());
         let left = independence.unwrap_or(ASSUMED).min(1.0);
-        let (is_of_guided, enabled_before) = (self.enabled > 1 && independence.is_some(), self.enabled);
-        let gain = self.gain().map(|g| GuideGain { gain: g.gain * if is_of_guided { left * left } else { left }, ..g });
+        let left = if self.enabled > 1 && independence.is_some() { left * left } else { left };
+        let gain = self.gain().map(|g| GuideGain { gain: g.gain * left, ..g });
         if let Some(GuideGain { gain, error }) = gain {
-            let least = if was_enabled { DISABLED_BELOW } else { ENABLED_ABOVE };
             let [at_first, in_doubt] = DOUBT;
             let doubt = if doubted || was_enabled { in_doubt } else { at_first };
-            let pays = gain * (1.0 - doubt * error) > least;
-            self.enabled = if pays { enabled_before.saturating_add(1) } else { 0 };
+            let pays = gain * (1.0 - doubt * error) > ENABLED_ABOVE;
+            self.enabled = if pays { self.enabled.saturating_add(1) } else { 0 };
         }
         let [informed, unclear, longest] = PATIENCE;
         let hopeful = gain.is_some_and(|g| g.gain * (1.0 + g.error) > ENABLED_ABOVE);

@@ -94,10 +94,17 @@ impl<'a> Outputs<'a> {
         spares(&others, &resumed.map(Path::to_path_buf).into_iter().collect::<Vec<_>>())
     }
 
-    /// Pictures in false colours of layers that there are.
+    /// Pictures in false colours of layers that there are: files, names and titles of the layers, and what is drawn.
+    fn drawings<'p>(&'p self, picture: &'p Picture) -> impl Iterator<Item = (&'p Path, [&'static str; 2], &'p [f32])> {
+        self.false_color.iter().zip(FALSE_COLOR).filter_map(|(path, (layer, title))| {
+            let channel = picture.layer(layer)?.channels.first()?;
+            Some((path.as_path(), [layer, title], channel.values.as_slice()))
+        })
+    }
+
+    /// Files of pictures in false colours.
     pub(crate) fn drawn(&self, picture: &Picture) -> Vec<PathBuf> {
-        let drawings = self.false_color.iter().zip(FALSE_COLOR);
-        drawings.filter(|(_, (layer, _))| picture.layer(layer).is_some()).map(|(path, _)| path.clone()).collect()
+        self.drawings(picture).map(|(path, ..)| path.into()).collect()
     }
 
     /// Writes everything: the PNG and the false colours are made from `picture`. `image` names the layer of the PNG.
@@ -108,11 +115,10 @@ impl<'a> Outputs<'a> {
         if let Some(png) = &self.png {
             written.add(png, self.write_png(png, picture, image, exposure));
         }
-        for (path, (layer, title)) in self.false_color.iter().zip(FALSE_COLOR) {
-            let Some(channel) = picture.layer(layer).and_then(|l| l.channels.first()) else { continue };
+        for (path, [layer, title], values) in self.drawings(picture) {
             let factors = layer.starts_with("factor");
-            let scale = if factors { Scale::FACTORS } else { Scale::sequential(&channel.values) };
-            let drawing = draw(&channel.values, picture.width, &scale, title);
+            let scale = if factors { Scale::FACTORS } else { Scale::sequential(values) };
+            let drawing = draw(values, picture.width, &scale, title);
             written.add(path, write_png(path, drawing.width, drawing.height, &drawing.pixels));
         }
         written
