@@ -117,6 +117,10 @@ impl F32x8 {
         return Self::new(self.to_array().map(|x| {
             let y: f32;
             // SAFETY: one FPU instruction on registers, which every `eabihf` target has.
+            #[expect(
+                unsafe_code,
+                reason = "the compiler has no safe function for the instruction without the standard library"
+            )]
             unsafe {
                 core::arch::asm!("vsqrt.f32 {0}, {1}", out(sreg) y, in(sreg) x,
                     options(pure, nomem, nostack, preserves_flags));

@@ -10,7 +10,7 @@
 //! Operations are inlined, which is right for processors with vector instructions. On one without, each is some 30
 //! instructions: with the feature `compact` they are called instead. That changes size and speed only.
 #![no_std]
-#![cfg_attr(not(all(target_arch = "arm", target_abi = "eabihf")), forbid(unsafe_code))]
+#![deny(unsafe_code)]
 
 #[cfg(target_endian = "big")]
 compile_error!(
@@ -22,11 +22,13 @@ mod f32x8;
 mod int;
 mod mask;
 mod math;
+mod prefetch;
 mod vec3;
 
 pub use f32x8::F32x8;
 pub use int::{I32x8, U32x8};
 pub use mask::Mask8;
+pub use prefetch::prefetch;
 pub use vec3::{Frame8, LUMINANCE, Vec3x8};
 
 /// Lanes of every vector type here.
