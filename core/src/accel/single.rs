@@ -32,9 +32,10 @@ use croupier_simd::{F32x8, Mask8, U32x8, prefetch};
 /// [`MAX_TREE_DEPTH`](crate::scene::blob::MAX_TREE_DEPTH) levels fit, and one that is written but not kept.
 pub(super) const STACK: usize = 256;
 
-/// Trees of more nodes than this, with their leaves some 2 MB, do not stay in the fast caches: they are prefetched.
+/// Node tables longer than this, of all trees of a scene, are prefetched: with their leaves they have some 2 MB or more,
+/// which does not stay in the fast caches.
 const LARGE: usize = 1024;
-/// Cache lines of a node or leaf that are prefetched. The next ones follow by themselves: four gain no more.
+/// Cache lines of a node or leaf that are prefetched. With four no further gain was found.
 const AHEAD: usize = 2;
 
 /// Entry distance (upper half, float bits) and child reference of the subtrees to visit.
@@ -171,7 +172,8 @@ fn take_turns<const ANY: bool, const ROOM: usize, B: Blocking>(
             // without a branch on what cannot be predicted
             let kind = usize::from(child & LEAF_BIT != 0);
             let size = [size_of::<Node>(), size_of::<Leaf>()][kind];
-            prefetch::<AHEAD>(tables[kind], (child & CHILD_INDEX) as usize * size);
+            // trees that were not checked may hold any index
+            prefetch::<AHEAD>(tables[kind], ((child & CHILD_INDEX) as usize).wrapping_mul(size));
         }
     };
     let (mut live, mut found, mut deep) = (lanes, 0u32, 0u32);
