@@ -85,6 +85,12 @@ fn subtract(sin_a: F32x8, cos_a: F32x8, sin_b: F32x8, cos_b: F32x8) -> (F32x8, F
 /// negative.
 #[inline(always)]
 pub fn light_importance(node: &LightNode, p: [f32; 3], n: [f32; 3]) -> F32x8 {
+    importance(node, p, n, Mask8::splat(n == [0.0; 3]))
+}
+
+/// [`light_importance`], `in_media` in all lanes or in none.
+#[inline(always)]
+fn importance(node: &LightNode, p: [f32; 3], n: [f32; 3], in_media: Mask8) -> F32x8 {
     let rows = |r: &[[f32; 8]; 3]| {
         let [x, y, z] = r.map(F32x8::new);
         Vec3x8::new(x, y, z)
@@ -112,7 +118,7 @@ pub fn light_importance(node: &LightNode, p: [f32; 3], n: [f32; 3]) -> F32x8 {
     // at the surface, whatever its side
     let (sin, cos) = over_distance(splat(n).dot(d).abs());
     let (_, cos) = subtract(sin, cos, sin_ball, cos_ball);
-    let any_side = inside | Mask8::splat(n == [0.0; 3]);
+    let any_side = inside | in_media;
     let at_surface = any_side.select(F32x8::ONE, cos) * (1.0 - SURFACE_FLOOR) + SURFACE_FLOOR;
     let near = weight * at_light * at_surface * inv_square;
     let infinite = !radius.is_finite();
@@ -177,6 +183,8 @@ fn share(importance: f64, total: f64) -> f32 {
 #[inline(never)]
 fn select(nodes: &[LightNode], point: Vec3x8, normal: Vec3x8, r: U32x8, mask: Mask8) -> (U32x8, F32x8) {
     let [points, normals] = [point, normal].map(|v| [v.x.to_array(), v.y.to_array(), v.z.to_array()]);
+    let in_media = normal.x.eq(F32x8::ZERO) & normal.y.eq(F32x8::ZERO) & normal.z.eq(F32x8::ZERO);
+    let of = |rows: &[[f32; 8]; 3], i: usize| rows.each_ref().map(|row| row[i]);
     let mut u = r.to_array().map(|r| f64::from(r) / 4_294_967_296.0);
     let mut node = U32x8::select(mask, U32x8::splat(0), U32x8::splat(NONE)).to_array();
     let mut probability = mask.zero_unless(F32x8::ONE);
@@ -188,7 +196,7 @@ fn select(nodes: &[LightNode], point: Vec3x8, normal: Vec3x8, r: U32x8, mask: Ma
         let mut rows = [F32x8::ZERO; 8];
         for i in left.lanes() {
             if let Some(node) = nodes.get(node[i] as usize) {
-                rows[i] = light_importance(node, points.map(|x| x[i]), normals.map(|x| x[i]));
+                rows[i] = importance(node, of(&points, i), of(&normals, i), Mask8::splat(in_media.lane(i)));
             }
         }
         let choice = Choice::of(F32x8::transpose(rows), &u);
