@@ -211,7 +211,7 @@ const VEACH_MIS: &[Row] = &[
     calm(tried("adrrs", Trial::Small)),
     tried("adrrs", Trial::Reloaded),
     short("adrrs", Trial::Poisoned, 3, USUAL),
-    tried("ears", Trial::Ring),
+    tried("ears:plain", Trial::Ring),
     tried("ears", Trial::Ledger),
     tried("ears", Trial::Cache),
     calm(tried("ears", Trial::Small)),
