@@ -88,7 +88,7 @@ pub fn light_importance(node: &LightNode, p: [f32; 3], n: [f32; 3]) -> F32x8 {
     importance(node, p, n, Mask8::splat(n == [0.0; 3]))
 }
 
-/// [`light_importance`], `in_media` in all lanes or in none.
+/// [`light_importance`] for callers that know whether `n` is 0: `in_media` holds in all lanes then, else in none.
 #[inline(always)]
 fn importance(node: &LightNode, p: [f32; 3], n: [f32; 3], in_media: Mask8) -> F32x8 {
     let rows = |r: &[[f32; 8]; 3]| {
@@ -184,6 +184,7 @@ fn share(importance: f64, total: f64) -> f32 {
 fn select(nodes: &[LightNode], point: Vec3x8, normal: Vec3x8, r: U32x8, mask: Mask8) -> (U32x8, F32x8) {
     let [points, normals] = [point, normal].map(|v| [v.x.to_array(), v.y.to_array(), v.z.to_array()]);
     let in_media = normal.x.eq(F32x8::ZERO) & normal.y.eq(F32x8::ZERO) & normal.z.eq(F32x8::ZERO);
+    // borrowed: to map the rows themselves copies all eight lanes for one
     let of = |rows: &[[f32; 8]; 3], i: usize| rows.each_ref().map(|row| row[i]);
     let mut u = r.to_array().map(|r| f64::from(r) / 4_294_967_296.0);
     let mut node = U32x8::select(mask, U32x8::splat(0), U32x8::splat(NONE)).to_array();

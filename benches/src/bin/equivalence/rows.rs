@@ -211,7 +211,7 @@ const VEACH_MIS: &[Row] = &[
     calm(tried("adrrs", Trial::Small)),
     tried("adrrs", Trial::Reloaded),
     short("adrrs", Trial::Poisoned, 3, USUAL),
-    tried("ears:plain", Trial::Ring),
+    calm(short("fixed:3.3", Trial::Ring, 3, &[8])),
     tried("ears", Trial::Ledger),
     tried("ears", Trial::Cache),
     calm(tried("ears", Trial::Small)),
